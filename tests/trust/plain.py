@@ -375,7 +375,7 @@ def tracks():
     one = work(*RUNS["folds missed"][:2])
     folded = ambiguous_plots.Recorded().simulated(one.case, 3)
     made["folded plots"] = np.nan_to_num(folded["velocity_mps"])
-    made["folds of one"] = np.nan_to_num(folds.simulated_lists(one.plan.world, one.plan.banks, 0)[1])
+    made["folds of one"] = np.nan_to_num(folds.simulate_hypotheses(one.plan.world, one.plan.banks, 0)[1])
     measured = {name: folded[name] for name in ("t_s", "range_m", "velocity_mps")}
     for options in one.case.spec.filters:
         if likelihood := ambiguous_plots.Recorded().likelihood(one.case, options.name, [measured]):
@@ -384,7 +384,7 @@ def tracks():
     likelihood = range_doppler_plots.PlotLikelihood(one.case, None, [recorded])
     made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])
     one = work(*RUNS["multimodel families"][:2])
-    z, R, _ = multimodel.measured(one.plan, 0)
+    z, R, _ = multimodel.simulate_plots(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R
     made["multimodel drawn"] = np.stack(list(multimodel_plots.drawing(one.case)(0, 3).columns.values()))
     r = np.linalg.norm(z[:, :, 0], axis=1)

@@ -11,17 +11,17 @@ from radarsim.config import fields
 from radarsim.config.fields import At, Design, Model, NonNegative, Positive, Probability, Whole, at, cross_check, key
 from radarsim.constants import STANDARD_GRAVITY_MPS2
 
-MOST_RARE_SCANS = 64  # sequences of folds are looked for before the run, and each shifts the noise of every scan
-MOST_SCANS = 10_000  # plots and estimates of eight realisations are held for the whole run
-MOST_HYPOTHESES = 100_000
-MOST_RATES = 16
-MOST_RATIO = 1000  # whole numbers that two repetition rates must be to each other, to have a common remainder
-PROPORTION = 1e6  # largest ratio of what the prior leaves open to what a plot tells: beyond, rounding shows
-MOST_FOLDS = 1e4  # spans in a standard deviation of the prior: the first scan has so many folds to look at
-DISTINCT = 1e-9  # relative difference from which two spans are two
-BIASES = ("bias_range_m", "bias_velocity_mps", "sigma_bias_range_m", "sigma_bias_velocity_mps")  # of range_doppler
-KNOWN_FOLDS = "with known folds"  # after a filter's name
-LISTED = {"doppler": "folded", "merge": "never"}  # filters that keep several hypotheses
+MAX_RARE_SCANS = 64  # the search for sequences of folds precedes the run, and each shifts the noise of every scan
+MAX_SCANS = 10_000  # plots and estimates of eight realisations are stored for the whole run
+MAX_HYPOTHESES = 100_000
+MAX_RATES = 16
+MAX_RATIO = 1000  # largest whole number in the ratio of two repetition rates that have a common remainder
+MAX_PROPORTION = 1e6  # largest ratio of the prior's spread to a plot's accuracy: beyond, rounding shows
+MAX_FOLDS = 1e4  # spans in a standard deviation of the prior: the first scan tries that many folds
+MIN_SPAN_DIFFERENCE = 1e-9  # relative difference below which two spans count as equal
+BIAS_KEYS = ("bias_range_m", "bias_velocity_mps", "sigma_bias_range_m", "sigma_bias_velocity_mps")  # of range_doppler
+ORACLE_SUFFIX = "with known folds"  # appended to a filter's name
+LISTS_HYPOTHESES = {"doppler": "folded", "merge": "never"}  # keys of filters that keep several hypotheses
 
 Order = Annotated[int, Whole(0, 2)]
 
@@ -29,7 +29,7 @@ Order = Annotated[int, Whole(0, 2)]
 class Radar(fields.Radar):
     """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
 
-    repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_RATES)] = key(
+    repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MAX_RATES)] = key(
         "pulse repetition rate",
         "pulse repetition rate, Hz; the velocity is folded modulo half the wavelength times this rate; a "
         "list is used in turn, scan by scan (stagger)",
@@ -52,28 +52,32 @@ class Radar(fields.Radar):
 
     @property
     def joint_spans_mps(self) -> tuple[tuple[float, ...], ...]:
-        """The span in which each two of the rates together are unambiguous, m/s; zero where they have none."""
-        return tuple(tuple(joint_span(one, other) for other in self.spans_mps) for one in self.spans_mps)
+        """The span in which each pair of rates is unambiguous, m/s; zero where it has none."""
+        return tuple(tuple(joint_span(span, other_span) for other_span in self.spans_mps) for span in self.spans_mps)
 
     @cross_check
     def _spans_differ(self) -> Iterator[At]:
         spans = self.spans_mps
-        for i, one in enumerate(spans):
-            if any(math.isclose(one, other, rel_tol=DISTINCT) for other in spans[:i]):
-                yield at("repetition_rate_hz", f"must differ from rate to rate: two spans are {one:g} m/s")
+        for i, span in enumerate(spans):
+            if any(math.isclose(span, other_span, rel_tol=MIN_SPAN_DIFFERENCE) for other_span in spans[:i]):
+                yield at("repetition_rate_hz", f"must differ from rate to rate: two spans are {span:g} m/s")
                 return
 
 
-def joint_span(one: float, other: float) -> float:
-    """The least common multiple of two spans in a ratio of whole numbers up to MOST_RATIO; else zero."""
-    ratio = Fraction(one / other).limit_denominator(MOST_RATIO)
-    if one == other or ratio.numerator > MOST_RATIO or not math.isclose(ratio, one / other, rel_tol=DISTINCT):
+def joint_span(span: float, other_span: float) -> float:
+    """The least common multiple of two spans whose ratio is one of whole numbers up to MAX_RATIO; else zero."""
+    ratio = Fraction(span / other_span).limit_denominator(MAX_RATIO)
+    if (
+        span == other_span
+        or ratio.numerator > MAX_RATIO
+        or not math.isclose(ratio, span / other_span, rel_tol=MIN_SPAN_DIFFERENCE)
+    ):
         return 0.0
-    return one * ratio.denominator
+    return span * ratio.denominator
 
 
 class Prior(Model):
-    """What the filters know before the first plot: mean zero, and these standard deviations. The range is not known."""
+    """What the filters know before the first plot: mean zero, and these standard deviations; nothing of the range."""
 
     sigma_velocity_mps: Positive = key(
         "prior σ of the radial velocity", "standard deviation of the radial velocity, m/s", 300.0, symbol="σ_V0"
@@ -104,7 +108,7 @@ class RandomPolynomial(Model):
 
 
 class AccelerationPulse(Model):
-    """A polynomial with a constant acceleration for a while; the velocity it has built up stays."""
+    """A polynomial with a constant acceleration for a while; the velocity gained remains."""
 
     kind: Literal["acceleration_pulse"] = key("kind", "a constant acceleration for a while")
     coefficients: fields.Coefficients = key("derivatives of the range at the first plot", fields.COEFFICIENTS)
@@ -133,7 +137,7 @@ Target = Annotated[
 
 
 class Manoeuvres(Model):
-    """A class of manoeuvres: a constant radial acceleration for a while, that begins at any scan, each as likely."""
+    """A class of manoeuvres: a constant radial acceleration for a while, which begins at any scan with equal chance."""
 
     acceleration_mps2: Positive = key("acceleration", "size of the acceleration, m/s²", symbol="a")
     duration_s: Positive = key("duration", "duration, s")
@@ -160,17 +164,17 @@ class Filter(Model):
         symbol="D_M",
         unit="",
     )
-    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
+    hypotheses: Annotated[int, Whole(1, MAX_HYPOTHESES)] | None = key(
         "hypotheses kept",
         "folded: largest number of fold sequences kept; 1: the nearest fold; default: 300",
         300,
-        only=LISTED,
+        only=LISTS_HYPOTHESES,
     )
     prune_below: Annotated[Probability, Field(lt=1)] | None = key(
         "ratio below which a hypothesis is dropped",
         "folded: a hypothesis is dropped below this ratio to the best one's probability; 0: never; default: 1e-6",
         1e-6,
-        only=LISTED,
+        only=LISTS_HYPOTHESES,
     )
     merge: Literal["never", "each_scan"] | None = key(
         "merging of hypotheses",
@@ -182,7 +186,7 @@ class Filter(Model):
         "estimate",
         "folded: the best hypothesis, or the mean of all by their probabilities; default: mean",
         "mean",
-        only=LISTED,
+        only=LISTS_HYPOTHESES,
     )
     combine: Literal["likelihood", "expected_error", "intersection"] | None = key(
         "combination of orders",
@@ -204,20 +208,20 @@ class Filter(Model):
     @property
     def variances(self) -> tuple[float, ...]:
         """The manoeuvre variance of each order."""
-        given = self.manoeuvre_variance
-        return given if isinstance(given, tuple) else (given,)
+        variance = self.manoeuvre_variance
+        return variance if isinstance(variance, tuple) else (variance,)
 
     @property
     def folds(self) -> bool:
-        """Whether it takes the velocity as it is measured."""
+        """Whether it takes the velocity as measured, folded."""
         return self.doppler in ("folded", "remainder")
 
     @cross_check
     def _orders_and_variances(self) -> Iterator[At]:
         if len(self.variances) != len(self.orders):
-            many = len(self.orders)
+            count = len(self.orders)
             yield at(
-                "manoeuvre_variance", f"must be a list of {many}, one for each order" if many > 1 else "must be one"
+                "manoeuvre_variance", f"must be a list of {count}, one for each order" if count > 1 else "must be one"
             )
 
     @cross_check
@@ -235,18 +239,20 @@ class Filter(Model):
             yield at("combine", "has no doppler: remainder, which unfolds for one order")
 
 
-def _carried_filter(one: Any) -> Any:
-    """A filter of range_doppler, as read, as one of this study; what this study cannot say is left as it is."""
-    use = {("range",): "none", ("range", "velocity"): "folded"}
-    if not isinstance(one, dict) or "python" in one or not isinstance(observed := one.get("observes"), list | tuple):
-        return one
-    told = {"observes": None, "initial_scans": None, "kind": "kalman", "process_noise": "random_jerk"}
-    kept = {name: value for name, value in one.items() if name not in told or told[name] not in (None, value)}
-    return {**kept, "doppler": use.get(tuple(observed), observed)}
+def _carried_filter(data: Any) -> Any:
+    """The keys of a filter of range_doppler as those of this study; keys without a counterpart are left as they are."""
+    doppler_by_observed = {("range",): "none", ("range", "velocity"): "folded"}
+    if not isinstance(data, dict) or "python" in data or not isinstance(observed := data.get("observes"), list | tuple):
+        return data
+    replaced = {"observes": None, "initial_scans": None, "kind": "kalman", "process_noise": "random_jerk"}
+    kept_keys = {
+        name: value for name, value in data.items() if name not in replaced or replaced[name] not in (None, value)
+    }
+    return {**kept_keys, "doppler": doppler_by_observed.get(tuple(observed), observed)}
 
 
 class RareFolds(fields.RareEvent):
-    """Wrong folds that are rare: realisations shifted towards them, and weights that make up for it."""
+    """Rare wrong folds: realisations shifted towards them, and weights that correct for the shift."""
 
     filter: fields.Name = key("filter", "the filter whose wrong folds at the last scan are sampled")
 
@@ -256,7 +262,7 @@ class RareFolds(fields.RareEvent):
 
 
 class Keys(fields.Lasting):
-    """Folded Doppler: what it is worth, and how many scans it takes."""
+    """Folded Doppler: how much it gains, and after how many scans."""
 
     figure_names = (
         *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
@@ -265,7 +271,7 @@ class Keys(fields.Lasting):
         "hypotheses",
         "orders",
     )
-    most_scans: ClassVar[int] = MOST_SCANS
+    most_scans: ClassVar[int] = MAX_SCANS
 
     radar: Radar = key("radar", "the radar")
     target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
@@ -274,7 +280,7 @@ class Keys(fields.Lasting):
     )
     filters: fields.Members[Filter] = key("filters", "the filters; all see the same plots")
     baseline: fields.Baseline = fields.BASELINE
-    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = fields.SCANS
+    scans: Annotated[Annotated[int, Whole(2, MAX_SCANS)] | None, Design()] = fields.SCANS
     duration_s: Annotated[Positive | None, Design(), fields.Added()] = fields.DURATION
     rare: Annotated[RareFolds | None, Design(), fields.Added()] = key(
         "rare wrong folds",
@@ -284,51 +290,53 @@ class Keys(fields.Lasting):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        """The number of scans, and the target with its spreads, written out."""
-        whole = {"scans": self.plots, "duration_s": None}
+        """The config with the number of scans and the target's standard deviations filled in."""
+        updates = {"scans": self.plots, "duration_s": None}
         if not isinstance(self.target, RandomPolynomial):
-            return self.model_copy(update=whole)
-        own = {
+            return self.model_copy(update=updates)
+        sigmas = {
             name: getattr(self.prior, name)
             for name in ("sigma_velocity_mps", "sigma_acceleration_mps2")
             if getattr(self.target, name) is None
         }
-        return self.model_copy(update=whole | {"target": self.target.model_copy(update=own)})
+        return self.model_copy(update=updates | {"target": self.target.model_copy(update=sigmas)})
 
     @classmethod
     def carried(cls, study: str, data: Mapping[str, Any]) -> dict[str, Any] | None:
-        """A config of range_doppler: filters with velocity take it folded, and one is added that knows the folds of the
-        first of them. They start by the prior in place of least squares."""
+        """A config of range_doppler as one of this study.
+
+        Filters with velocity take it folded, and a filter is added that is the first of them with known folds. All
+        start from the prior instead of least squares."""
         if study != "range_doppler":
             return None
         carried, filters = dict(data), data.get("filters")
         if isinstance(radar := data.get("radar"), dict):
-            carried["radar"] = {name: value for name, value in radar.items() if name not in BIASES or value != 0}
+            carried["radar"] = {name: value for name, value in radar.items() if name not in BIAS_KEYS or value != 0}
         if isinstance(filters, list):
-            made = [_carried_filter(one) for one in filters]
-            folded = [one for one in made if isinstance(one, dict) and one.get("doppler") == "folded"]
-            known = [one | {"name": f"{one.get('name')} {KNOWN_FOLDS}", "doppler": "unfolded"} for one in folded[:1]]
-            carried["filters"] = [*made, *known]
+            carried_filters = [_carried_filter(f) for f in filters]
+            folded = [f for f in carried_filters if isinstance(f, dict) and f.get("doppler") == "folded"]
+            oracle = [f | {"name": f"{f.get('name')} {ORACLE_SUFFIX}", "doppler": "unfolded"} for f in folded[:1]]
+            carried["filters"] = [*carried_filters, *oracle]
         return carried
 
     @cross_check
     def _prior_in_proportion(self) -> Iterator[At]:
-        """Refuse a prior beside which a plot's accuracy drowns in rounding, or a start that has too many folds."""
+        """Refuse a prior so wide that a plot's accuracy is lost in rounding, or that the start has too many folds."""
         radar, prior = self.radar, self.prior
-        if prior.sigma_velocity_mps > PROPORTION * radar.sigma_velocity_mps:
-            yield at("prior.sigma_velocity_mps", f"must be at most {PROPORTION:g} times the velocity's accuracy")
+        if prior.sigma_velocity_mps > MAX_PROPORTION * radar.sigma_velocity_mps:
+            yield at("prior.sigma_velocity_mps", f"must be at most {MAX_PROPORTION:g} times the velocity's accuracy")
             return
         widest, name = max((prior.sigma_velocity_mps, "prior"), (radar.sigma_velocity_mps, "radar"))
-        if widest > MOST_FOLDS * min(radar.spans_mps):
-            least = f"{widest / MOST_FOLDS:g} m/s, {name}.sigma_velocity_mps over {MOST_FOLDS:g}"
-            yield at("radar.repetition_rate_hz", f"its span must be at least {least}")
+        if widest > MAX_FOLDS * min(radar.spans_mps):
+            smallest = f"{widest / MAX_FOLDS:g} m/s, {name}.sigma_velocity_mps over {MAX_FOLDS:g}"
+            yield at("radar.repetition_rate_hz", f"its span must be at least {smallest}")
 
     @cross_check
     def _range_resolved(self) -> Iterator[At]:
         radar, prior, last = self.radar, self.prior, (self.plots - 1) * self.radar.scan_period_s
-        if prior.sigma_acceleration_mps2 * radar.scan_period_s > PROPORTION * radar.sigma_velocity_mps:
-            few = f"{PROPORTION:g} times the velocity's accuracy a scan period"
-            yield at("prior.sigma_acceleration_mps2", f"must be at most {few}")
+        if prior.sigma_acceleration_mps2 * radar.scan_period_s > MAX_PROPORTION * radar.sigma_velocity_mps:
+            limit = f"{MAX_PROPORTION:g} times the velocity's accuracy a scan period"
+            yield at("prior.sigma_acceleration_mps2", f"must be at most {limit}")
         if not isinstance(self.target, RandomPolynomial):
             yield from fields.within_reach(self.target, radar, last)
 
@@ -336,46 +344,47 @@ class Keys(fields.Lasting):
     def _remainders_exist(self) -> Iterator[At]:
         yield from fields.of_each(self.filters, self._remainder_exists)
 
-    def _remainder_exists(self, i: int, one: Filter) -> Iterator[At]:
-        if one.doppler != "remainder":
+    def _remainder_exists(self, i: int, filter_: Filter) -> Iterator[At]:
+        if filter_.doppler != "remainder":
             return
         joint = self.radar.joint_spans_mps
         if len(joint) == 1:
             yield at(f"filters.{i}.doppler", "remainder needs several rates in radar.repetition_rate_hz")
         elif not all(joint[j][k] for j in range(len(joint)) for k in range(j)):
-            few = f"in ratios of whole numbers up to {MOST_RATIO}"
-            yield at(f"filters.{i}.doppler", f"remainder needs rates in radar.repetition_rate_hz that are {few}")
+            limit = f"in ratios of whole numbers up to {MAX_RATIO}"
+            yield at(f"filters.{i}.doppler", f"remainder needs rates in radar.repetition_rate_hz that are {limit}")
 
     @cross_check
     def _every_plot(self) -> Iterator[At]:
-        for i, one in enumerate(self.filters):
-            if one.combine in ("expected_error", "intersection") and self.radar.detection_probability < 1:
-                yield at(f"filters.{i}.combine", f"{one.combine} needs every plot: radar.detection_probability 1")
+        for i, filter_ in enumerate(self.filters):
+            if filter_.combine in ("expected_error", "intersection") and self.radar.detection_probability < 1:
+                yield at(f"filters.{i}.combine", f"{filter_.combine} needs every plot: radar.detection_probability 1")
 
     @cross_check
     def _rare_fits(self) -> Iterator[At]:
         if self.rare is None:
             return
-        listing = [one for one in self.filters if one.doppler == "folded" and one.merge == "never"]
-        single = [one.name for one in listing if one.combine is None]
+        listing = [f for f in self.filters if f.doppler == "folded" and f.merge == "never"]
+        single = [f.name for f in listing if f.combine is None]
         if self.rare.filter not in single:
             names = ", ".join(single) or "there is none"
             yield at("rare.filter", f"must be the name of a filter of one order that lists its folds: {names}")
         if self.radar.detection_probability < 1:
             yield at("rare", "needs every plot: radar.detection_probability 1")
-        if self.plots > MOST_RARE_SCANS:
-            yield at("rare", f"needs at most {MOST_RARE_SCANS} scans, got {self.plots}")
+        if self.plots > MAX_RARE_SCANS:
+            yield at("rare", f"needs at most {MAX_RARE_SCANS} scans, got {self.plots}")
 
     @cross_check
     def _variances_in_proportion(self) -> Iterator[At]:
         yield from fields.of_each(self.filters, self._variance_in_proportion)
 
-    def _variance_in_proportion(self, i: int, one: Filter) -> Iterator[At]:
+    def _variance_in_proportion(self, i: int, filter_: Filter) -> Iterator[At]:
         radar = self.radar
-        powers = zip(one.orders, one.variances, strict=False)
+        powers = zip(filter_.orders, filter_.variances, strict=False)
         grown = max(math.sqrt(variance) * radar.scan_period_s**order for order, variance in powers)
-        if grown > PROPORTION * radar.sigma_velocity_mps:
-            few = f"{PROPORTION:g} times the velocity's accuracy a scan"
+        if grown > MAX_PROPORTION * radar.sigma_velocity_mps:
+            limit = f"{MAX_PROPORTION:g} times the velocity's accuracy a scan"
             yield at(
-                f"filters.{i}.manoeuvre_variance", f"out of proportion: its root must change velocity by at most {few}"
+                f"filters.{i}.manoeuvre_variance",
+                f"out of proportion: its root must change velocity by at most {limit}",
             )

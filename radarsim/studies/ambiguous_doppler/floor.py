@@ -1,6 +1,6 @@
-"""The floor under σ with velocities that fold: of a drawn polynomial, and of one that is the same in all realisations.
+"""The floor under σ with folded velocities, for a random polynomial, and for one common to all realisations.
 
-A folded velocity tells no more than one with its fold, so that the bound of range and velocity holds for it too."""
+A folded velocity has no more information than an unfolded one, so that the bound of range and velocity holds for it."""
 
 from typing import Any
 
@@ -13,11 +13,13 @@ from radarsim.studies.floor import Bound, Floor
 
 
 def floor(spec: Any, axes: Axes) -> Floor | None:
-    """The first range of a drawn polynomial is not drawn: under estimators that shift with it, as all do that take the
-    first range from a plot. Of manoeuvres none is defined."""
+    """The floor of each filter; None for targets that manoeuvre.
+
+    The first range of a random polynomial is not random: the bound holds for estimators that shift with it, as all do
+    that take the first range from a plot."""
     target, radar, t = spec.target, spec.radar, np.asarray(axes.t_s, dtype=float)
-    if drawn := target.kind == "random_polynomial":
-        spread = np.array([np.inf, *filters.spread(target)])
+    if is_random := target.kind == "random_polynomial":
+        spread = np.array([np.inf, *filters.random_motion_sigma(target)])
         unknown = np.flatnonzero(spread)
         prior, maps = np.diag(spread[unknown] ** -2.0), floors.polynomial(t, 3)[..., unknown]
     elif target.kind == "polynomial":
@@ -27,17 +29,17 @@ def floor(spec: Any, axes: Axes) -> Floor | None:
         return None
     sigma = np.array([radar.sigma_range_m, radar.sigma_velocity_mps])
 
-    def below(observes: int) -> Bound:
+    def bound(observes: int) -> Bound:
         rows = maps[:, :observes] / sigma[:observes, None]
-        gained = np.einsum("kdi,kdj->kij", rows, rows)
+        information = np.einsum("kdi,kdj->kij", rows, rows)
         if radar.detection_probability == 1:
-            return floors.static(prior, gained, maps)
-        chance, each = np.full(len(t), radar.detection_probability), np.ones((len(t), 3), dtype=int)
-        settles = -(-int((prior.diagonal() == 0).sum()) // observes)
-        return floors.missed(prior, gained, maps, chance, each, (1, 1, 1), settles)
+            return floors.static(prior, information, maps)
+        detection, plot_counts = np.full(len(t), radar.detection_probability), np.ones((len(t), 3), dtype=int)
+        settling_scans = -(-int((prior.diagonal() == 0).sum()) // observes)
+        return floors.missed(prior, information, maps, detection, plot_counts, (1, 1, 1), settling_scans)
 
-    ranges, both = below(1), below(2)
-    ways = {"none": ranges, "unfolded": both}
+    ranges, both = bound(1), bound(2)
+    floors_by_doppler = {"none": ranges, "unfolded": both}
     folded = both._replace(reached=False)
-    kind = floors.POSTERIOR if drawn else floors.CRB
-    return Floor(kind, tuple(ways.get(one.doppler, folded) for one in spec.filters), folded)
+    kind = floors.POSTERIOR if is_random else floors.CRB
+    return Floor(kind, tuple(floors_by_doppler.get(options.doppler, folded) for options in spec.filters), folded)

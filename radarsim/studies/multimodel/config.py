@@ -84,8 +84,8 @@ class Sensor(Model):
     def sigma(self) -> tuple[float, float, float]:
         """Of range (m), elevation and azimuth (rad), or of x, y, z (m)."""
         biconical = (self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad)
-        given = (*biconical, self.sigma_x_m, self.sigma_y_m, self.sigma_z_m)
-        first, second, third = (sigma for sigma in given if sigma is not None)  # by _one_frame
+        sigmas = (*biconical, self.sigma_x_m, self.sigma_y_m, self.sigma_z_m)
+        first, second, third = (sigma for sigma in sigmas if sigma is not None)  # by _one_frame
         return first, second, third
 
 

@@ -1,4 +1,4 @@
-"""What one update of each filter costs: arithmetic operations counted, and seconds measured by the clock."""
+"""The cost of one update of each filter: arithmetic operations counted, and seconds measured by the clock."""
 
 import time
 from collections.abc import Sequence
@@ -18,32 +18,32 @@ from radarsim.threads import mapping
 PREDICT, UPDATE = {True: 282, False: 99}, {True: 456, False: 267}
 LIKELIHOOD, MERGE, MERGE_ONCE = 8, 208, -9
 
-MOST_SCANS, PASSES = 4096, 5  # of the measurement by the clock
+MAX_SCANS, PASSES = 4096, 5  # of the measurement by the clock
 
 
 def blocks(family: str, transition: np.ndarray, merged_first: bool = True) -> tuple[np.ndarray, np.ndarray]:
-    """Extrapolations and updates (M,) of each model in a scan, by the changes that transition (M, M) allows.
+    """Predictions and updates (M,) of each model in a scan, by the changes that transition (M, M) allows.
 
-    merged_first: of family imm hypotheses are merged before a model extrapolates them, and not after."""
-    sources, once = np.count_nonzero(transition, axis=1), np.ones(len(transition), dtype=int)
+    merged_first: in the family imm hypotheses are merged before a model predicts them, not after."""
+    sources, single = np.count_nonzero(transition, axis=1), np.ones(len(transition), dtype=int)
     if family == "gpb2":
         return sources, sources
-    return (sources if family == "imm" and not merged_first else once), once
+    return (sources if family == "imm" and not merged_first else single), single
 
 
 def operations(
     family: str, transition: np.ndarray, accelerates: Sequence[bool], merged_first: bool = True
 ) -> tuple[float, float, float]:
-    """Arithmetic operations of one scan: fixed ones, and those of each merged hypothesis and of each merge.
+    """Arithmetic operations of one scan: fixed ones, those per merged hypothesis, and those per merge.
 
     transition (M, M); accelerates (M,): whether each model has an acceleration. A merge of a single hypothesis is a
     copy and costs nothing."""
-    size, (extrapolated, updated) = len(transition), blocks(family, transition, merged_first)
-    every = zip(extrapolated, updated, accelerates, strict=True)
-    advanced = sum(m * PREDICT[bool(a)] + n * UPDATE[bool(a)] for m, n, a in every)
-    predicted = size * (2 * size - 1) if size > 1 else 0
-    likelihoods = updated.sum() * LIKELIHOOD if size > 1 else 0
-    return float(advanced + likelihoods + predicted), MERGE, MERGE_ONCE
+    size, (predictions, updates) = len(transition), blocks(family, transition, merged_first)
+    models = zip(predictions, updates, accelerates, strict=True)
+    prediction_and_update = sum(m * PREDICT[bool(a)] + n * UPDATE[bool(a)] for m, n, a in models)
+    mixing = size * (2 * size - 1) if size > 1 else 0
+    likelihoods = updates.sum() * LIKELIHOOD if size > 1 else 0
+    return float(prediction_and_update + likelihoods + mixing), MERGE, MERGE_ONCE
 
 
 def operations_of(options: Filter, merged_first: bool = True) -> tuple[float, float, float]:
@@ -53,36 +53,38 @@ def operations_of(options: Filter, merged_first: bool = True) -> tuple[float, fl
 
 
 def seconds_per_update(plan: Plan) -> dict[str, float]:
-    """CPU seconds of one update of one realisation by filter, outputs included, noise, plots and sums not. The least of
-    some passes over the first scans of the flight, in a thread of a pool, as kernels run, or in this one where threads
-    are forbidden."""
+    """CPU seconds of one update of one realisation by each filter, with outputs, without noise, plots and sums.
+
+    The smallest of several passes over the first scans of the flight, in a thread of a pool, as kernels run, or in the
+    current one if threads are forbidden."""
     from radarsim.kernels.lanes import WIDTH, rows
     from radarsim.studies.multimodel.kernels import strip
 
     world = plan.world
-    count = min(len(world.truth), MOST_SCANS)
-    found = rows(count * PLOT)
-    strip.fill_plots(world.keys, world.frame, world.plot_truth[:count], START, 0, rows(strip.RANDOM), found)
-    with mapping(1) as mapped:
+    count = min(len(world.truth), MAX_SCANS)
+    plots = rows(count * PLOT)
+    strip.fill_plots(world.keys, world.frame, world.plot_truth[:count], START, 0, rows(strip.RANDOM), plots)
+    with mapping(1) as parallel_map:
         seconds = [
-            min(mapped(partial(_seconds, plan, f, found), [count] * PASSES)) for f in range(len(plan.axes.filters))
+            min(parallel_map(partial(_seconds, plan, f, plots), [count] * PASSES))
+            for f in range(len(plan.axes.filters))
         ]
     return {name: s / (WIDTH * (count - START)) for name, s in zip(plan.axes.filters, seconds, strict=True)}
 
 
-def _seconds(plan: Plan, f: int, found: np.ndarray, count: int) -> float:
+def _seconds(plan: Plan, f: int, plots: np.ndarray, count: int) -> float:
     """CPU seconds of filter f over the scans after the start of its track."""
     from radarsim.kernels.lanes import rows
     from radarsim.studies.multimodel.kernels import hypothesis, strip
 
     world, banks, (work, numbers) = plan.world, plan.banks, hypothesis.work_arrays()
     size = banks.numbers[f, SIZE]
-    strip.start_strip(work, numbers, found, world.weights, banks.probabilities[f, :size])
-    out, scans = rows(count * OUTPUT), (found, START, count)
+    strip.start_strip(work, numbers, plots, world.weights, banks.probabilities[f, :size])
+    out, scans = rows(count * OUTPUT), (plots, START, count)
     models, transitions = banks.models[f, : MODEL_NUMBERS * size], banks.transitions[f]
-    started = time.thread_time()
+    start_time = time.thread_time()
     strip.filter_strip(
         *(work, numbers, *scans, models, transitions, world.intervals, world.times, banks.numbers[f], world.frame),
         *(world.reported, out),
     )
-    return time.thread_time() - started
+    return time.thread_time() - start_time

@@ -34,158 +34,169 @@ COMPONENTS = (
 SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"), "$\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
-SPREAD = 0.5  # of the points of a stage, stages being one apart
-ACROSS, ACROSS_NARROW = 60, 28  # letters across a panel of two in a row, and of three
-MOST_LOOKS = 8  # filters, each of a colour, dash and marker of its own
+STAGE_SPREAD = 0.5  # width over which a stage's points are spread; stages are one apart
+LETTERS_ACROSS, LETTERS_ACROSS_NARROW = 60, 28  # letters across a panel in a row of two, and of three
+MAX_LOOKS = 8  # filters with distinct colours, dashes and markers
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
 
 
 def figures(
-    results: Sequence[CaseResult], made: "Mapping[str, pd.DataFrame]", experiment: Experiment
+    results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataFrame]", experiment: Experiment
 ) -> dict[str, Figure]:
-    """All figures that these results can fill, by name; each shows the cases that the config names for it."""
+    """All figures for which there are results, by name; each shows the cases that the config names for it."""
 
-    def chosen(name: str) -> list[CaseResult]:
+    def visible_results(name: str) -> list[CaseResult]:
         return panels.shown(results, panels.named(experiment, name))[0]
 
-    drawn: dict[str, Figure | None] = {}
+    figures_by_name: dict[str, Figure | None] = {}
     for component in SIGMAS:
-        drawn[f"sigma_{component}"] = sigma(chosen(f"sigma_{component}"), made["curves"], component)
-    drawn["trajectory"] = trajectory(chosen("trajectory"))
-    drawn["probabilities"] = probabilities(chosen("probabilities"), made["probabilities"])
-    drawn["families"] = families(chosen("families"), made)
-    drawn["cost"] = cost(chosen("cost"), made)
-    drawn["consistency"] = consistency(chosen("consistency"), made["consistency"])
-    return {name: figure for name, figure in drawn.items() if figure is not None}
+        figures_by_name[f"sigma_{component}"] = sigma(
+            visible_results(f"sigma_{component}"), tables_by_name["curves"], component
+        )
+    figures_by_name["trajectory"] = trajectory(visible_results("trajectory"))
+    figures_by_name["probabilities"] = probabilities(visible_results("probabilities"), tables_by_name["probabilities"])
+    figures_by_name["families"] = families(visible_results("families"), tables_by_name)
+    figures_by_name["cost"] = cost(visible_results("cost"), tables_by_name)
+    figures_by_name["consistency"] = consistency(visible_results("consistency"), tables_by_name["consistency"])
+    return {name: figure for name, figure in figures_by_name.items() if figure is not None}
 
 
-def _several(name: str, title: str, caption: str, drawn: Sequence[Panel], height: float = 62.0) -> Figure | None:
-    """A figure of one panel, or of more in two columns, in three where that fills the page better."""
-    if not drawn:
+def _figure_of_panels(
+    name: str, title: str, caption: str, figure_panels: Sequence[Panel], height: float = 62.0
+) -> Figure | None:
+    """A figure of one panel, or of several in two columns, or three if that fills the page better."""
+    if not figure_panels:
         return None
-    width = panels.WIDE_MM if len(drawn) == 1 else PAGE_MM
-    columns = 1 if len(drawn) == 1 else 3 if len(drawn) in (3, 5, 6, 9, 12) else 2
-    return Figure(name, title, caption, tuple(drawn), columns, width, height)
+    width = panels.WIDE_MM if len(figure_panels) == 1 else PAGE_MM
+    columns = 1 if len(figure_panels) == 1 else 3 if len(figure_panels) in (3, 5, 6, 9, 12) else 2
+    return Figure(name, title, caption, tuple(figure_panels), columns, width, height)
 
 
-def _many(result: CaseResult) -> bool:
-    """Whether a case has more filters than there are looks."""
-    return len(result.axes.filters) > MOST_LOOKS
+def _has_many_filters(result: CaseResult) -> bool:
+    """Whether a case has more filters than distinct looks."""
+    return len(result.axes.filters) > MAX_LOOKS
 
 
 def _styles(result: CaseResult) -> list[Style]:
-    """A look for each filter of a case: its own where there are few, else the rule's colour and the family's marks."""
+    """The style of each filter of a case: distinct if there are few, else the rule's colour and the family's mark."""
     options = result.spec.filters
-    if not _many(result):
+    if not _has_many_filters(result):
         return [Style(n, n, n) for n in range(len(options))]
-    families = list(dict.fromkeys(of.family for of in options))
-    marks = [families.index(of.family) for of in options]
-    return [Style(RULES.index(of.merge), mark, mark) for of, mark in zip(options, marks, strict=True)]
+    families = list(dict.fromkeys(o.family for o in options))
+    marks = [families.index(o.family) for o in options]
+    return [Style(RULES.index(o.merge), mark, mark) for o, mark in zip(options, marks, strict=True)]
 
 
-def _keys(result: CaseResult, **look: Any) -> tuple[tuple[str, Style], ...]:
-    """What the looks of many filters say: colours of rules, marks of families; look: how they differ from _styles."""
-    styled = list(zip(result.spec.filters, _styles(result), strict=True))
-    rules = {of.merge: replace(style, dash=0, marker=None, width_pt=4.0, flat=True) for of, style in styled}
-    families = {of.family: replace(style, colour=0) for of, style in styled}
-    named = [(rule.replace("_", " "), style) for rule, style in rules.items()]
-    named += [(tr(FAMILIES.get(family, family)), style) for family, style in families.items()]
-    marked = {tr(FAMILIES.get(family, family)) for family in families}
-    return tuple((label, replace(style, **look) if label in marked else style) for label, style in named)
+def _legend_keys(result: CaseResult, **changes: Any) -> tuple[tuple[str, Style], ...]:
+    """The legend for many filters: colours of rules, marks of families; changes: of the styles of families."""
+    styled_filters = list(zip(result.spec.filters, _styles(result), strict=True))
+    rules = {o.merge: replace(style, dash=0, marker=None, width_pt=4.0, flat=True) for o, style in styled_filters}
+    families = {o.family: replace(style, colour=0) for o, style in styled_filters}
+    labelled_styles = [(rule.replace("_", " "), style) for rule, style in rules.items()]
+    labelled_styles += [(tr(FAMILIES.get(family, family)), style) for family, style in families.items()]
+    family_labels = {tr(FAMILIES.get(family, family)) for family in families}
+    return tuple(
+        (label, replace(style, **changes) if label in family_labels else style) for label, style in labelled_styles
+    )
 
 
-def _beside(drawn: Sequence[Panel], result: CaseResult, **look: Any) -> list[Panel]:
-    """Panels with one legend in a cell of its own; look: see `_keys`."""
-    made = panels.in_legend(drawn)
-    if _many(result):
-        made[-1] = replace(made[-1], keys=_keys(result, **look))
-    return made
+def _with_legend(panels_without_legend: Sequence[Panel], result: CaseResult, **changes: Any) -> list[Panel]:
+    """Panels with a common legend in its own cell; changes: see `_legend_keys`."""
+    with_legend = panels.in_legend(panels_without_legend)
+    if _has_many_filters(result):
+        with_legend[-1] = replace(with_legend[-1], keys=_legend_keys(result, **changes))
+    return with_legend
 
 
 def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
-    """What tells a case from the others shown: the swept values where one config is swept, else its label."""
+    """The title that distinguishes a case: its swept values if all cases are of one config, else its label."""
     if len(results) == 1:
         return ""
-    one = len(panels.families(results)) == 1
-    if not one:
+    if len(panels.families(results)) > 1:
         return panels.label(result).replace("_", " ")
     return ", ".join(_value(result, key, value) for key, value in result.swept)
 
 
 def _value(result: CaseResult, key: str, value: object) -> str:
-    """A swept value: a number with its symbol and unit, a choice as it is called."""
+    """A swept value in words: a number with its symbol and unit, a choice by its name."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return f"{panels.symbol_of(result, key)} = {panels.with_its_unit(result, key, value)}"
     return panels.with_its_unit(result, key, value)
 
 
 def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
-    """Ground track, height, speed and acceleration (the paper's figures 1 to 4), a line for each different flight."""
+    """Ground track, height, speed and acceleration (the paper's figures 1 to 4), a line for each distinct flight."""
     flights: dict[bytes, CaseResult] = {}
     for result in results:
         flights.setdefault(np.ascontiguousarray(result.axes.truth).tobytes(), result)
     lines: list[list[Line]] = [[], [], [], []]
     for n, result in enumerate(flights.values()):
         x, t = result.axes.truth, np.asarray(result.axes.t_s, dtype=float)
-        words, style = _title(result, results) if len(flights) > 1 else "", Style(n, n)
+        label, style = _title(result, results) if len(flights) > 1 else "", Style(n, n)
         speed, acceleration = (np.linalg.norm(x[:, i::3], axis=1) for i in (1, 2))
-        lines[0].append(Line(x[:, 6] / 1e3, x[:, 0] / 1e3, words, style))
-        for place, values in ((1, x[:, 3] / 1e3), (2, speed), (3, acceleration)):
-            lines[place].append(Line(t, values, words, style))
-    ends = _stage_lines(list(flights.values()))
+        lines[0].append(Line(x[:, 6] / 1e3, x[:, 0] / 1e3, label, style))
+        for panel_index, values in ((1, x[:, 3] / 1e3), (2, speed), (3, acceleration)):
+            lines[panel_index].append(Line(t, values, label, style))
+    stage_lines = _stage_lines(list(flights.values()))
     axes = (
         (Axis(tr("east $z$, km")), Axis(tr("north $x$, km")), tr("1  ground track"), ()),
-        (panels.time_axis(), Axis(tr("height $y$, km"), limits=(0, None)), tr("2  height"), ends),
-        (panels.time_axis(), Axis(tr("speed, m/s"), limits=(0, None)), tr("3  speed"), ends),
-        (panels.time_axis(), Axis(tr("acceleration, m/s²"), limits=(0, None)), tr("4  acceleration"), ends),
+        (panels.time_axis(), Axis(tr("height $y$, km"), limits=(0, None)), tr("2  height"), stage_lines),
+        (panels.time_axis(), Axis(tr("speed, m/s"), limits=(0, None)), tr("3  speed"), stage_lines),
+        (panels.time_axis(), Axis(tr("acceleration, m/s²"), limits=(0, None)), tr("4  acceleration"), stage_lines),
     )
-    lines[1:] = [_unnamed(own) for own in lines[1:]]
-    drawn = [
-        Panel(x, y, (*marks, *own), title, direct=False) for (x, y, title, marks), own in zip(axes, lines, strict=True)
+    lines[1:] = [_without_labels(panel_lines) for panel_lines in lines[1:]]
+    flight_panels = [
+        Panel(x, y, (*marks, *panel_lines), title, direct=False)
+        for (x, y, title, marks), panel_lines in zip(axes, lines, strict=True)
     ]
-    drawn[0] = replace(drawn[0], marks=(*drawn[0].marks, *_landmarks(lines[0])), equal=True)
+    flight_panels[0] = replace(flight_panels[0], marks=(*flight_panels[0].marks, *_landmarks(lines[0])), equal=True)
     track, (height, *_), (acceleration, *_) = lines[0][0], lines[1], lines[3]
-    far = np.hypot(track.x, track.y)
+    ground_range_km = np.hypot(track.x, track.y)
     caption = tr(
         "{name}: ground range from {begin:.0f} to {end:.0f} km, height up to {height:.0f} km, "
         "acceleration up to {acceleration:.0f} m/s². ",
         **{
             "name": track.name or track.label or panels.plain_label(results[0]),
-            "begin": float(far[0]),
-            "end": float(far[-1]),
+            "begin": float(ground_range_km[0]),
+            "end": float(ground_range_km[-1]),
         },
         **{"height": float(height.y.max()), "acceleration": float(acceleration.y.max())},
     ) + tr(
         "The true flight: the ground track from its start, at one scale "
         "north and east, with the radar at the origin. Dotted: ends of the stages."
     )
-    caption += _stages_said(drawn, results)
-    return _of_the_paper(_several("trajectory", tr("Flight"), caption, drawn, 56), results, "1 … 4")
+    caption += _stages_sentence(flight_panels, results)
+    return _with_paper_number(
+        _figure_of_panels("trajectory", tr("Flight"), caption, flight_panels, 56), results, "1 … 4"
+    )
 
 
 def _landmarks(tracks: Sequence[Line]) -> list[Line | Note]:
-    """The radar, and where each track begins and which way it goes."""
+    """Marks for the radar, and for the start and the direction of each track."""
     radar = Line(np.zeros(1), np.zeros(1), "", Style(0, None, 1, size_pt=5.0), name=tr("radar"))
     marks: list[Line | Note] = [radar, Note(0.0, 0.0, tr("radar"), "ne")]
     for track in tracks:
         start = Line(
             track.x[:1], track.y[:1], "", replace(track.style, dash=None, marker=0, size_pt=5.0), name=tr("start")
         )
-        third = len(track.x) // 3
-        marks += [start, Note(float(track.x[third]), float(track.y[third]), _arrow(track, third), "se")]
+        third_index = len(track.x) // 3
+        marks += [
+            start,
+            Note(float(track.x[third_index]), float(track.y[third_index]), _arrow(track, third_index), "se"),
+        ]
     marks.append(Note(float(tracks[0].x[0]), float(tracks[0].y[0]), tr("start"), "ne"))
     return marks
 
 
-def _arrow(track: Line, at: int) -> str:
-    """An arrow of the eight winds along a track at a place, east to the right, north up."""
-    ahead = min(at + max(1, len(track.x) // 50), len(track.x) - 1)
-    turn = np.arctan2(track.y[ahead] - track.y[at], track.x[ahead] - track.x[at])
+def _arrow(track: Line, index: int) -> str:
+    """An arrow in one of eight directions along a track at an index, east to the right, north up."""
+    next_index = min(index + max(1, len(track.x) // 50), len(track.x) - 1)
+    turn = np.arctan2(track.y[next_index] - track.y[index], track.x[next_index] - track.x[index])
     return "→↗↑↖←↙↓↘"[round(float(turn) / (np.pi / 4)) % 8]
 
 
-def _stage_lines(results: Sequence[CaseResult], letters: int = ACROSS) -> tuple[Reference | Note, ...]:
-    """The ends of the stages, and the names of all that are long enough, where all cases have the same."""
+def _stage_lines(results: Sequence[CaseResult], letters: int = LETTERS_ACROSS) -> tuple[Reference | Note, ...]:
+    """The ends of the stages, and the names of those that are long enough; empty if the cases' stages differ."""
     if len({result.spec.target.stages for result in results}) > 1:
         return ()
     stages, last = results[0].spec.target.stages, max(float(result.axes.t_s[-1]) for result in results)
@@ -199,170 +210,187 @@ def _stage_lines(results: Sequence[CaseResult], letters: int = ACROSS) -> tuple[
     return tuple(marks)
 
 
-def _stages_said(drawn: Sequence[Panel], results: Sequence[CaseResult]) -> str:
-    """The stages in order, for a caption, where a panel has no room for all their names; else empty."""
+def _stages_sentence(figure_panels: Sequence[Panel], results: Sequence[CaseResult]) -> str:
+    """A sentence for a caption that lists the stages, if a panel has no space for all their names; else empty."""
     stages = {result.spec.target.stages for result in results}
-    named = [sum(isinstance(mark, Note) and mark.place == "top" for mark in panel.marks) for panel in drawn]
-    (only,) = stages if len(stages) == 1 else ((),)
-    if len(only) < 2 or min(filter(None, named), default=0) >= len(only):
+    name_counts = [
+        sum(isinstance(mark, Note) and mark.place == "top" for mark in panel.marks) for panel in figure_panels
+    ]
+    (shared_stages,) = stages if len(stages) == 1 else ((),)
+    if len(shared_stages) < 2 or min(filter(None, name_counts), default=0) >= len(shared_stages):
         return ""
-    return " " + tr("Stages in order: {names}.", names=listed([tr(stage.name) for stage in only]))
+    return " " + tr("Stages in order: {names}.", names=listed([tr(stage.name) for stage in shared_stages]))
 
 
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
     """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case."""
     rows = tables.groups(curves[curves["component"] == component], "case", "filter")
     quantity, symbol, unit = SIGMAS[component]
-    drawn = []
+    sigma_panels = []
     for result in results:
-        marks: list = list(_stage_lines([result], ACROSS if len(results) == 1 else ACROSS_NARROW))
+        marks: list = list(_stage_lines([result], LETTERS_ACROSS if len(results) == 1 else LETTERS_ACROSS_NARROW))
         for f, style in zip(result.axes.filters, _styles(result), strict=True):
-            own = rows.get((result.name, f))
-            if own is not None:
-                marks.append(panels.line(own, panels.SIGMA[:4], panels.literal(f), replace(style, marker=None)))
+            filter_rows = rows.get((result.name, f))
+            if filter_rows is not None:
+                marks.append(panels.line(filter_rows, panels.SIGMA[:4], panels.literal(f), replace(style, marker=None)))
         y = Axis(panels.sigma_of(symbol, unit), "log")
-        drawn.append(Panel(panels.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1))
-    if len(drawn) > 1:
-        drawn = _beside(drawn, results[0], marker=None)
-    elif drawn and _many(results[0]):
-        (panel,) = drawn
-        keys = _keys(results[0], marker=None)
-        drawn = [replace(panel, marks=tuple(_unnamed(panel.marks)), keys=keys, direct=False, legend="right")]
+        sigma_panels.append(
+            Panel(panels.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1)
+        )
+    if len(sigma_panels) > 1:
+        sigma_panels = _with_legend(sigma_panels, results[0], marker=None)
+    elif sigma_panels and _has_many_filters(results[0]):
+        (panel,) = sigma_panels
+        keys = _legend_keys(results[0], marker=None)
+        sigma_panels = [
+            replace(panel, marks=tuple(_without_labels(panel.marks)), keys=keys, direct=False, legend="right")
+        ]
     caption = tr(
         "Root-mean-square error of {quantity} about the truth, of {count:,} realisations; bands: 95 % "
         "intervals. Dotted: ends of the stages.",
         quantity=quantity,
         count=results[0].count if results else 0,
-    ) + _stages_said(drawn, results)
-    figure = _several(f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, drawn, 76)
+    ) + _stages_sentence(sigma_panels, results)
+    figure = _figure_of_panels(
+        f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, sigma_panels, 76
+    )
     if figure is None:
         return None
-    figure = figure
-    return _of_the_paper(figure, results, {"y": "5", "vy": "6"}[component])
+    return _with_paper_number(figure, results, {"y": "5", "vy": "6"}[component])
 
 
-def _of_the_paper(figure: Figure | None, results: Sequence[CaseResult], number: str) -> Figure | None:
-    """The figure with its number in the paper, where it is of the paper's own experiment."""
-    own = figure is not None and all(result.name == "multimodel" for result in results)
-    return seen.with_figure_number(figure, number) if figure and own else figure
+def _with_paper_number(figure: Figure | None, results: Sequence[CaseResult], number: str) -> Figure | None:
+    """The figure with its number in the paper, if it is of the paper's experiment."""
+    is_of_paper = figure is not None and all(result.name == "multimodel" for result in results)
+    return seen.with_figure_number(figure, number) if figure and is_of_paper else figure
 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
     """Mean probabilities of the models against time (figure 7), a panel for each filter of two or more models."""
     rows = tables.groups(table, "case", "filter", "model")
-    drawn: list[Panel] = []
+    probability_panels: list[Panel] = []
     for result in results:
         for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
             if len(options.models) < 2:
                 continue
             marks: list = list(
-                _stage_lines([result], ACROSS if len(result.axes.filters) < MOST_LOOKS else ACROSS_NARROW)
+                _stage_lines(
+                    [result], LETTERS_ACROSS if len(result.axes.filters) < MAX_LOOKS else LETTERS_ACROSS_NARROW
+                )
             )
             for m, motion in enumerate(_motions(options.models)):
                 columns = ("t_s", "probability", "probability_lo", "probability_hi")
-                own = rows[(result.name, name, m + 1)]
-                marks.append(panels.line(own, columns, f"{m + 1} {motion}", Style(m, m)))
+                model_rows = rows[(result.name, name, m + 1)]
+                marks.append(panels.line(model_rows, columns, f"{m + 1} {motion}", Style(m, m)))
             title = panels.literal(name) if len(results) == 1 else f"{_title(result, results)}: {panels.literal(name)}"
-            drawn.append(
+            probability_panels.append(
                 Panel(
                     panels.time_axis(), Axis(tr("mean probability"), limits=(0, 1)), tuple(marks), title, direct=False
                 )
             )
-    banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in drawn}
-    titles = [panel.title for panel in drawn]
-    left = panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS))
-    drawn = panels.spread_out(drawn, panels.MOST_PANELS)
-    if len(drawn) > 2 and len(banks) == 1:
-        drawn = panels.in_legend(drawn)
+    banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in probability_panels}
+    titles = [panel.title for panel in probability_panels]
+    left_out = panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS))
+    probability_panels = panels.spread_out(probability_panels, panels.MOST_PANELS)
+    if len(probability_panels) > 2 and len(banks) == 1:
+        probability_panels = panels.in_legend(probability_panels)
     caption = (
         tr(
             "Mean posterior probabilities of the models; the numbers after the motions are the spreads of "
             "the random acceleration, m/s². Dotted: ends of the stages."
         )
-        + _stages_said(drawn, results)
-        + left
+        + _stages_sentence(probability_panels, results)
+        + left_out
     )
-    return _of_the_paper(_several("probabilities", tr("Probabilities of the models"), caption, drawn, 58), results, "7")
+    return _with_paper_number(
+        _figure_of_panels("probabilities", tr("Probabilities of the models"), caption, probability_panels, 58),
+        results,
+        "7",
+    )
 
 
-def families(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
+def families(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | None:
     """σ of the height by family and merging rule, a map for each stage; needs at least two of each."""
-    drawn = []
-    rows = tables.groups(tables.where(made["stages"], component="y"), "case", "stage")
+    heat_panels = []
+    rows = tables.groups(tables.where(tables_by_name["stages"], component="y"), "case", "stage")
     for result in results:
-        found = {
+        filter_by_design = {
             (options.family, options.merge): name
             for name, options in zip(result.axes.filters, result.spec.filters, strict=True)
             if options.family in FAMILIES
         }
-        names = [[found.get((family, rule)) for rule in RULES] for family in FAMILIES]
+        names = [[filter_by_design.get((family, rule)) for rule in RULES] for family in FAMILIES]
         if sum(any(row) for row in names) < 2 or sum(any(column) for column in zip(*names, strict=True)) < 2:
             continue
-        for (case, stage), own in rows.items():
+        for (case, stage), stage_rows in rows.items():
             if case != result.name:
                 continue
-            value = own.set_index("filter")["sigma"]
+            value = stage_rows.set_index("filter")["sigma"]
             grid = np.array([[value.get(name, np.nan) for name in row] for row in names], dtype=float)
             x = Axis(tr("merging rule"), ticks=tuple((i, rule.replace("_", "\n")) for i, rule in enumerate(RULES)))
             y = Axis(tr("family"), ticks=tuple(enumerate(map(tr, FAMILIES.values()))))
             title = ": ".join(filter(None, (_title(result, results), tr(str(stage)))))
-            drawn.append(Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, panels.sigma_of("$y$", "m")),), title))
+            heat_panels.append(
+                Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, panels.sigma_of("$y$", "m")),), title)
+            )
     caption = tr(
         "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
     )
-    titles = [panel.title for panel in drawn]
+    titles = [panel.title for panel in heat_panels]
     caption += panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS))
-    drawn = panels.spread_out(drawn, panels.MOST_PANELS)
-    return _several("families", tr("Families and merging rules"), caption, drawn, 52)
+    heat_panels = panels.spread_out(heat_panels, panels.MOST_PANELS)
+    return _figure_of_panels("families", tr("Families and merging rules"), caption, heat_panels, 52)
 
 
-def cost(results: Sequence[CaseResult], made: Mapping) -> Figure | None:
+def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | None:
     """Operations per update against σ of the height, a panel for each stage of the first case shown."""
     if not results:
         return None
     result = results[0]
-    operations = tables.groups(made["operations"], "case", "stage", "filter")
-    rows = tables.where(made["stages"], case=result.name, component="y")
-    drawn = []
-    most = made["operations"].loc[made["operations"]["case"] == result.name, "operations"].max()
+    operations = tables.groups(tables_by_name["operations"], "case", "stage", "filter")
+    rows = tables.where(tables_by_name["stages"], case=result.name, component="y")
+    cost_panels = []
+    max_operations = (
+        tables_by_name["operations"].loc[tables_by_name["operations"]["case"] == result.name, "operations"].max()
+    )
     styles = dict(zip(result.axes.filters, _styles(result), strict=True))
-    for stage, own in rows.groupby("stage", sort=False):
+    for stage, stage_rows in rows.groupby("stage", sort=False):
         marks = []
-        for _, row in own.iterrows():
+        for _, row in stage_rows.iterrows():
             style = replace(styles[row["filter"]], dash=None, size_pt=4.5)
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
             marks.append(Line(count, value, panels.literal(row["filter"]), style, lo, hi))
-        x = Axis(tr("operations per update"), limits=(0, 1.06 * float(most)))
+        x = Axis(tr("operations per update"), limits=(0, 1.06 * float(max_operations)))
         y = Axis(panels.sigma_of("$y$", "m"), "log")
-        drawn.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
-    points = [mark for mark in drawn[-1].marks if isinstance(mark, Line)]
-    fewest, good = min(float(one.x[0]) for one in points), min(points, key=lambda one: float(one.y[0]))
-    cheap = listed([one.label for one in points if float(one.x[0]) == fewest])
-    told = tr(
+        cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
+    points = [mark for mark in cost_panels[-1].marks if isinstance(mark, Line)]
+    min_operations, best = min(float(point.x[0]) for point in points), min(points, key=lambda point: float(point.y[0]))
+    cheapest = listed([point.label for point in points if float(point.x[0]) == min_operations])
+    headline = tr(
         "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
-        **{"cheap": cheap, "count": fewest, "stage": drawn[-1].title},
-        **{"good": good.label, "sigma": wording.number(float(good.y[0]), 3)},
+        **{"cheap": cheapest, "count": min_operations, "stage": cost_panels[-1].title},
+        **{"good": best.label, "sigma": wording.number(float(best.y[0]), 3)},
     )
-    drawn = _beside(drawn, result, dash=None)
-    caption = told + tr(
+    cost_panels = _with_legend(cost_panels, result, dash=None)
+    caption = headline + tr(
         "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of "
         "arithmetic operations of one update.{of_case}",
-        of_case=_of_case(result, results),
+        of_case=_case_sentence(result, results),
     )
-    return _several("cost", tr("Cost and accuracy"), caption, drawn, 62)
+    return _figure_of_panels("cost", tr("Cost and accuracy"), caption, cost_panels, 62)
 
 
 def _motions(models: Sequence) -> list[str]:
-    """What each model of a bank is, in the language spoken: its motion and the spread in m/s²."""
+    """The models of a bank in the user's language: motion and spread of the acceleration in m/s²."""
     return [f"{tr(MOTIONS[model.motion])} {numeral(f'{model.sigma_acceleration_mps2:g}')}" for model in models]
 
 
 MOTIONS = {"uniform": term("uniform"), "accelerated": term("accelerated"), "still": term("still")}
 
 
-def _of_case(result: CaseResult, results: Sequence[CaseResult]) -> str:
-    """A sentence on which of several cases is shown."""
+def _case_sentence(result: CaseResult, results: Sequence[CaseResult]) -> str:
+    """A sentence that names the case shown, if there are several."""
     return (
         tr(" For {plain_label}; the other cases are only in the tables.", plain_label=panels.plain_label(result))
         if len(results) > 1
@@ -370,8 +398,8 @@ def _of_case(result: CaseResult, results: Sequence[CaseResult]) -> str:
     )
 
 
-def _unnamed(lines: Sequence) -> list:
-    """The same marks without a legend of their own."""
+def _without_labels(lines: Sequence) -> list:
+    """The marks without labels in the legend."""
     return [replace(line, label="", name=line.name or line.label) if isinstance(line, Line) else line for line in lines]
 
 
@@ -381,22 +409,26 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
         return None
     result = results[0]
     rows = tables.groups(table[table["case"] == result.name], "filter")
-    drawn = []
+    consistency_panels = []
     for key, title in (("nees", tr("NEES of the position")), ("nis", tr("NIS of the plot"))):
         marks: list = [Reference(1.0)]
         stages: tuple = ()
         for n, (f, style) in enumerate(zip(result.axes.filters, _styles(result), strict=True)):
-            own = rows[(f,)]
-            stages = tuple(tr(str(stage)) for stage in own["stage"])
-            x = np.arange(len(own)) + SPREAD / len(result.axes.filters) * (n - (len(result.axes.filters) - 1) / 2)
+            filter_rows = rows[(f,)]
+            stages = tuple(tr(str(stage)) for stage in filter_rows["stage"])
+            x = np.arange(len(filter_rows)) + STAGE_SPREAD / len(result.axes.filters) * (
+                n - (len(result.axes.filters) - 1) / 2
+            )
             columns = ("x", key, f"{key}_lo", f"{key}_hi")
-            marks.append(panels.line(own.assign(x=x), columns, panels.literal(f), replace(style, dash=None)))
+            marks.append(panels.line(filter_rows.assign(x=x), columns, panels.literal(f), replace(style, dash=None)))
         axis = Axis(tr("stage"), ticks=tuple(enumerate(stages)))
-        drawn.append(Panel(axis, Axis(tr("mean per degree of freedom"), "log"), tuple(marks), title, direct=False))
-    drawn = _beside(drawn, result, dash=None)
+        consistency_panels.append(
+            Panel(axis, Axis(tr("mean per degree of freedom"), "log"), tuple(marks), title, direct=False)
+        )
+    consistency_panels = _with_legend(consistency_panels, result, dash=None)
     caption = tr(
         "Normalised squared errors per degree of freedom, by stage: 1 where the filter's own covariance "
         "is correct, more where it is optimistic, less where it is pessimistic.{of_case}",
-        of_case=_of_case(result, results),
+        of_case=_case_sentence(result, results),
     )
-    return _several("consistency", tr("Consistency of the filters"), caption, drawn, 66)
+    return _figure_of_panels("consistency", tr("Consistency of the filters"), caption, consistency_panels, 66)

@@ -28,17 +28,17 @@ RULES = {
 
 @dataclass(frozen=True, kw_only=True)
 class FlightAxes(Axes):
-    """Labels of the sums, and what tables and figures need of the flight; the case describes stages and banks."""
+    """Labels of the sums, and the data of the flight for tables and figures."""
 
     truth: np.ndarray  #: (K', 9) true states x, vx, ax, y, vy, ay, z, vz, az (m, m/s, m/s²) at the reported scans
     stage: np.ndarray  #: (K',) stage of each reported scan
-    #: (S,) scans of each stage that its means are of: from the third scan of the track on, reported or not
+    #: (S,) number of scans in the means of each stage: from the third scan of the track on, reported or not
     stage_scans: np.ndarray
 
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs; see `kernels.records` for the arrays."""
+    """The data for simulating a block; see `kernels.records` for the arrays."""
 
     layout: Layout
     axes: FlightAxes
@@ -49,17 +49,20 @@ class Plan:
 
 
 def banks(spec: Keys, times: np.ndarray) -> records.Banks:
-    """The filters' arrays, padded to eights, for the different intervals times (U,) in s."""
+    """The filters' arrays, padded to multiples of eight, for the distinct intervals times (U,) in s."""
     count = len(spec.filters)
     numbers, models = np.zeros((count, 8), dtype=np.int64), np.zeros((count, 16))
-    transitions, probabilities = np.zeros((count, -(-len(times) * records.MOST**2 // 8) * 8)), np.zeros((count, 8))
+    transitions = np.zeros((count, -(-len(times) * records.MAX_MODELS**2 // 8) * 8))
+    probabilities = np.zeros((count, 8))
     for f, options in enumerate(spec.filters):
         size, T = len(options.models), filters.transition_matrix(options.transition)
         numbers[f, records.FAMILY] = FAMILIES[options.family]
         numbers[f, records.MERGE], numbers[f, records.OUTPUT_RULE] = RULES[options.merge], RULES[options.output]
         numbers[f, records.AT_PREDICTION] = options.covariance_at == "prediction"
         numbers[f, records.SIZE] = size
-        bank = filters.bank([m.motion for m in options.models], [m.sigma_acceleration_mps2 for m in options.models])
+        bank = filters.model_rows(
+            [m.motion for m in options.models], [m.sigma_acceleration_mps2 for m in options.models]
+        )
         models[f, : bank.size] = bank.ravel()
         powers = filters.transition_powers(T, times / options.transition_interval_s)
         transitions[f, : powers.size] = powers.ravel()
@@ -68,15 +71,16 @@ def banks(spec: Keys, times: np.ndarray) -> records.Banks:
 
 
 def stages(spec: Keys, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Stage of each scan (K,), and lengths (S, 2): scans of a stage from the third on, and the reported ones."""
+    """The stage of each scan (K,), and lengths (S, 2): scans of a stage from the third on, and the reported ones."""
     stage = np.searchsorted(np.array(spec.target.stage_ends_s), t, side="right").astype(np.int64)
-    counted = np.arange(len(t)) >= records.START
-    inside = stage == np.arange(len(spec.target.stages))[:, None]
-    return stage, np.stack([(inside & counted).sum(axis=1), (inside & counted & reported).sum(axis=1)], axis=1) * 1.0
+    in_track = np.arange(len(t)) >= records.START
+    in_stage = stage == np.arange(len(spec.target.stages))[:, None]
+    counts = [(in_stage & in_track).sum(axis=1), (in_stage & in_track & reported).sum(axis=1)]
+    return stage, np.stack(counts, axis=1) * 1.0
 
 
 def prepare(case: Case) -> Plan:
-    """The plan of a case: truth, sensor, filters' banks, labels. Raises ConfigError where the flight is impossible."""
+    """The plan of a case: truth, sensor, filters' banks, labels. Raises ConfigError for an impossible flight."""
     spec = case.spec
     t, x = truth(case)
     scan = np.arange(len(t))
@@ -92,7 +96,7 @@ def prepare(case: Case) -> Plan:
         intervals=index,
         times=times,
         reported=reported.astype(np.int64),
-        place=(np.cumsum(reported) - 1).astype(np.int64),
+        report_index=(np.cumsum(reported) - 1).astype(np.int64),
         stage=stage,
         lengths=lengths,
         weights=filters.start_weights(t[: records.START], spec.start_acceleration_mps2),
@@ -102,7 +106,7 @@ def prepare(case: Case) -> Plan:
 
 
 def axes(spec: Keys, t: np.ndarray, world: records.World, lengths: np.ndarray) -> FlightAxes:
-    """Labels of the sums; nothing of this study is known exactly."""
+    """Labels of the sums; this study has no exact values."""
     reported = world.reported.astype(bool)
     shape = (len(spec.filters), int(reported.sum()), records.STATES)
     names = tuple(f.name for f in spec.filters)
@@ -124,30 +128,31 @@ def axes(spec: Keys, t: np.ndarray, world: records.World, lengths: np.ndarray) -
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
-    return _simulated(plan, first, count, 0)[0]
+    return _simulate_block(plan, first, count, 0)[0]
 
 
 def errors(plan: Plan, first: int, count: int) -> np.ndarray:
-    """The errors (F, count, K, 9) of its realisations."""
-    return _simulated(plan, first, count, count)[1][..., :count].transpose(0, 3, 1, 2)
+    """The errors (F, count, K, 9) of the realisations of a block."""
+    return _simulate_block(plan, first, count, count)[1][..., :count].transpose(0, 3, 1, 2)
 
 
-def _simulated(plan: Plan, first: int, count: int, kept: int) -> tuple[np.ndarray, np.ndarray]:
-    """Sums of one block, and the errors (F, K, 9, kept) of all its realisations, in whole eights, or of none."""
+def _simulate_block(plan: Plan, first: int, count: int, kept_errors: int) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of one block, and the errors (F, K, 9, n) of kept_errors realisations, n a multiple of eight."""
     values = np.zeros(plan.layout.size)
     arrays = plan.layout.unpack(values)
-    plain = records.Sums(*(arrays[name] for name in records.Sums._fields))
-    memory = strip.memory(len(plan.banks.numbers), len(plan.world.lengths), len(plan.axes.k), kept)
-    strip.simulate_block(plan.world, plan.banks, memory, plain, plan.axes.baseline, first, count)
-    return values, memory.each
+    sums = records.Sums(*(arrays[name] for name in records.Sums._fields))
+    memory = strip.block_memory(len(plan.banks.numbers), len(plan.world.lengths), len(plan.axes.k), kept_errors)
+    strip.simulate_block(plan.world, plan.banks, memory, sums, plan.axes.baseline, first, count)
+    return values, memory.errors
 
 
-def measured(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Plots of the realisations first … first + 7: positions (K, 3, 8) in m, covariances (K, 6, 8) in m², and detected
-    (K, 8) as 0 or 1. The covariances are packed (xx, xy, xz, yy, yz, zz)."""
+def simulate_plots(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Plots of realisations first … first + 7: positions (K, 3, 8), covariances (K, 6, 8), and detections (K, 8).
+
+    In m and m²; detections are 0 or 1. The covariances are packed (xx, xy, xz, yy, yz, zz)."""
     world, count = plan.world, len(plan.world.truth)
-    found = rows(count * records.PLOT)
-    strip.fill_plots(world.keys, world.frame, world.plot_truth, records.START, first, rows(strip.RANDOM), found)
-    cells = found.reshape(count, records.PLOT, WIDTH)
+    plot_rows = rows(count * records.PLOT)
+    strip.fill_plots(world.keys, world.frame, world.plot_truth, records.START, first, rows(strip.RANDOM), plot_rows)
+    cells = plot_rows.reshape(count, records.PLOT, WIDTH)
     covariance = slice(records.COVARIANCE, records.DETECTED)
     return cells[:, : records.COVARIANCE], cells[:, covariance], cells[:, records.DETECTED]

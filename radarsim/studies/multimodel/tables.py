@@ -9,7 +9,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import notes, statistics
-from radarsim.report import tables as common
+from radarsim.report import tables as report_tables
 from radarsim.studies.multimodel import cost as costs
 from radarsim.studies.multimodel import world
 from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
@@ -17,14 +17,15 @@ from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NI
 if TYPE_CHECKING:
     import pandas as pd
 
+    from radarsim.report.row_notes import RowNote
     from radarsim.studies.multimodel.study import FlightAxes
 
-table = common.Tables()
+table = report_tables.Tables()
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
 
 
 @table("probabilities")
-def _probabilities(result: CaseResult) -> common.Columns:
+def _probabilities(result: CaseResult) -> report_tables.Columns:
     """How probable a filter takes each of its models to be, by scan.
 
     model: number of the model, from 1
@@ -32,23 +33,23 @@ def _probabilities(result: CaseResult) -> common.Columns:
     motion: the model in words
     """
     axes, models = result.axes, [world.labels(options.models) for options in result.spec.filters]
-    shown = [(f, m) for f, own in enumerate(models) for m in range(len(own)) if len(own) > 1]
+    filter_models = [(f, m) for f, labels in enumerate(models) for m in range(len(labels)) if len(labels) > 1]
     scans = len(axes.k)
-    f = np.repeat([f for f, _ in shown], scans).astype(int)
-    m = np.repeat([m for _, m in shown], scans).astype(int)
-    k = np.tile(np.arange(scans), len(shown))
+    f = np.repeat([f for f, _ in filter_models], scans).astype(int)
+    m = np.repeat([m for _, m in filter_models], scans).astype(int)
+    k = np.tile(np.arange(scans), len(filter_models))
     sums = np.asarray(result.sums["probability"])[f, k, m]
-    of = statistics.probability(sums[:, 0], sums[:, 1], result.count)
+    mean_probability = statistics.probability(sums[:, 0], sums[:, 1], result.count)
     return {
-        **common.leading(result, f, k, model=m + 1),
+        **report_tables.leading(result, f, k, model=m + 1),
         "n": np.full(f.size, result.count),
-        "probability": of,
+        "probability": mean_probability,
         "motion": np.array([models[a][b] for a, b in zip(f, m, strict=True)], dtype=object),
     }
 
 
 def stage_names(result: CaseResult) -> tuple[str, ...]:
-    """Names (S,) of the stages of a case, those without scans too, in the order of the sums."""
+    """Names (S,) of the stages of a case, also of those without scans, in the order of the sums."""
     return tuple(stage.name for stage in result.spec.target.stages)
 
 
@@ -66,40 +67,47 @@ def stage_sigma(result: CaseResult, f: int, s: int, c: int) -> statistics.Estima
 
 
 def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statistics.Estimate:
-    """Paired gain of filter f against any other in component c over stage s, %."""
+    """Paired gain of filter f relative to any other in component c over stage s, %."""
     (a, aa), (b, bb) = (np.asarray(result.sums["stage"])[i, s, c] for i in (f, base))
     return statistics.gain(a, aa, b, bb, np.asarray(result.sums["pairs"])[f, base, s, c], result.count)
 
 
+def _heavy_note(is_heavy: bool, is_baseline_heavy: bool) -> "RowNote | str":
+    """The note on a row whose σ, or whose baseline's σ, few realisations decide; empty for others."""
+    if is_heavy:
+        return notes.HEAVY
+    return notes.HEAVY.about("gain") if is_baseline_heavy else ""
+
+
 @table("stages")
-def _stages(result: CaseResult) -> common.Columns:
+def _stages(result: CaseResult) -> report_tables.Columns:
     """σ over each stage of the flight, of all its scans, and the paired gain against the first baseline filter.
 
     begin_s, end_s: times from which and to which the stage lasts
     """
     rows, axes, b = [], result.axes, result.axes.baseline
-    places = {name: s for s, name in enumerate(stage_names(result))}
+    stage_numbers = {name: s for s, name in enumerate(stage_names(result))}
     square, fourth = np.moveaxis(np.asarray(result.sums["stage"]), -1, 0)
-    few = statistics.effective(square, fourth, result.count) < notes.EFFECTIVE
-    nothing = statistics.Estimate(np.nan, np.nan, np.nan)
+    is_heavy = statistics.effective(square, fourth, result.count) < notes.EFFECTIVE
+    no_gain = statistics.Estimate(np.nan, np.nan, np.nan)
     for f, label in enumerate(axes.filters):
         for stage, begin, end in stage_bounds(result):
             for c, (component, unit) in enumerate(axes.components):
-                s = places[stage]
+                s = stage_numbers[stage]
                 row = {
                     **{"case": result.name, "filter": label, "stage": stage, "begin_s": begin, "end_s": end},
                     **{"component": component, "unit": unit, "n": result.count},
                     "sigma": stage_sigma(result, f, s, c),
                     "baseline": axes.filters[b],
-                    "gain_percent|gain": stage_gain(result, f, b, s, c) if f != b else nothing,
-                    "note": notes.HEAVY if few[f, s, c] else notes.HEAVY.about("gain") if few[b, s, c] else "",
+                    "gain_percent|gain": stage_gain(result, f, b, s, c) if f != b else no_gain,
+                    "note": _heavy_note(is_heavy[f, s, c], is_heavy[b, s, c]),
                 }
                 rows.append(row)
-    return common.of_rows(rows)
+    return report_tables.of_rows(rows)
 
 
 @table("consistency")
-def _consistency(result: CaseResult) -> common.Columns:
+def _consistency(result: CaseResult) -> report_tables.Columns:
     """NEES of the position by stage, at the reported scans, and NIS of the plots, at all scans.
 
     The plot against what the hypothesis predicted that was the most probable before it. The bounds, from the spread of
@@ -110,21 +118,23 @@ def _consistency(result: CaseResult) -> common.Columns:
     s = np.array([names.index(stage) for stage, *_ in stage_bounds(result)])
     filters = len(axes.filters)
     sums = np.asarray(result.sums["stage"])[:, s].reshape(filters * s.size, -1, 2)
-    found: dict[str, np.ndarray] = {}
-    for quantity, place in (("nees", NEES), ("nis", NIS)):
-        total, square = sums[:, place, 0] / FREEDOM, sums[:, place, 1] / FREEDOM**2
+    columns: dict[str, np.ndarray] = {}
+    for quantity, mean_index in (("nees", NEES), ("nis", NIS)):
+        total, square = sums[:, mean_index, 0] / FREEDOM, sums[:, mean_index, 1] / FREEDOM**2
         bounds = notes.bounds_from_spread(total, square, n, len(sums))
         means = [statistics.mean_square(*pair, n) for pair in zip(total, square, strict=True)]
-        found |= notes.normalised(quantity, statistics.Estimate(*np.transpose(means)), bounds)
+        columns |= notes.normalised(quantity, statistics.Estimate(*np.transpose(means)), bounds)
     return {
-        **common.leading(result, np.repeat(np.arange(filters), s.size), stage=common.names(names, np.tile(s, filters))),
+        **report_tables.leading(
+            result, np.repeat(np.arange(filters), s.size), stage=report_tables.names(names, np.tile(s, filters))
+        ),
         "n": np.full(len(sums), n),
-        **found,
+        **columns,
     }
 
 
 @table("operations")
-def _operations(result: "CaseResult[FlightAxes]") -> common.Columns:
+def _operations(result: "CaseResult[FlightAxes]") -> report_tables.Columns:
     """Arithmetic operations of one update of one realisation, counted: mean over each stage, and the whole flight.
 
     family, merge, models: family of the filter, its rule of merging, and number of its models
@@ -133,32 +143,36 @@ def _operations(result: "CaseResult[FlightAxes]") -> common.Columns:
     """
     rows, scans = [], result.axes.stage_scans
     for f, options in enumerate(result.spec.filters):
-        fixed, each, once = costs.operations_of(options)
-        own = np.asarray(result.sums["stage"])[f, :, [MERGED, MERGES], 0].T / result.count
-        whole = scans @ own / scans.sum()
-        named = [(name, own[s]) for s, name in enumerate(stage_names(result)) if scans[s] > 0]
-        what = {"family": options.family, "merge": options.merge, "models": len(options.models)}
-        for stage, (merged, merges) in [*named, ("whole", whole)]:
-            row = {"case": result.name, "filter": result.axes.filters[f], **what, "stage": stage}
-            counted = {"merged": merged, "merges": merges, "operations": fixed + each * merged + once * merges}
-            rows.append(row | counted)
-    return common.of_rows(rows)
+        fixed, per_hypothesis, per_merge = costs.operations_of(options)
+        merge_means = np.asarray(result.sums["stage"])[f, :, [MERGED, MERGES], 0].T / result.count
+        flight_means = scans @ merge_means / scans.sum()
+        means_by_stage = [(name, merge_means[s]) for s, name in enumerate(stage_names(result)) if scans[s] > 0]
+        filter_columns = {"family": options.family, "merge": options.merge, "models": len(options.models)}
+        for stage, (merged, merges) in [*means_by_stage, ("whole", flight_means)]:
+            row = {"case": result.name, "filter": result.axes.filters[f], **filter_columns, "stage": stage}
+            counts = {
+                "merged": merged,
+                "merges": merges,
+                "operations": fixed + per_hypothesis * merged + per_merge * merges,
+            }
+            rows.append(row | counts)
+    return report_tables.of_rows(rows)
 
 
 tables = table.made
 
 
-def cost(made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
-    """Operations counted and nanoseconds measured of one update, with σ of the height by stage; None if not measured.
+def cost(tables_by_name: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
+    """Counted operations and measured nanoseconds of one update, with σ of the height by stage; None if not measured.
 
     run: the facts of the run, with `seconds_per_update`."""
     measured = run.get("seconds_per_update")
     if not measured:
         return None
-    counted = common.where(made["operations"], stage="whole")
-    table = counted[["case", "filter", "family", "merge", "models", "operations"]].reset_index(drop=True)
+    operation_rows = report_tables.where(tables_by_name["operations"], stage="whole")
+    table = operation_rows[["case", "filter", "family", "merge", "models", "operations"]].reset_index(drop=True)
     table["measured, ns"] = [1e9 * measured[c][f] for c, f in zip(table["case"], table["filter"], strict=True)]
-    height = common.where(made["stages"], component="y")
+    height = report_tables.where(tables_by_name["stages"], component="y")
     wide = height.pivot(index=["case", "filter"], columns="stage", values="sigma")
     stages = list(dict.fromkeys(height["stage"]))
     wide = wide[stages].rename(columns={stage: f"σ of y, {stage}, m" for stage in stages})

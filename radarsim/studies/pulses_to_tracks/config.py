@@ -11,12 +11,12 @@ from radarsim.config.document import short
 from radarsim.config.fields import NEAREST_M, At, Design, Display, Lasting, Model, Positive, Whole, at, cross_check, key
 from radarsim.constants import Band
 
-MOST_SCANS = 1000  # each scan has windows of its own
-FEWEST_PULSES, MOST_PULSES = 4, 4096
-SIGMAS = 3.0  # of the prior, in the checks of spans and rates
-MOST_DERIVATIVES = 1
-MOST_HYPOTHESES = 1000
-UNFOLDING = {"prune_below": 1e-6, "estimate": "mean"}  # keys of several hypotheses, and defaults
+MAX_SCANS = 1000  # each scan has its own windows
+MIN_PULSES, MAX_PULSES = 4, 4096
+SWEEP_SIGMAS = 3.0  # standard deviations of the prior in the check of the repetition rate
+MAX_DERIVATIVES = 1
+MAX_HYPOTHESES = 1000
+HYPOTHESIS_DEFAULTS = {"prune_below": 1e-6, "estimate": "mean"}  # of filters that keep several hypotheses
 SEQUENCES = ("sequence", "dense", "cured")
 Target = Annotated[
     fields.Polynomial | fields.AccelerationStart | fields.Turn | fields.FlyBy | fields.Recorded,
@@ -44,7 +44,7 @@ class Burst(Model):
         "pulse repetition rate, Hz; the velocity is folded modulo λ/2 times this rate",
         symbol="F_r",
     )
-    pulses: Annotated[int, Whole(FEWEST_PULSES, MOST_PULSES)] | None = key(
+    pulses: Annotated[int, Whole(MIN_PULSES, MAX_PULSES)] | None = key(
         "pulses of a burst", "number of pulses; or give pulses_per_second", None, symbol="N"
     )
     pulses_per_second: Positive | None = key(
@@ -102,7 +102,7 @@ class Forecast(Model):
 
 
 class Filter(Model):
-    """A Kalman filter of range, and of what an estimator finds in the burst."""
+    """A Kalman filter of ranges, and of an estimator's numbers from the burst."""
 
     name: Annotated[fields.Name, Display()] = key("name", "label; every filter has its own")
     observes: tuple[Literal["range", "velocity", "acceleration"], ...] = key(
@@ -132,7 +132,7 @@ class Filter(Model):
         "covariance), or a forecast of fixed accuracy; default: track",
         None,
     )
-    derivatives: Annotated[int, Whole(0, MOST_DERIVATIVES)] | None = key(
+    derivatives: Annotated[int, Whole(0, MAX_DERIVATIVES)] | None = key(
         "derivatives estimated",
         "derivatives of the Doppler frequency that are estimated; default: 1 with the acceleration, else 0 (it is "
         "then taken as forecast)",
@@ -157,7 +157,7 @@ class Filter(Model):
         only={"use": "mixture"},
     )
 
-    hypotheses: Annotated[int, Whole(1, MOST_HYPOTHESES)] | None = key(
+    hypotheses: Annotated[int, Whole(1, MAX_HYPOTHESES)] | None = key(
         "hypotheses kept",
         "largest number of hypotheses kept on the folds of its velocities (and, in a mixture, on which "
         "bursts locked), as for folded velocity; default: 1, the fold nearest to the prediction",
@@ -174,7 +174,7 @@ class Filter(Model):
 
     @property
     def takes(self) -> int:
-        """How many numbers of the burst it takes: none, the velocity, or the acceleration too."""
+        """The number of quantities that it takes from the burst: none, the velocity, or also the acceleration."""
         return len(self.observes) - 1
 
     @cross_check
@@ -186,7 +186,7 @@ class Filter(Model):
     @cross_check
     def _keys_have_an_effect(self) -> Iterator[At]:
         if self.observes == ("range",):
-            for name in ("estimator", "forecast", "derivatives", "use", "hypotheses", *UNFOLDING):
+            for name in ("estimator", "forecast", "derivatives", "use", "hypotheses", *HYPOTHESIS_DEFAULTS):
                 if getattr(self, name) is not None:
                     yield at(name, "has no effect on range alone; leave it out")
             return
@@ -204,7 +204,7 @@ class Filter(Model):
         several = (self.hypotheses or 1) > 1
         if several and self.use == "gated":
             yield at("use", "must be as_measured or mixture with several hypotheses, which weigh what a gate would cut")
-        for name in UNFOLDING:
+        for name in HYPOTHESIS_DEFAULTS:
             if getattr(self, name) is not None and not several:
                 yield at(name, "has no effect without hypotheses: 2 or more; leave it out")
 
@@ -215,20 +215,20 @@ class Filter(Model):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        """The same with the defaults of what has an effect written out."""
+        """The filter with the defaults of all keys that have an effect filled in."""
         if self.takes == 0:
             return self
         defaults: dict[str, Any] = {"estimator": "cured", "derivatives": self.takes - 1, "use": "as_measured"}
         if (self.estimator or "cured") in SEQUENCES:
             defaults["forecast"] = "track"
         if self.estimator != "fisher_bound":
-            defaults |= {"hypotheses": 1} | (UNFOLDING if (self.hypotheses or 1) > 1 else {})
+            defaults |= {"hypotheses": 1} | (HYPOTHESIS_DEFAULTS if (self.hypotheses or 1) > 1 else {})
         missing = {name: value for name, value in defaults.items() if getattr(self, name) is None}
         return self.model_copy(update=missing) if missing else self
 
 
 class Keys(Lasting):
-    """From pulses to tracks: how many pulses buy which track, and what a lost lock costs."""
+    """From pulses to tracks: which accuracy a number of pulses gives, and how much a lost lock costs."""
 
     figure_names = (
         *(f"{kind}_{component}" for component in ("r", "Vr", "ar") for kind in ("sigma", "gain", "dynamic")),
@@ -238,7 +238,7 @@ class Keys(Lasting):
         "losses",
         "threshold",
     )
-    most_scans = MOST_SCANS
+    most_scans = MAX_SCANS
     in_place_of: ClassVar = {
         **Lasting.in_place_of,
         "burst.pulses": "burst.pulses_per_second",
@@ -251,12 +251,12 @@ class Keys(Lasting):
     prior: Prior = key("designation", "what is known when the track begins")
     filters: fields.Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
     baseline: fields.Baseline = fields.BASELINE
-    scans: Annotated[Annotated[int, Whole(2, MOST_SCANS)] | None, Design()] = fields.SCANS
+    scans: Annotated[Annotated[int, Whole(2, MAX_SCANS)] | None, Design()] = fields.SCANS
     duration_s: Annotated[Positive | None, Design()] = fields.DURATION
 
     @property
     def pulses(self) -> int:
-        """Pulses of a burst, given or by their number a second."""
+        """The pulses of a burst, as configured or from their number per second."""
         burst = self.burst
         if burst.pulses is not None:
             return burst.pulses
@@ -282,36 +282,38 @@ class Keys(Lasting):
 
     @cross_check
     def _pulses_in_bounds(self) -> Iterator[At]:
-        if self.burst.pulses is None and not FEWEST_PULSES <= self.pulses <= MOST_PULSES:
-            bounds = f"{FEWEST_PULSES} to {MOST_PULSES} pulses in radar.scan_period_s, makes {self.pulses}"
+        if self.burst.pulses is None and not MIN_PULSES <= self.pulses <= MAX_PULSES:
+            bounds = f"{MIN_PULSES} to {MAX_PULSES} pulses in radar.scan_period_s, makes {self.pulses}"
             yield at("burst.pulses_per_second", f"must be {bounds}")
 
     @cross_check
     def _burst_fits_the_scan(self) -> Iterator[At]:
         if self.burst_s > self.radar.scan_period_s:
-            words = f"the burst must be <= radar.scan_period_s, {short(self.radar.scan_period_s)} s"
+            message = f"the burst must be <= radar.scan_period_s, {short(self.radar.scan_period_s)} s"
             name = "pulses" if self.burst.pulses is not None else "pulses_per_second"
-            yield at(f"burst.{name}", f"{words}, is {short(self.burst_s)} s")
+            yield at(f"burst.{name}", f"{message}, is {short(self.burst_s)} s")
 
     @cross_check
     def _rate_carries_the_derivatives(self) -> Iterator[At]:
         """Refuse a burst over which the forecast acceleration could sweep the frequency past half the rate."""
-        if not any(one.takes for one in self.filters):
+        if not any(f.takes for f in self.filters):
             return
-        swept = 2 / self.radar.wavelength_m * SIGMAS * self.prior.sigma_acceleration_mps2 * self.burst_s
-        if self.burst.repetition_rate_hz < 2 * swept:
-            words = f"must be >= {short(2 * swept)} Hz, twice what {SIGMAS:g} σ of the prior's acceleration sweep"
-            yield at("burst.repetition_rate_hz", f"{words} over the burst")
+        swept_hz = 2 / self.radar.wavelength_m * SWEEP_SIGMAS * self.prior.sigma_acceleration_mps2 * self.burst_s
+        if self.burst.repetition_rate_hz < 2 * swept_hz:
+            clause = (
+                f"must be >= {short(2 * swept_hz)} Hz, twice what {SWEEP_SIGMAS:g} σ of the prior's acceleration sweep"
+            )
+            yield at("burst.repetition_rate_hz", f"{clause} over the burst")
 
     @cross_check
     def _enough_pulses(self) -> Iterator[At]:
         yield from fields.of_each(self.filters, self._determined)
 
-    def _determined(self, i: int, one: Filter) -> Iterator[At]:
-        fewest = 2 + (one.derivatives if one.derivatives is not None else max(one.takes - 1, 0))
-        if one.takes and self.pulses < 2 * fewest:
-            words = f"{self.pulses} pulses are too few for {fewest} parameters: at least {2 * fewest}"
-            yield at(f"filters.{i}.derivatives" if one.derivatives is not None else "burst.pulses", words)
+    def _determined(self, i: int, filter_: Filter) -> Iterator[At]:
+        parameters = 2 + (filter_.derivatives if filter_.derivatives is not None else max(filter_.takes - 1, 0))
+        if filter_.takes and self.pulses < 2 * parameters:
+            message = f"{self.pulses} pulses are too few for {parameters} parameters: at least {2 * parameters}"
+            yield at(f"filters.{i}.derivatives" if filter_.derivatives is not None else "burst.pulses", message)
 
     @cross_check
     def _in_proportion(self) -> Iterator[At]:
@@ -321,10 +323,10 @@ class Keys(Lasting):
             ("sigma_acceleration_mps2", self.prior.sigma_acceleration_mps2 * dt**2),
         ):
             if not 1e-6 <= value / sigma <= 1e6:
-                words = (
+                message = (
                     "out of proportion: what it moves a target in a scan over sigma_range_m must be from 1e-6 to 1e6"
                 )
-                yield at(f"prior.{name}", words)
+                yield at(f"prior.{name}", message)
 
     @cross_check
     def _target_in_reach(self) -> Iterator[At]:

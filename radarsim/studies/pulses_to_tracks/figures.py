@@ -1,4 +1,4 @@
-"""The study's figures: σ and gains, locks by scan, what the bursts measured, what a loss costs."""
+"""The study's figures: σ and gains, locks by scan, errors of the bursts' estimates, the cost of a lost burst."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -17,72 +17,79 @@ from radarsim.studies.pulses_to_tracks.tables import Result
 if TYPE_CHECKING:
     import pandas as pd
 
-FEW = 30  # realisations behind a point
+MIN_REALISATIONS = 30  # for a point to be drawn
 DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 
-def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
+def figures(
+    results: Sequence[Result], tables_by_name: "Mapping[str, pd.DataFrame]", experiment: Experiment
+) -> dict[str, Figure]:
     """sigma_r … gain_ar; folds; locks, measured, losses of cases without a sweep, threshold of the others."""
-    drawn = panels.per_component(results, made, RADIAL, experiment)
-    for name, (draw, title, caption) in OWN.items():
+    figures_by_name = panels.per_component(results, tables_by_name, RADIAL, experiment)
+    for name, (draw, title, caption) in STUDY_FIGURES.items():
         unswept = [result for result in panels.unswept(results) if not result.swept]
-        some, left_out = panels.shown(results if name == "folds" else unswept, panels.named(experiment, name))
-        found = [panel for result in some if (panel := draw(result, made)).marks]
-        if found:
-            drawn[name] = _figure(name, tr(title), tr(caption) + left_out, found)
-    drawn |= threshold_figure(results, made)
-    return {name: one for name, one in drawn.items() if one}
+        visible, left_out = panels.shown(results if name == "folds" else unswept, panels.named(experiment, name))
+        visible_panels = [panel for result in visible if (panel := draw(result, tables_by_name)).marks]
+        if visible_panels:
+            figures_by_name[name] = _figure(name, tr(title), tr(caption) + left_out, visible_panels)
+    figures_by_name |= threshold_figure(results, tables_by_name)
+    return {name: figure for name, figure in figures_by_name.items() if figure}
 
 
-def _figure(name: str, title: str, caption: str, found: list[Panel]) -> Figure:
-    if len(found) > 1 or any(len(panel.marks) > panels.MOST_AT_ENDS for panel in found):
-        found = panels.in_legend(found)
-    columns = min(3, len(found))
-    return Figure(name, title, caption, tuple(found), columns, COLUMN_MM if columns == 1 else PAGE_MM)
+def _figure(name: str, title: str, caption: str, figure_panels: list[Panel]) -> Figure:
+    if len(figure_panels) > 1 or any(len(panel.marks) > panels.MOST_AT_ENDS for panel in figure_panels):
+        figure_panels = panels.in_legend(figure_panels)
+    columns = min(3, len(figure_panels))
+    return Figure(name, title, caption, tuple(figure_panels), columns, COLUMN_MM if columns == 1 else PAGE_MM)
 
 
 def _title(result: Result) -> str:
     return panels.swept(result) or panels.device(result)
 
 
-def threshold_figure(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]") -> dict[str, Figure]:
+def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd.DataFrame]") -> dict[str, Figure]:
     """Share of bursts that locked, and σ of range at the last scan, against one swept number, for each config."""
-    drawn: list[Panel] = []
+    threshold_panels: list[Panel] = []
     for (_, keys), members in sweeps.families(results).items():
         x, axis = sweeps.places(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
         if len(keys) == 1 and not axis.ticks:
-            drawn += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, made)
-    if not any(panel.marks for panel in drawn):
+            threshold_panels += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, tables_by_name)
+    if not any(panel.marks for panel in threshold_panels):
         return {}
     caption = tr(
         "P(not locked): share of bursts that do not lock, at the worst scan: velocity (or acceleration, "
         "where used) in error by more than five Fisher bounds; where all lock there is no point. "
         "σ of the range at the last scan. Bands: 95 % intervals."
     )
-    figure = Figure("threshold", tr("The threshold"), caption, tuple(panels.in_legend(drawn)), 3, PAGE_MM, 60)
+    figure = Figure(
+        "threshold", tr("The threshold"), caption, tuple(panels.in_legend(threshold_panels)), 3, PAGE_MM, 60
+    )
     return {"threshold": figure}
 
 
 def _threshold_panels(
-    members: Sequence[Result], x: np.ndarray, axis: Axis, made: "Mapping[str, pd.DataFrame]"
+    members: Sequence[Result], x: np.ndarray, axis: Axis, tables_by_name: "Mapping[str, pd.DataFrame]"
 ) -> list[Panel]:
     """The two panels of cases in the order of their swept values x (n,)."""
     locks: list[Line] = []
     sigmas: list[Line] = []
-    curves = tables.groups(made["curves"], "case", "filter", "component")
+    curves = tables.groups(tables_by_name["curves"], "case", "filter", "component")
     for n, name in enumerate(members[0].axes.filters):
-        style, words = panels.look(n, 0, 1), panels.literal(name)
-        found = np.array([sweeps.last(result, name, "r", curves) for result in members])
-        exact = found[:, 3] if np.isfinite(found[:, 3]).any() else None
-        sigmas.append(Line(x, found[:, 0], words, style, found[:, 1], found[:, 2], exact))
+        style, label = panels.look(n, 0, 1), panels.literal(name)
+        final_sigmas = np.array([sweeps.last(result, name, "r", curves) for result in members])
+        exact = final_sigmas[:, 3] if np.isfinite(final_sigmas[:, 3]).any() else None
+        sigmas.append(Line(x, final_sigmas[:, 0], label, style, final_sigmas[:, 1], final_sigmas[:, 2], exact))
         if members[0].axes.ideal[n] >= 0:
-            shares = np.array([_locked(result, made["locks"], name) for result in members])
-            locks.append(Line(x, shares[:, 0], words, style, shares[:, 1], shares[:, 2]))
+            shares = np.array([_locked(result, tables_by_name["locks"], name) for result in members])
+            locks.append(Line(x, shares[:, 0], label, style, shares[:, 1], shares[:, 2]))
     y = panels.fitting_axis(tr("$\\sigma$ of $r$ at the end, m"), sigmas)
-    of_r = Panel(axis, y, tuple(sigmas), panels.device(members[0]))
-    lost = tuple(line for line in map(panels.lost, locks) if (line.y > 0).any())
-    axis_y = panels.loss_axis(tr("P(not locked)"), lost)
-    return [*([Panel(axis, axis_y, lost, panels.device(members[0]))] if lost else []), of_r]
+    range_panel = Panel(axis, y, tuple(sigmas), panels.device(members[0]))
+    lines_of_losses = tuple(line for line in map(panels.lost, locks) if (line.y > 0).any())
+    axis_y = panels.loss_axis(tr("P(not locked)"), lines_of_losses)
+    return [
+        *([Panel(axis, axis_y, lines_of_losses, panels.device(members[0]))] if lines_of_losses else []),
+        range_panel,
+    ]
 
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
@@ -97,42 +104,45 @@ def _line(result: Result, name: str, rows: "pd.DataFrame", columns: Sequence[str
     return panels.line(rows, columns, panels.literal(name), panels.look(result.axes.filters.index(name), 0, 1))
 
 
-def locks_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+def locks_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """Share of bursts that locked against time, a line for each estimator."""
-    rows = tables.groups(tables.where(made["locks"], case=result.name), "filter")
+    rows = tables.groups(tables.where(tables_by_name["locks"], case=result.name), "filter")
     marks = []
-    ideal = {one.name for one in result.spec.filters if one.estimator == "fisher_bound"}
-    for (name,), own in rows.items():
-        if ((1 - own["lock_rate"]) * own["n"]).sum() >= FEW_EVENTS and name not in ideal:
-            marks.append(panels.lost(_line(result, name, own, ("t_s", "lock_rate", "lock_lo", "lock_hi"))))
+    ideal_filters = {options.name for options in result.spec.filters if options.estimator == "fisher_bound"}
+    for (name,), filter_rows in rows.items():
+        if ((1 - filter_rows["lock_rate"]) * filter_rows["n"]).sum() >= FEW_EVENTS and name not in ideal_filters:
+            marks.append(panels.lost(_line(result, name, filter_rows, ("t_s", "lock_rate", "lock_lo", "lock_hi"))))
     y_axis = panels.loss_axis(tr("P(not locked)"), marks)
     return Panel(panels.time_axis(), y_axis, tuple(marks), _title(result))
 
 
-def folds_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+def folds_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """How often the best hypothesis has no wrong fold against time, a line for each filter that keeps several."""
-    rows = tables.groups(tables.where(made["folds"], case=result.name), "filter")
-    marks = [_line(result, name, own, ("t_s", "right", "right_lo", "right_hi")) for (name,), own in rows.items()]
+    rows = tables.groups(tables.where(tables_by_name["folds"], case=result.name), "filter")
+    marks = [
+        _line(result, name, filter_rows, ("t_s", "right", "right_lo", "right_hi"))
+        for (name,), filter_rows in rows.items()
+    ]
     return Panel(panels.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
 
 
-def measured_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+def measured_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
-    rows = tables.groups(tables.where(made["estimates"], case=result.name, component="Vr"), "filter")
+    rows = tables.groups(tables.where(tables_by_name["estimates"], case=result.name, component="Vr"), "filter")
     columns = ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi")
-    marks = [_line(result, name, own, columns) for (name,), own in rows.items()]
+    marks = [_line(result, name, filter_rows, columns) for (name,), filter_rows in rows.items()]
     if rows:
         marks.append(panels.line(next(iter(rows.values())), ("t_s", "bound"), tr("Fisher bound"), Style(9, 1)))
     y = panels.fitting_axis(tr("$\\sigma$ of measured $V_r$, m/s"), marks)
     return Panel(panels.time_axis(), y, tuple(marks), _title(result))
 
 
-def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
+def losses_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """σ of the range at the last scan by the scans since a burst was lost, a line for each filter that lost some."""
-    own = tables.where(made["losses"], case=result.name, component="r", k=result.axes.k[-1])
+    range_rows = tables.where(tables_by_name["losses"], case=result.name, component="r", k=result.axes.k[-1])
     marks = []
-    for (name,), rows in tables.groups(own, "filter").items():
-        rows = rows[rows["n"] >= FEW]
+    for (name,), rows in tables.groups(range_rows, "filter").items():
+        rows = rows[rows["n"] >= MIN_REALISATIONS]
         if len(rows) > 1:
             rows = rows.assign(sigma_hi=np.minimum(rows["sigma_hi"], 1e3 * rows["sigma"]))
             marks.append(_line(result, name, rows, ("since_loss", "sigma", "sigma_lo", "sigma_hi")))
@@ -143,7 +153,7 @@ def losses_panel(result: Result, made: "Mapping[str, pd.DataFrame]") -> Panel:
 
 
 Draw = Callable[[Result, "Mapping[str, pd.DataFrame]"], Panel]
-OWN: dict[str, tuple[Draw, str, str]] = {
+STUDY_FIGURES: dict[str, tuple[Draw, str, str]] = {
     "locks": (
         locks_panel,
         term("Bursts that do not lock"),

@@ -10,17 +10,19 @@ from radarsim.studies.pulses_to_tracks.study import PulsesAxes
 
 
 def floor(spec: Any, axes: PulsesAxes) -> Floor | None:
-    """A burst measures velocity and acceleration no better than its Fisher bounds; the designation is a measurement.
-    Of the second degree, or of the target's own where that is higher; of other motions none is defined."""
+    """The floor of each filter; None for targets that are no polynomial.
+
+    A burst measures velocity and acceleration no better than its Fisher bounds; the designation counts as a
+    measurement. The polynomial estimated is of the second degree, or of the target's if that is higher."""
     if spec.target.kind != "polynomial":
         return None
     t, size = np.asarray(axes.t_s, dtype=float), max(3, len(spec.target.coefficients))
-    maps, known = floors.polynomial(t, size), np.zeros((size, size))
-    known[1, 1], known[2, 2] = spec.prior.sigma_velocity_mps**-2.0, spec.prior.sigma_acceleration_mps2**-2.0
-    found: dict[bytes, Bound] = {}
+    maps, prior = floors.polynomial(t, size), np.zeros((size, size))
+    prior[1, 1], prior[2, 2] = spec.prior.sigma_velocity_mps**-2.0, spec.prior.sigma_acceleration_mps2**-2.0
+    bounds_by_value: dict[bytes, Bound] = {}
     for bound in axes.bound:
         sigma = np.column_stack([np.full(len(t), spec.radar.sigma_range_m), bound])
         rows = np.where(np.isnan(sigma)[..., None], 0.0, maps / sigma[..., None])
-        if bound.tobytes() not in found:
-            found[bound.tobytes()] = floors.static(known, np.einsum("kdi,kdj->kij", rows, rows), maps)
-    return Floor(floors.CRB, tuple(found[bound.tobytes()] for bound in axes.bound))
+        if bound.tobytes() not in bounds_by_value:
+            bounds_by_value[bound.tobytes()] = floors.static(prior, np.einsum("kdi,kdj->kij", rows, rows), maps)
+    return Floor(floors.CRB, tuple(bounds_by_value[bound.tobytes()] for bound in axes.bound))

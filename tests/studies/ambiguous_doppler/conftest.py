@@ -25,14 +25,19 @@ RANDOM = {"kind": "random_polynomial"}
 FIXED = {"kind": "polynomial", "coefficients": [100e3, -250.0, 4.0]}
 
 
-def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None, rare=None, **keys):
+def make_case(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None, rare=None, **keys):
     """A checked case; keys are further ones of the radar."""
     sigma_r, sigma_v, dt, wavelength = RADARS[radar]
-    given = {"sigma_range_m": sigma_r, "sigma_velocity_mps": sigma_v, "scan_period_s": dt, "wavelength_m": wavelength}
+    radar_keys = {
+        "sigma_range_m": sigma_r,
+        "sigma_velocity_mps": sigma_v,
+        "scan_period_s": dt,
+        "wavelength_m": wavelength,
+    }
     document = {
-        "radar": given | {"repetition_rate_hz": 1000.0} | keys,
+        "radar": radar_keys | {"repetition_rate_hz": 1000.0} | keys,
         "target": target,
-        "filters": [{"manoeuvre_variance": variance} | one for one in filters],
+        "filters": [{"manoeuvre_variance": variance} | f for f in filters],
         "scans": scans,
     }
     if prior:
@@ -43,21 +48,21 @@ def made(radar, filters, scans, target=RANDOM, variance=1e-3, seed=1, prior=None
     return Case("case", "case", "ambiguous_doppler", spec, (), 1, seed)
 
 
-def tolerances(case, came, size=naive.SIZE):
+def tolerances(case, detected, size=naive.SIZE):
     """Rounding of estimates (3,), and of weights, of filters that list or combine: as of ranges alone, of any order."""
     radar = case.spec.radar
     sigma = radar.sigma_range_m, radar.sigma_velocity_mps
-    alone = [
-        SimpleNamespace(orders=(one.order,), variances=(one.manoeuvre_variance,), doppler="none")
+    range_only_options = [
+        SimpleNamespace(orders=(member.order,), variances=(member.manoeuvre_variance,), doppler="none")
         for options in case.spec.filters
-        for one in filters.members(options)
+        for member in filters.members(options)
     ]
-    kalmans = [naive.Kalman(one, case.spec.prior, sigma, radar.scan_period_s) for one in alone]
-    estimates, weights = zip(*(naive.precision(one, came, size) for one in kalmans), strict=True)
+    kalmans = [naive.Kalman(member, case.spec.prior, sigma, radar.scan_period_s) for member in range_only_options]
+    estimates, weights = zip(*(naive.rounding_errors(member, detected, size) for member in kalmans), strict=True)
     return np.max(estimates, axis=0), max(weights)
 
 
-def added(plan, n):
+def simulate_sums(plan, n):
     """Sums of n realisations."""
     values = np.zeros(plan.layout.size)
     for first in range(0, n, plan.block):
@@ -65,28 +70,28 @@ def added(plan, n):
     return plan.layout.unpack(values)
 
 
-def summed(case, n):
+def plan_and_sums(case, n):
     """The plan and the sums of n realisations."""
     plan = study.prepare(case)
-    return plan, SimpleNamespace(**added(plan, n))
+    return plan, SimpleNamespace(**simulate_sums(plan, n))
 
 
-def config_of(*filters, **keys):
+def config_document(*filters, **keys):
     """The config of eight scans of RLS 5, as a document, with further keys."""
-    spec = made("RLS 5", filters, 8).spec
+    spec = make_case("RLS 5", filters, 8).spec
     return {"study": "ambiguous_doppler", "realisations": 10} | spec.model_dump(exclude_none=True) | keys
 
 
 @pytest.fixture(scope="session")
 def matched():
     """Sums of 100 000 realisations where truth and filters agree, by radar."""
-    kept = {}
+    sums_by_radar = {}
     wide = {"hypotheses": 3000, "prune_below": 1e-7}
 
-    def of(radar):
-        if radar not in kept:
+    def sums_of_radar(radar):
+        if radar not in sums_by_radar:
             filters = [RANGE_ONLY, ORACLE, NEAREST, MEMORY | wide]
-            kept[radar] = summed(made(radar, filters, 10, variance=0.0), 100_000)
-        return kept[radar]
+            sums_by_radar[radar] = plan_and_sums(make_case(radar, filters, 10, variance=0.0), 100_000)
+        return sums_by_radar[radar]
 
-    return of
+    return sums_of_radar

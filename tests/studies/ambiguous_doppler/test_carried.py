@@ -33,7 +33,7 @@ MINE = {
 FOLDED = ("study=ambiguous_doppler",)
 
 
-def test_one_key_asks_what_the_same_config_written_by_hand_asks():
+def test_study_key_equals_a_config_written_by_hand():
     by_hand = {
         "study": "ambiguous_doppler",
         "radar": RADAR,
@@ -50,7 +50,7 @@ def test_one_key_asks_what_the_same_config_written_by_hand_asks():
         assert carried.tables[name].equals(written.tables[name])
 
 
-def test_beside_include_it_is_the_same_and_takes_the_study_s_own_keys(tmp_path, monkeypatch):
+def test_study_key_with_include_takes_further_keys(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.yaml").write_text(as_yaml(MINE))
     (tmp_path / "wide.yaml").write_text("study: ambiguous_doppler\ninclude: [mine]\nprior: {sigma_velocity_mps: 500}\n")
@@ -70,38 +70,38 @@ def test_beside_include_it_is_the_same_and_takes_the_study_s_own_keys(tmp_path, 
         ("target={kind: jerk_pulse}", "kind.*must be one of"),
     ],
 )
-def test_what_the_other_study_has_not_is_refused(changed, fault):
+def test_keys_without_counterpart_are_refused(changed, fault):
     with pytest.raises(ConfigError, match=fault):
         load(MINE, (*FOLDED, changed))
 
 
-def at_the_end(result):
+def lost_share_at_the_end(result):
     """The share of realisations in which the folded filter's velocity is off by over half the span at the last scan."""
     folds = result.tables["folds"]
     return folds[folds["filter"] == "r+Vr"]["beyond"].iloc[-1]
 
 
-def test_what_helps_is_what_was_tried():
+def test_remedies_are_those_tried():
     """Of the turn with one order nearly all are lost. Orders [1, 2] hold the fold; staggered rates do not here."""
     lost = radarsim.run(MINE, overrides=FOLDED)
-    assert at_the_end(lost) > 0.8
-    found = dict(cures(load(MINE, FOLDED).cases[0].spec, "r+Vr"))
-    assert found
-    assert all("repetition_rate_hz" not in settings for settings in found)
-    for settings, share in found.items():
-        overrides = (*FOLDED, *(one for one in settings.replace("--set ", "").split()))
+    assert lost_share_at_the_end(lost) > 0.8
+    shares = dict(cures(load(MINE, FOLDED).cases[0].spec, "r+Vr"))
+    assert shares
+    assert all("repetition_rate_hz" not in settings for settings in shares)
+    for settings, share in shares.items():
+        overrides = (*FOLDED, *(setting for setting in settings.replace("--set ", "").split()))
         cured = radarsim.run(MINE, overrides=overrides)
-        assert abs(at_the_end(cured) - share) < 2**0.5 * share_error(share, 400)  # two independent samples
+        assert abs(lost_share_at_the_end(cured) - share) < 2**0.5 * share_error(share, 400)  # two independent samples
 
 
-def test_what_helps_does_not_touch_what_the_config_sweeps():
+def test_remedies_do_not_change_swept_keys():
     """Where it would, the setting is refused beside the sweep."""
     key = "filters.1.manoeuvre_variance"
     swept = load({**MINE, "sweep": {key: [0.1, 0.2]}}, FOLDED)
-    one = swept.cases[0]
-    touching = {said for said, _ in cures(one.spec, "r+Vr") if key in said}
+    case = swept.cases[0]
+    touching = {said for said, _ in cures(case.spec, "r+Vr") if key in said}
     assert touching
     for settings in touching:
         with pytest.raises(ConfigError, match="sweep"):
             load({**MINE, "sweep": {key: [0.1, 0.2]}}, (*FOLDED, *settings.replace("--set ", "").split()))
-    assert not touching & {said for said, _ in cures(one.spec, "r+Vr", dict(one.swept))}
+    assert not touching & {said for said, _ in cures(case.spec, "r+Vr", dict(case.swept))}

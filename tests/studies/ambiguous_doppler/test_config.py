@@ -53,13 +53,13 @@ from radarsim.studies import registry
          "acceleration_pulse, turn, fly_by, recorded"),
     ],
 )  # fmt: skip
-def test_what_is_refused(key, value, words):
+def test_invalid_keys_are_refused(key, value, words):
     with pytest.raises(ConfigError) as error:
         load("ambiguous_rls4", [f"{key}={value}"])
     assert words in str(error.value).replace("']:", ":")  # a key given in Python: overrides['KEY']
 
 
-def test_orders_need_to_be_combined():
+def test_several_orders_need_a_combination():
     assert "filters.4.combine: is needed by several orders" in refused_without("combine")
     assert "filters.5.manoeuvres: is needed by combine: expected_error" in refused_without("manoeuvres")
 
@@ -68,8 +68,8 @@ def refused_without(key):
     case = load("orders").cases[0]
     document = {"study": "ambiguous_doppler", **case.resolved()}
     document = {name: value for name, value in document.items() if name not in ("case", "swept")}
-    for one in document["filters"]:
-        one.pop(key, None)
+    for f in document["filters"]:
+        f.pop(key, None)
     with pytest.raises(ConfigError) as error:
         load(document)
     return str(error.value)
@@ -80,7 +80,7 @@ def test_combinations_of_fixed_shares_need_every_plot():
         load("orders", ["radar.detection_probability=0.9"])
 
 
-def test_defaults_are_written_out():
+def test_defaults_are_filled_in():
     spec = load("ambiguous_rls4").cases[0].spec
     assert (spec.target.sigma_velocity_mps, spec.target.sigma_acceleration_mps2) == (300, 10)
     range_only, _, nearest, no_memory, best, memory = spec.filters
@@ -89,11 +89,11 @@ def test_defaults_are_written_out():
     assert (no_memory.merge, no_memory.hypotheses) == ("each_scan", None)
 
 
-def test_a_span_too_short_is_warned_of_and_runs():
-    one = registry.study("ambiguous_doppler")
-    assert one.warnings(load("ambiguous_rls4")) == []
-    (line,) = one.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=120"]))
+def test_short_span_warns_and_runs():
+    study = registry.study("ambiguous_doppler")
+    assert study.warnings(load("ambiguous_rls4")) == []
+    (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=120"]))
     assert line.startswith("ambiguous_rls4: radar.repetition_rate_hz: its span of 1.8 m/s is under 2 σ_V, 2 m/s")
-    (line,) = one.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=[120, 1000]"]))
+    (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=[120, 1000]"]))
     assert "1.8 m/s" in line
-    assert one.warnings(load("orders", ["radar.repetition_rate_hz=1"])) == []  # nothing there is folded
+    assert study.warnings(load("orders", ["radar.repetition_rate_hz=1"])) == []  # nothing there is folded

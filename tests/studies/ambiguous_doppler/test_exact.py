@@ -8,7 +8,16 @@ from scipy import stats
 
 from radarsim.studies.ambiguous_doppler import filters as exact
 from radarsim.studies.ambiguous_doppler import study
-from tests.studies.ambiguous_doppler.conftest import FIXED, MEMORY, NEAREST, ORACLE, RANDOM, RANGE_ONLY, made, summed
+from tests.studies.ambiguous_doppler.conftest import (
+    FIXED,
+    MEMORY,
+    NEAREST,
+    ORACLE,
+    RANDOM,
+    RANGE_ONLY,
+    make_case,
+    plan_and_sums,
+)
 from tests.tolerances import Z, assert_rounded, rounding, sigma_error
 
 N = 100_000
@@ -22,7 +31,7 @@ def sigma(sums):
 @pytest.mark.parametrize("target", [RANDOM, FIXED], ids=["random", "fixed"])
 @pytest.mark.parametrize("radar", ["RLS 2", "RLS 4", "RLS 5"])
 def test_range_only_and_oracle_are_exact(radar, target):
-    plan, sums = summed(made(radar, [RANGE_ONLY, ORACLE], 15, target), N)
+    plan, sums = plan_and_sums(make_case(radar, [RANGE_ONLY, ORACLE], 15, target), N)
     z = (sigma(sums) / plan.axes.exact_sigma - 1) * np.sqrt(2 * N)
     assert np.abs(z).max() < Z
     # Correlated over scans: the mean square of ten unit normals is beyond these once in 300 000 looks.
@@ -47,7 +56,7 @@ TARGETS = {
 def test_targets_that_break_the_model(kind):
     """σ of the oracle and its bias are exact: whatever moved the target is in the truth."""
     n = 20_000
-    plan, sums = summed(made("RLS 2", [RANGE_ONLY, ORACLE], 12, TARGETS[kind]), n)
+    plan, sums = plan_and_sums(make_case("RLS 2", [RANGE_ONLY, ORACLE], 12, TARGETS[kind]), n)
     exact_sigma, exact_bias = plan.axes.exact_sigma, plan.axes.exact_bias
     errs = exact_sigma > 0  # who flies straight in has no acceleration to miss at the first scan
     z = (sigma(sums) - exact_sigma)[errs] / exact_sigma[errs] * np.sqrt(2 * n)
@@ -60,31 +69,31 @@ def test_targets_that_break_the_model(kind):
 
 
 @pytest.mark.parametrize("order", [0, 1])
-def test_lower_orders_are_exact_of_what_they_estimate(order):
+def test_lower_orders_are_exact(order):
     filters = [RANGE_ONLY | {"orders": [order]}, ORACLE | {"orders": [order]}]
-    plan, sums = summed(made("RLS 2", filters, 15, FIXED, 25.0), N)
-    known = np.isfinite(plan.axes.exact_sigma)
-    assert np.array_equal(known, plan.axes.available)
-    assert known[:, 0].sum(axis=1).tolist() == ([1, 2] if order == 0 else [2, 2])
-    z = (sigma(sums) / plan.axes.exact_sigma - 1)[known] * np.sqrt(2 * N)
+    plan, sums = plan_and_sums(make_case("RLS 2", filters, 15, FIXED, 25.0), N)
+    is_known = np.isfinite(plan.axes.exact_sigma)
+    assert np.array_equal(is_known, plan.axes.available)
+    assert is_known[:, 0].sum(axis=1).tolist() == ([1, 2] if order == 0 else [2, 2])
+    z = (sigma(sums) / plan.axes.exact_sigma - 1)[is_known] * np.sqrt(2 * N)
     # e² of a biased error varies less than 2σ⁴: the deviations are smaller than unit normals, never larger.
     assert np.abs(z).max() < Z
 
 
-def binomial(found, n, p):
+def binomial(count, n, p):
     """Whether counts `found` of n lie within the interval that is missed as seldom as Z standard errors."""
     chance = stats.norm.sf(Z)
-    return (stats.binom.ppf(chance, n, p) <= found) & (found <= stats.binom.isf(chance, n, p))
+    return (stats.binom.ppf(chance, n, p) <= count) & (count <= stats.binom.isf(chance, n, p))
 
 
 @pytest.mark.parametrize(("radar", "scans"), [("RLS 2", 15), ("RLS 3", 29), ("RLS 4", 15), ("RLS 5", 29)])
-def test_nearest_fold_is_right_as_often_as_the_product_says(radar, scans):
+def test_rate_of_right_nearest_folds_is_the_product(radar, scans):
     """Over all scans of the published runs; the product falls from one half to one in 10⁶ and less."""
-    plan, sums = summed(made(radar, [NEAREST], scans, variance=0.0), N)
-    p, found = plan.axes.exact_right[0], sums.folds[0, :, 0]
+    plan, sums = plan_and_sums(make_case(radar, [NEAREST], scans, variance=0.0), N)
+    p, right_counts = plan.axes.exact_right[0], sums.folds[0, :, 0]
     assert np.isfinite(p).all()
     assert (p[1:] <= p[:-1]).all()
-    assert binomial(found, N, p).all()
+    assert binomial(right_counts, N, p).all()
 
 
 REMAINDER = {"name": "remainder", "doppler": "remainder"}
@@ -94,20 +103,20 @@ STEADY = {"kind": "polynomial", "coefficients": [100e3, -40.0, 0.05]}
 
 @pytest.mark.parametrize("target", [RANDOM, SLOW, STEADY], ids=["drawn", "slow", "fixed"])
 @pytest.mark.parametrize("rates", [[1000.0, 1200.0], [1000.0, 1200.0, 1400.0]], ids=["two rates", "three"])
-def test_remainders_of_two_scans_are_right_as_often_as_calculated(rates, target):
-    plan, sums = summed(made("RLS 4", [REMAINDER], 15, target, repetition_rate_hz=rates), N)
-    p, found = plan.axes.exact_right[0], sums.folds[0, :, 0]
+def test_rate_of_right_remainders_is_exact(rates, target):
+    plan, sums = plan_and_sums(make_case("RLS 4", [REMAINDER], 15, target, repetition_rate_hz=rates), N)
+    p, right_counts = plan.axes.exact_right[0], sums.folds[0, :, 0]
     assert p[0] == 0
     assert (p[1:] > 0.001).all()
-    assert binomial(found, N, p).all()
+    assert binomial(right_counts, N, p).all()
     sure = plan.axes.oracle_sigma[0]
     assert (sigma(sums)[0, 1:, 1] > sure[1:, 1]).all()  # wrong ones cost
 
 
-def test_a_remainder_is_right_by_hand():
+def test_remainder_probability_by_hand():
     """Two spans of 15 and 18 m/s and a still target: right where the difference of two noises of 1 m/s is under 1.5."""
     rate = {"repetition_rate_hz": [1000.0, 1200.0], "wavelength_m": 0.03}
-    plan = study.prepare(made("RLS 4", [REMAINDER], 4, {"kind": "polynomial", "coefficients": [1e5]}, **rate))
+    plan = study.prepare(make_case("RLS 4", [REMAINDER], 4, {"kind": "polynomial", "coefficients": [1e5]}, **rate))
     wrong_by_a_span = [
         stats.norm.cdf(15 * i + 1.5, scale=2**0.5) - stats.norm.cdf(15 * i - 1.5, scale=2**0.5) for i in (1, 2)
     ]
@@ -131,7 +140,7 @@ def test_probabilities_of_the_best_hypothesis_are_calibrated(radar, matched):
 
 
 @pytest.mark.parametrize("radar", ["RLS 2", "RLS 4"])
-def test_memory_lies_between_its_brackets(radar, matched):
+def test_memory_lies_between_nearest_fold_and_oracle(radar, matched):
     """The optimum is no worse than the filter of range alone, nor better than the one that knows the folds."""
     _, sums = matched(radar)
     range_only, oracle, _, memory = sigma(sums)
@@ -140,22 +149,22 @@ def test_memory_lies_between_its_brackets(radar, matched):
     assert (memory > oracle * (1 - np.hypot(error[1], error[3]))).all()
 
 
-def test_no_exact_probability_where_truth_and_filter_differ():
-    def known(**changes):
-        plan = study.prepare(made("RLS 4", [NEAREST, MEMORY], 4, **({"variance": 0.0} | changes)))
+def test_no_exact_probability_if_truth_and_filter_differ():
+    def is_known(**changes):
+        plan = study.prepare(make_case("RLS 4", [NEAREST, MEMORY], 4, **({"variance": 0.0} | changes)))
         return np.isfinite(plan.axes.exact_right).any(axis=1).tolist()
 
-    assert known() == [True, False]
-    assert known(variance=1e-3) == [False, False]
-    assert known(target=FIXED) == [False, False]
-    assert known(target=RANDOM | {"sigma_velocity_mps": 100.0}) == [False, False]
-    assert known(detection_probability=0.9) == [False, False]
+    assert is_known() == [True, False]
+    assert is_known(variance=1e-3) == [False, False]
+    assert is_known(target=FIXED) == [False, False]
+    assert is_known(target=RANDOM | {"sigma_velocity_mps": 100.0}) == [False, False]
+    assert is_known(detection_probability=0.9) == [False, False]
 
 
 def test_product_of_teunissen():
     """Two scans of a span of two standard deviations: erf(1/√2)² = 0.4660649…"""
-    of = exact.Gains(
+    gains = exact.Gains(
         np.eye(3), np.zeros((2, 3)), np.zeros((2, 3)), np.array([4.0, 9.0]), np.ones(2), np.zeros((2, 3, 3))
     )
     expected = [0.6826894921370859, 0.6826894921370859**2]
-    assert_rounded(exact.all_right(of, np.array([4.0, 6.0])), expected, operations=5)
+    assert_rounded(exact.nearest_fold_probability(gains, np.array([4.0, 6.0])), expected, operations=5)

@@ -22,15 +22,15 @@ def shares(weights, main, rule):
     weights = np.asarray(weights, dtype=float)
     if not weights.any():
         return np.eye(len(weights))[main]
-    best, kept = np.argmax(weights), np.ones(len(weights), dtype=bool)
-    alone = all(weights[main] > w for j, w in enumerate(weights) if j != main)
+    best, is_kept = np.argmax(weights), np.ones(len(weights), dtype=bool)
+    outweighs_others = all(weights[main] > w for j, w in enumerate(weights) if j != main)
     if rule == "best":
-        kept = np.arange(len(weights)) == best
-    elif rule in ("combined", "modified_combined") and alone:
-        kept = np.arange(len(weights)) == main
+        is_kept = np.arange(len(weights)) == best
+    elif rule in ("combined", "modified_combined") and outweighs_others:
+        is_kept = np.arange(len(weights)) == main
     elif rule == "modified_combined":
-        kept = np.isin(np.arange(len(weights)), (main, best))
-    return weights * kept / (weights * kept).sum()
+        is_kept = np.isin(np.arange(len(weights)), (main, best))
+    return weights * is_kept / (weights * is_kept).sum()
 
 
 def merge(s, x, P):
@@ -69,23 +69,23 @@ def imm(x, P, p, models, T, z, R, rule):
 
 def imm_by_extrapolations(x, P, p, models, T, z, R, rule):
     """The paper's MMA2: N² extrapolations, merged after it, then N updates."""
-    weights, found = T * p, []
+    weights, updates = T * p, []
     for i, (F, Q) in enumerate(models):
         xs, Ps = x @ F.T, F @ P @ F.T + Q
         mean, cov = merge(shares(weights[i], i, rule), xs, Ps)
-        found.append(advance(mean, cov, np.eye(9), np.zeros((9, 9)), z, R))
-    x, P, q, det = zip(*found, strict=True)
+        updates.append(advance(mean, cov, np.eye(9), np.zeros((9, 9)), z, R))
+    x, P, q, det = zip(*updates, strict=True)
     return np.array(x), np.array(P), posterior(weights.sum(1), np.array(q), np.array(det))
 
 
 def gpb2(x, P, p, models, T, z, R, rule):
     """One step of GPB2: all pairs, then merges by target model."""
     size, weights = len(p), T * p
-    found = [[advance(x[j], P[j], *models[i], z, R) for j in range(size)] for i in range(size)]
-    q, det = np.array([[f[2] for f in row] for row in found]), np.array([[f[3] for f in row] for row in found])
+    updates = [[advance(x[j], P[j], *models[i], z, R) for j in range(size)] for i in range(size)]
+    q, det = np.array([[f[2] for f in row] for row in updates]), np.array([[f[3] for f in row] for row in updates])
     weights = posterior(weights.ravel(), q.ravel(), det.ravel()).reshape(size, size)
     merged = [
-        merge(shares(weights[i], i, rule), np.array([f[0] for f in found[i]]), np.array([f[1] for f in found[i]]))
+        merge(shares(weights[i], i, rule), np.array([f[0] for f in updates[i]]), np.array([f[1] for f in updates[i]]))
         for i in range(size)
     ]
     return np.array([m[0] for m in merged]), np.array([m[1] for m in merged]), weights.sum(1)
@@ -105,7 +105,7 @@ def track(family, rule, output, kinds, transition, x, P, p, plots, covariances, 
     the first.
     """
     size = len(kinds)
-    x, P, wait, found = np.tile(x, (size, 1)), np.tile(P, (size, 1, 1)), 0.0, []
+    x, P, wait, outputs = np.tile(x, (size, 1)), np.tile(P, (size, 1, 1)), 0.0, []
     for z, R, dt in zip(plots, covariances, times, strict=True):
         wait += dt
         z = None if np.isnan(z).any() else z
@@ -114,11 +114,11 @@ def track(family, rule, output, kinds, transition, x, P, p, plots, covariances, 
             nx, nP, np_ = gpb1(x[0], P[0], p, models, T, z, R)
         else:
             nx, nP, np_ = (gpb2 if family == "gpb2" else imm)(x, P, p, models, T, z, R, rule)
-        found.append((*merge(shares(np_, 0, output), nx, nP), np_))
+        outputs.append((*merge(shares(np_, 0, output), nx, nP), np_))
         if z is None:
             continue
         if family == "gpb1":
             mean, cov = merge(shares(np_, int(np.argmax(p)), rule), nx, nP)
             nx, nP = np.tile(mean, (size, 1)), np.tile(cov, (size, 1, 1))
         x, P, p, wait = nx, nP, np_, 0.0
-    return tuple(np.array(part) for part in zip(*found, strict=True))
+    return tuple(np.array(part) for part in zip(*outputs, strict=True))

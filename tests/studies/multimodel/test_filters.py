@@ -14,14 +14,14 @@ TWO = np.array([[0.995, 0.01], [0.005, 0.99]])
 
 def test_stationary_probabilities():
     """To rounding of what is left of 1 − T where models last long: a thousandth."""
-    for T, wanted in (
+    for T, expected in (
         (PRINTED, [0.25, 0.25, 0.5]),
         (TWO, [2 / 3, 1 / 3]),
         (np.eye(4), np.full(4, 0.25)),
         (np.array([[0.0, 1], [1, 0]]), np.full(2, 0.5)),
         (np.ones((1, 1)), np.ones(1)),
     ):
-        assert_rounded(world.stationary(T), wanted, condition=1e3, operations=4)
+        assert_rounded(world.stationary(T), expected, condition=1e3, operations=4)
 
 
 @pytest.mark.parametrize("T", [PRINTED, TWO])
@@ -83,7 +83,7 @@ class ExactZero:
     __mul__ = __rmul__ = _product
 
 
-class Counted:
+class CountingNumber:
     """A number that counts the operations made with it."""
 
     count = 0
@@ -91,7 +91,7 @@ class Counted:
     def _operate(self, other):
         if isinstance(other, ExactZero):
             return NotImplemented
-        Counted.count += 1
+        CountingNumber.count += 1
         return self
 
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _operate
@@ -99,33 +99,33 @@ class Counted:
 
 @pytest.mark.parametrize("accelerates", [True, False])
 def test_operations_are_those_of_the_formulas(accelerates):
-    x = Counted()
+    x = CountingNumber()
     zero = x if accelerates else ExactZero()
     F, Q = (x, zero, x, zero, zero), (x, x, zero, x, zero, zero)
-    Counted.count = 0
+    CountingNumber.count = 0
     for _ in range(3):
         mean = algebra.predicted((x,) * 3, F)
-        own = algebra.predicted_covariance((x,) * 6, F, Q)
+        covariance = algebra.predicted_covariance((x,) * 6, F, Q)
         cross = algebra.predicted_cross((x,) * 9, F)
-    assert Counted.count == cost.PREDICT[accelerates]
-    Counted.count = 6 + 3  # S = H P H' + R; the innovation
+    assert CountingNumber.count == cost.PREDICT[accelerates]
+    CountingNumber.count = 6 + 3  # S = H P H' + R; the innovation
     algebra.factored((x,) * 6)
     v = algebra.whitened((x,) * 3, (x,) * 3)
     algebra.dot(algebra.scaled(v, (x,) * 3), v)
     for _ in range(3):
         # Rows of P H': the first columns of the axis's own block and of the blocks with the other two.
-        rows = [algebra.whitened((own[i], cross[3 * i], cross[3 * i]), (x,) * 3) for i in range(3)]
+        rows = [algebra.whitened((covariance[i], cross[3 * i], cross[3 * i]), (x,) * 3) for i in range(3)]
         scaled = [algebra.scaled(row, (x,) * 3) for row in rows]
-        _ = [at + algebra.dot(row, v) for at, row in zip(mean, scaled, strict=True)]
-        algebra.shrunk_own(own, scaled, rows)
+        _ = [mean_element + algebra.dot(row, v) for mean_element, row in zip(mean, scaled, strict=True)]
+        algebra.shrunk_own(covariance, scaled, rows)
         algebra.shrunk_cross(cross, scaled, rows)
-    assert Counted.count == cost.UPDATE[accelerates]
+    assert CountingNumber.count == cost.UPDATE[accelerates]
 
 
 def test_operations_of_families():
     for accelerates in (True, False):
-        one = cost.operations("kalman", np.ones((1, 1)), [accelerates])[0]
-        assert one == cost.PREDICT[accelerates] + cost.UPDATE[accelerates]
+        count = cost.operations("kalman", np.ones((1, 1)), [accelerates])[0]
+        assert count == cost.PREDICT[accelerates] + cost.UPDATE[accelerates]
     imm, gpb2 = (cost.operations(family, PRINTED, [False, True, True])[0] for family in ("imm", "gpb2"))
     cheap, dear = (cost.PREDICT[accelerates] + cost.UPDATE[accelerates] for accelerates in (False, True))
     assert imm == cheap + 2 * dear + 3 * cost.LIKELIHOOD + 15

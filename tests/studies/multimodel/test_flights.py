@@ -12,17 +12,19 @@ T = np.arange(0, 186.2, 0.5)
 UNFLYABLE = {"dive 60"}
 
 
-def flown(of):
+def fly_flight(flight):
     phases = [
         world.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
-        for p in of.phases
+        for p in flight.phases
     ]
-    return world.fly(of.position_m, of.velocity_mps, of.ballistic_coefficient_kgpm2, of.lag_s, phases, T)
+    return world.fly(
+        flight.position_m, flight.velocity_mps, flight.ballistic_coefficient_kgpm2, flight.lag_s, phases, T
+    )
 
 
 @pytest.mark.parametrize("name", sorted(set(FLIGHTS) - UNFLYABLE))
-def test_a_flight_is_within_the_printed_axes(name):
-    track = flown(FLIGHTS[name])
+def test_flights_are_within_the_printed_axes(name):
+    track = fly_flight(FLIGHTS[name])
     north, up, east = track[:, 0], track[:, 3], track[:, 6]
     assert north.min() >= 0
     assert north.max() <= 200e3
@@ -40,24 +42,22 @@ def test_a_flight_is_within_the_printed_axes(name):
 
 
 @pytest.mark.parametrize("name", sorted(UNFLYABLE))
-def test_one_that_cannot_be_flown_says_why(name):
-    with pytest.raises(world.Unflyable, match="hits the ground"):
-        flown(FLIGHTS[name])
+def test_impossible_flights_say_why(name):
+    with pytest.raises(world.ImpossibleFlight, match="hits the ground"):
+        fly_flight(FLIGHTS[name])
 
 
-def test_when_the_manoeuvre_begins_is_varied():
+def test_starts_of_manoeuvres_vary():
     """A model that takes no part in the ballistic stage would take none either where that is half as long."""
-    begins = {of.phases[1].start_s for of in FLIGHTS.values()}
+    begins = {flight.phases[1].start_s for flight in FLIGHTS.values()}
     assert {60, 125} <= begins
 
 
 def test_there_are_enough_of_both_kinds():
-    of = Interpretations.choices[0]
-    assert of.key == "flight"
-    begins = {
-        name: f"within the printed axes, ballistic to {one.phases[1].start_s:g} s" for name, one in FLIGHTS.items()
-    }
-    assert {one.name: one.reason for one in of.alternatives[1:]} == begins
+    choice = Interpretations.choices[0]
+    assert choice.key == "flight"
+    begins = {name: f"within the printed axes, ballistic to {o.phases[1].start_s:g} s" for name, o in FLIGHTS.items()}
+    assert {o.name: o.reason for o in choice.alternatives[1:]} == begins
     assert len(begins) >= 8
     assert sum("vertical" in name or "pull-up" in name for name in FLIGHTS) >= 4
     assert sum("lateral" in name or "turn" in name for name in FLIGHTS) >= 4

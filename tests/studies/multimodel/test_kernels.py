@@ -6,7 +6,7 @@ import pytest
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.multimodel.kernels import hypothesis, records
 from radarsim.studies.multimodel.kernels import strip as strips
-from radarsim.studies.multimodel.kernels.strip import frame
+from radarsim.studies.multimodel.kernels.strip import pack_frame
 from tests.studies.multimodel import naive
 from tests.tolerances import assert_rounded, rounding, scaled_condition
 
@@ -19,7 +19,7 @@ RULES = {
 }
 UPPER = np.triu_indices(3)
 DT = 0.05
-FRAME = frame(np.eye(3), 0.0, (1.0, 1.0, 1.0), 1, False, 1.0)
+FRAME = pack_frame(np.eye(3), 0.0, (1.0, 1.0, 1.0), 1, False, 1.0)
 
 OPERATIONS = 200  # of an update of nine states by three numbers: terms of the products that an element is summed of
 EXPONENT = 50  # a weight is the exponential of so much at most, which multiplies a relative error
@@ -58,9 +58,9 @@ def run_kernel(family, rule, output, kinds, T, p, plots, covariances, x, P, pred
     """Estimates (K, 9, WIDTH), variances (K, 9, WIDTH), probabilities (K, M, WIDTH), and the work rows left behind."""
     scans, size = len(plots), len(kinds)
     work, numbers = hypothesis.work_arrays()
-    at = work.reshape(-1, WIDTH)
+    lane_values = work.reshape(-1, WIDTH)
     for i in range(size):
-        h = at[i * records.HYPOTHESIS :]
+        h = lane_values[i * records.HYPOTHESIS :]
         h[:9] = x[:, None]
         for axis in range(3):
             block = P[3 * axis : 3 * axis + 3, 3 * axis : 3 * axis + 3]
@@ -83,7 +83,7 @@ def run_kernel(family, rule, output, kinds, T, p, plots, covariances, x, P, pred
     )
     cells = out.reshape(scans, records.OUTPUT, WIDTH)
     variances = cells[:, records.VARIANCE : records.VARIANCE + 9]
-    return cells[:, :9], variances, cells[:, records.MODELS : records.MODELS + size], at
+    return cells[:, :9], variances, cells[:, records.MODELS : records.MODELS + size], lane_values
 
 
 def compare(family, rule, output, size, scans, missing=0.0, lanes=(0,), seed=3):
@@ -148,14 +148,14 @@ def hypothesis_of(cells, lane=0):
 def test_imm_equals_the_papers_form_of_n_squared_extrapolations(rule):
     kinds, T, p = bank(3, 11)
     plots, covariances, x, P = workload(60)
-    own = other = (np.tile(x, (3, 1)), np.tile(P, (3, 1, 1)), p)
+    merged_first = extrapolated_first = (np.tile(x, (3, 1)), np.tile(P, (3, 1, 1)), p)
     models = [naive.motion(*kind, DT) for kind in kinds]
     for z, R in zip(plots[:, :, 0], covariances, strict=True):
-        own = naive.imm(*own, models, T, z, R, rule)
-        other = naive.imm_by_extrapolations(*other, models, T, z, R, rule)
-    allowed = rounding(scaled_condition(own[1]).max(), OPERATIONS)
-    for one, two in zip(own, other, strict=True):
-        assert np.abs(one - two).max() <= allowed * max(np.abs(two).max(), EXPONENT)
+        merged_first = naive.imm(*merged_first, models, T, z, R, rule)
+        extrapolated_first = naive.imm_by_extrapolations(*extrapolated_first, models, T, z, R, rule)
+    allowed = rounding(scaled_condition(merged_first[1]).max(), OPERATIONS)
+    for left, right in zip(merged_first, extrapolated_first, strict=True):
+        assert np.abs(left - right).max() <= allowed * max(np.abs(right).max(), EXPONENT)
 
 
 @pytest.mark.slow_cases_except("imm-combined")
@@ -179,10 +179,10 @@ def test_rules_break_ties_by_the_lower_number():
     kinds, T, p = [("uniform", 5.0)] * 3, np.eye(3), np.array([0.4, 0.4, 0.2])
     plots, covariances, x, P = workload(1)
     for rule in RULES:
-        own = naive.track("imm", rule, "best", kinds, lambda t: T, x, P, p, plots[:, :, 0], covariances, [DT])
+        expected = naive.track("imm", rule, "best", kinds, lambda t: T, x, P, p, plots[:, :, 0], covariances, [DT])
         got = run_kernel("imm", rule, "best", kinds, T, p, plots, covariances, x, P)
-        allowed = rounding(scaled_condition(own[1][0]), OPERATIONS)
-        assert np.abs(got[0][0, :, 0] - own[0][0]).max() <= allowed * np.abs(own[0][0]).max()
+        allowed = rounding(scaled_condition(expected[1][0]), OPERATIONS)
+        assert np.abs(got[0][0, :, 0] - expected[0][0]).max() <= allowed * np.abs(expected[0][0]).max()
 
 
 def test_a_model_that_cannot_be_reached_does_no_harm():

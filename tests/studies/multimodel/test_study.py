@@ -44,13 +44,13 @@ FILTERS = [
 ]
 
 
-def work(**changes):
+def configured_case(**changes):
     """A small experiment: 100 scans of the weaving flight."""
     config = {"study": "multimodel", "sensor": SENSOR, "target": "weaving", "filters": FILTERS, "scans": 100}
     return CaseWork(load({**config, "realisations": 20, **changes}).cases[0])
 
 
-def full(packed):
+def unpack_covariance(packed):
     """Packed covariances (K, 6) as (K, 3, 3)."""
     matrix = np.empty((len(packed), 3, 3))
     upper = np.triu_indices(3)
@@ -59,14 +59,14 @@ def full(packed):
 
 
 def test_plots_have_the_stated_errors_and_covariances():
-    plan = work(scans=60).plan
+    plan = configured_case(scans=60).plan
     z, R, detected = (
-        np.concatenate([multimodel.measured(plan, 8 * g)[i] for g in range(60)], axis=-1) for i in range(3)
+        np.concatenate([multimodel.simulate_plots(plan, 8 * g)[i] for g in range(60)], axis=-1) for i in range(3)
     )
     assert detected.all()
     truth = plan.world.truth[:, 0::3]
     error = np.moveaxis(z - truth[:, :, None], 2, 0)
-    mean = np.array([full(R[:, :, i]) for i in range(R.shape[2])])
+    mean = np.array([unpack_covariance(R[:, :, i]) for i in range(R.shape[2])])
     nis = np.einsum("nka,nkab,nkb->nk", error, np.linalg.inv(mean), error)
     assert abs(nis.mean() - 3) < mean_error(nis.size, np.sqrt(6))
     antenna = physics.to_antenna(truth, physics.rotation(0, np.radians(30)), 12)
@@ -79,17 +79,17 @@ def test_plots_have_the_stated_errors_and_covariances():
 @pytest.mark.parametrize("sensor", [{}, {"detection_probability": 0.7, "jitter_s": 0.1}])
 @pytest.mark.parametrize("conversion", ["plain", "unbiased"])
 def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
-    case = work(sensor={**SENSOR, **sensor, "conversion": conversion})
+    case = configured_case(sensor={**SENSOR, **sensor, "conversion": conversion})
     plan, first = case.plan, 5
     sums = plan.layout.unpack(case.simulate(first, 1))
-    z, R, detected = (part[..., 0] for part in multimodel.measured(plan, first))
+    z, R, detected = (part[..., 0] for part in multimodel.simulate_plots(plan, first))
     t = plan.axes.t_s
     times = plan.world.times[plan.world.intervals]
     z = np.where(detected[:, None] > 0, z, np.nan)
     a, b, g = plan.world.weights.reshape(3, 3)
     x, P = np.zeros(9), np.zeros((9, 9))
     x[0::3], x[1::3] = a @ z[:3], b @ z[:3]
-    covariance = full(R)
+    covariance = unpack_covariance(R)
     for u, v in ((0, 0), (0, 1), (1, 0), (1, 1)):
         P[u::3, v::3] = np.tensordot((a, b)[u] * (a, b)[v], covariance[:3], 1)
     P += np.kron(np.eye(3), np.outer(g, g))
@@ -102,16 +102,16 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
 
         p = multimodel.filters.stationary(T)
         merge, output = options.merge, options.output
-        found = naive.track(options.family, merge, output, kinds, powers, x, P, p, z[3:], covariance[3:], times[3:])
-        error = found[0] - plan.world.truth[3:]
+        expected = naive.track(options.family, merge, output, kinds, powers, x, P, p, z[3:], covariance[3:], times[3:])
+        error = expected[0] - plan.world.truth[3:]
         scale = np.abs(error).max(axis=0)
         tolerance = (
             PRECISION if not sensor else 2e-3
         )  # missed and jittered: P(a) P(b) and P(a + b) differ by the generator
         assert np.max(np.abs(sums["error"][f, :, :, 0] - error) / scale) < tolerance
         assert np.allclose(sums["error"][f, :, :, 1], error**2, rtol=1e-2, atol=2 * tolerance * (scale**2).max())
-        assert np.allclose(sums["probability"][f, :, : len(p), 0], found[2], rtol=0, atol=10 * tolerance)
-        position = found[1][:, 0::3, 0::3]
+        assert np.allclose(sums["probability"][f, :, : len(p), 0], expected[2], rtol=0, atol=10 * tolerance)
+        position = expected[1][:, 0::3, 0::3]
         nees = np.einsum("ka,kab,kb->k", error[:, 0::3], np.linalg.inv(position), error[:, 0::3])
         assert np.allclose(sums["believed"][f, :, 0], nees, rtol=10 * PRECISION if not sensor else 0.05)
         assert len(t) == len(error)
@@ -119,12 +119,12 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
 
 def test_covariance_at_the_prediction_is_computed_there():
     filters = [{**FILTERS[2], "covariance_at": "prediction"}]
-    case = work(filters=filters)
+    case = configured_case(filters=filters)
     plan = case.plan
     sums = plan.layout.unpack(case.simulate(0, 1))
-    z, R, _ = (part[..., 0] for part in multimodel.measured(plan, 0))
+    z, R, _ = (part[..., 0] for part in multimodel.simulate_plots(plan, 0))
     a, b, g = plan.world.weights.reshape(3, 3)
-    x, P, covariance = np.zeros(9), np.zeros((9, 9)), full(R)
+    x, P, covariance = np.zeros(9), np.zeros((9, 9)), unpack_covariance(R)
     x[0::3], x[1::3] = a @ z[:3], b @ z[:3]
     for u, v in ((0, 0), (0, 1), (1, 0), (1, 1)):
         P[u::3, v::3] = np.tensordot((a, b)[u] * (a, b)[v], covariance[:3], 1)
@@ -132,13 +132,13 @@ def test_covariance_at_the_prediction_is_computed_there():
     F, Q = naive.motion("accelerated", 20.0, 0.5)
     turn, sigma = physics.rotation(0, np.radians(30)), np.array([2.5, np.radians(0.1), np.radians(0.1)])
     for k in range(3, len(z)):
-        at = to_biconical(physics.to_antenna((F @ x)[0::3], turn, 12))
-        x, P, *_ = naive.advance(x, P, F, Q, z[k], physics.plot_covariance(at, sigma, turn))
+        measured = to_biconical(physics.to_antenna((F @ x)[0::3], turn, 12))
+        x, P, *_ = naive.advance(x, P, F, Q, z[k], physics.plot_covariance(measured, sigma, turn))
         assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=PRECISION, atol=PRECISION * 100)
 
 
 def test_stage_sums_are_those_of_the_scans():
-    case = work(target={**inline_flight(), "stages": [{"name": "a", "end_s": 20}, {"name": "b"}]})
+    case = configured_case(target={**inline_flight(), "stages": [{"name": "a", "end_s": 20}, {"name": "b"}]})
     plan = case.plan
     sums = plan.layout.unpack(case.simulate(0, 1))
     square, summed = sums["error"][:, :, :, 0] ** 2, rounding(operations=len(plan.world.stage))
@@ -152,7 +152,7 @@ def test_stage_sums_are_those_of_the_scans():
 
 
 def test_report_every_keeps_some_scans_and_the_same_stages():
-    case, sparse = work(), work(report_every=7)
+    case, sparse = configured_case(), configured_case(report_every=7)
     every = case.plan.layout.unpack(case.simulate(0, 8))
     some = sparse.plan.layout.unpack(sparse.simulate(0, 8))
     k = sparse.plan.axes.k
@@ -175,8 +175,8 @@ def inline_flight(**changes):
 def test_plots_beyond_the_edge_are_missed_and_nothing_is_not_a_number():
     edge = inline_flight(position_m=[2e3, 8e3, -60e3], velocity_mps=[0, 0, 50])
     sensor = {**SENSOR, "antenna_elevation_deg": 0, "sigma_elevation_deg": 1, "sigma_azimuth_deg": 1}
-    case = work(target=edge, sensor=sensor)
-    detected = np.concatenate([multimodel.measured(case.plan, 8 * g)[2] for g in range(8)], axis=1)
+    case = configured_case(target=edge, sensor=sensor)
+    detected = np.concatenate([multimodel.simulate_plots(case.plan, 8 * g)[2] for g in range(8)], axis=1)
     assert 0.2 < 1 - detected[3:].mean() < 0.8
     assert np.isfinite(case.simulate(0, 64)).all()
 
@@ -193,13 +193,13 @@ def test_plots_beyond_the_edge_are_missed_and_nothing_is_not_a_number():
 )
 def test_impossible_flights_are_refused(target, words):
     with pytest.raises(ConfigError, match=words):
-        _ = work(target=target).plan
+        _ = configured_case(target=target).plan
 
 
 def test_plots_of_the_local_frame():
     sensor = {"sigma_x_m": 5, "sigma_y_m": 10, "sigma_z_m": 20, "scan_period_s": 0.5}
-    case = work(sensor=sensor)
-    z, R, _ = multimodel.measured(case.plan, 0)
+    case = configured_case(sensor=sensor)
+    z, R, _ = multimodel.simulate_plots(case.plan, 0)
     np.testing.assert_array_equal(R[7, :, 2], [25, 0, 0, 100, 0, 400])
     error = (z - case.plan.world.truth[:, 0::3, None]) / np.array([5, 10, 20])[:, None]
     assert abs(error.std() - 1) < 0.05
@@ -231,25 +231,25 @@ def test_recorded_flights_are_read_and_their_faults_reported(tmp_path):
 
 def test_cases_of_one_identity_have_their_own_names():
     """A case that differs in display names alone takes over the other's sums, under its own names."""
-    one, other = work(), work(filters=[{**of, "name": f"my {of['name']}"} for of in FILTERS])
-    assert one.identity == other.identity
-    plan = one.plan
-    axes = STUDY.relabelled(plan.axes, other.case)
+    shipped, renamed = configured_case(), configured_case(filters=[{**f, "name": f"my {f['name']}"} for f in FILTERS])
+    assert shipped.identity == renamed.identity
+    plan = shipped.plan
+    axes = STUDY.relabelled(plan.axes, renamed.case)
     assert axes.filters == ("my imm", "my gpb2", "my kalman")
     assert isinstance(axes, multimodel.FlightAxes)
     assert np.array_equal(axes.truth, plan.axes.truth)
-    sums = plan.layout.unpack(one.simulate(0, 16))
-    result = CaseResult("other", "multimodel", other.case.spec, (), 16, sums, axes)
+    sums = plan.layout.unpack(shipped.simulate(0, 16))
+    result = CaseResult("other", "multimodel", renamed.case.spec, (), 16, sums, axes)
     for name, table in tables.tables([result]).items():
         assert set(table["filter"]) <= set(axes.filters), name
     # Names of stages make tables of their own: a case that calls them differently is another one.
     flight = {**inline_flight(), "stages": [{"name": "a", "end_s": 20}, {"name": "b"}]}
-    renamed = {**flight, "stages": [{"name": "a", "end_s": 20}, {"name": "c"}]}
-    assert work(target=flight).identity != work(target=renamed).identity
+    other_flight = {**flight, "stages": [{"name": "a", "end_s": 20}, {"name": "c"}]}
+    assert configured_case(target=flight).identity != configured_case(target=other_flight).identity
 
 
 def test_axes_describe_the_reported_scans():
-    case = work(report_every=7)
+    case = configured_case(report_every=7)
     axes, spec = case.plan.axes, case.case.spec
     assert axes.truth.shape == (len(axes.k), 9)
     assert np.array_equal(axes.truth, case.plan.world.truth[axes.k - 1])
@@ -258,9 +258,9 @@ def test_axes_describe_the_reported_scans():
 
 
 def test_track_over_recorded_plots_equals_the_experiment():
-    case = work()
+    case = configured_case()
     plan, sensor = case.plan, case.case.spec.sensor
-    z, *_ = multimodel.measured(plan, 0)
+    z, *_ = multimodel.simulate_plots(plan, 0)
     R = physics.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
     biconical = to_biconical(physics.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
     t = np.concatenate([plan.axes.t_s[:1] - 1.5, plan.axes.t_s[:1] - 1.0, plan.axes.t_s[:1] - 0.5, plan.axes.t_s])
@@ -274,7 +274,7 @@ def test_track_over_recorded_plots_equals_the_experiment():
 
 
 def test_track_waits_over_gaps_and_plots_beyond_the_edge():
-    case = work()
+    case = configured_case()
     columns = multimodel_plots.columns(case.case.spec)[0]
     t = np.cumsum(np.random.default_rng(3).uniform(0.02, 3, 9000))
     plots = np.stack([np.full(9000, 5e4), np.full(9000, 0.1), np.full(9000, -0.1)])
@@ -288,7 +288,7 @@ def test_track_waits_over_gaps_and_plots_beyond_the_edge():
 
 
 def test_a_track_of_two_plots_has_no_estimate():
-    case = work()
+    case = configured_case()
     columns = multimodel_plots.columns(case.case.spec)[0]
     track = multimodel_plots.track(case.case, dict(zip(columns, [np.arange(2.0), *np.full((3, 2), 0.1)], strict=True)))
     assert np.isnan(track.estimate).all()
@@ -297,7 +297,7 @@ def test_a_track_of_two_plots_has_no_estimate():
 def test_coarse_angles_err_but_stay_finite():
     sensor = {**SENSOR, "scan_period_s": 0.05, "sigma_elevation_deg": 3, "sigma_azimuth_deg": 3, "antenna_height_m": 0}
     filters = [FILTERS[0], FILTERS[1], {**FILTERS[0], "name": "there", "covariance_at": "prediction"}]
-    case = work(sensor=sensor, filters=filters, target="ballistic", scans=1500)
+    case = configured_case(sensor=sensor, filters=filters, target="ballistic", scans=1500)
     assert np.isfinite(case.simulate(0, 16)).all()
 
 
@@ -306,11 +306,11 @@ def test_the_shipped_plots_are_tracked_with_errors_that_fit_sigma():
     path = Path(__file__).parents[3] / "docs" / "examples" / "multimodel.csv"
     table = np.genfromtxt(path, delimiter=",", names=True)
     columns = {name: table[name] for name in ("t_s", "range_m", "elevation_rad", "azimuth_rad")}
-    found = multimodel_plots.track(load("multimodel_1hz").cases[0], columns)
-    f, ballistic = found.filters.index("MMA2-122"), (table["t_s"] >= 20) & (table["t_s"] < 125)
+    tracks = multimodel_plots.track(load("multimodel_1hz").cases[0], columns)
+    f, ballistic = tracks.filters.index("MMA2-122"), (table["t_s"] >= 20) & (table["t_s"] < 125)
     truth = np.stack([table[f"true_{axis}_m"] for axis in "xyz"], axis=1)
-    e = (found.estimate[f, :, 0::3] - truth)[ballistic] / found.sigma[f, :, 0::3][ballistic]
+    e = (tracks.estimate[f, :, 0::3] - truth)[ballistic] / tracks.sigma[f, :, 0::3][ballistic]
     assert np.abs(e).max() < 5.85
     freedom = 3 * ballistic.sum()
-    assert found.tested == (("plot", 3),)
-    assert abs(found.nis[f, ballistic, 0].sum() / freedom - 1) < 5.85 * np.sqrt(2 / freedom)
+    assert tracks.tested == (("plot", 3),)
+    assert abs(tracks.nis[f, ballistic, 0].sum() / freedom - 1) < 5.85 * np.sqrt(2 / freedom)

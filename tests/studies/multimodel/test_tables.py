@@ -68,9 +68,9 @@ def test_operations_and_consistency(result):
 
 def test_gains_between_any_two_filters_are_paired(result):
     (case,) = result.cases
-    seen = Evidence(result.cases, result.tables, {case.name: {"filters": set(range(len(case.axes.filters)))}})
+    evidence = Evidence(result.cases, result.tables, {case.name: {"filters": set(range(len(case.axes.filters)))}})
     (key,) = CLAIMS[0].parts[0].cases
-    gain = seen.stage_gain(key, key[2][0], key[2][3], "ballistic", "y")
+    gain = evidence.stage_gain(key, key[2][0], key[2][3], "ballistic", "y")
     s = np.array(case.sums["stage"])[[0, 3], 1, 3, 0] / case.count
     assert_rounded(gain.value, 100 * (1 - np.sqrt(s[0] / s[1])), size=100, operations=6)
     assert gain.lo < gain.value < gain.hi
@@ -83,7 +83,7 @@ def test_claims_of_this_config_are_judged_and_no_others(result):
 
 
 @pytest.mark.slow
-def test_another_flight_is_not_the_papers(result):
+def test_other_flights_have_no_claims(result):
     changed = radarsim.run("multimodel", realisations=8, overrides=["target.lag_s=2"])
     table = changed.tables["claims"]
     assert table["class"].eq(NOT_JUDGED).all()
@@ -101,31 +101,31 @@ def test_figures_are_described(result):
 
 
 @pytest.mark.slow
-def test_names_of_stages_do_not_touch_and_the_caption_has_those_without_room():
-    made = radarsim.run("multimodel_recorded", realisations=3)
+def test_stage_names_do_not_overlap_and_captions_have_the_others():
+    result = radarsim.run("multimodel_recorded", realisations=3)
     with speaking("ru"):
-        drawn = output.case_figures(made.cases, made.tables, made.experiment)
+        case_figures = output.case_figures(result.cases, result.tables, result.experiment)
     for name in ("sigma_y", "trajectory"):
         assert (
             "Этапы по порядку: начало, прямая, разворот, набор высоты, обратный разворот и после."
-            in drawn[name].caption
+            in case_figures[name].caption
         )
-        canvas = figures.render(drawn[name])
+        canvas = figures.render(case_figures[name])
         (*_, axes) = canvas.axes
         boxes = [
             text.get_window_extent() for text in axes.texts if text.get_text() in ("разворот", "набор высоты", "после")
         ]
         assert len(boxes) >= 2
-        assert all(left.x1 < right.x0 for left, right in pairwise(sorted(boxes, key=lambda box: box.x0)))
+        assert all(a.x1 < b.x0 for a, b in pairwise(sorted(boxes, key=lambda box: box.x0)))
 
 
 @pytest.mark.slow
-def test_filters_of_as_few_operations_are_named_together():
-    made = radarsim.run("multimodel_families_1hz", realisations=3)
-    counts = made.tables["operations"].query("stage == 'after'").set_index("filter")["operations"]
+def test_filters_with_equally_few_operations_are_listed_together():
+    result = radarsim.run("multimodel_families_1hz", realisations=3)
+    counts = result.tables["operations"].query("stage == 'after'").set_index("filter")["operations"]
     fewest = counts[counts == counts.min()].index
     assert set(fewest) == {"MMA1 best", "MMA2 best"}
-    caption = output.case_figures(made.cases, made.tables, made.experiment)["cost"].caption
+    caption = output.case_figures(result.cases, result.tables, result.experiment)["cost"].caption
     assert caption.startswith(f"Fewest operations: MMA2 best and MMA1 best ({counts.min():.0f}); ")
 
 
@@ -138,14 +138,14 @@ def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     stages = result.tables["stages"]
     wide = stages[stages["component"] == "y"].pivot_table(index="stage", columns="filter", values="sigma")
     above = 100 * (wide.div(wide.min(axis=1), axis=0) - 1)
-    (best, least), (second, more) = above.max().sort_values().iloc[:2].items()
+    (best, smallest), (second, more) = above.max().sort_values().iloc[:2].items()
     stage = above[best].idxmax()
-    assert f"stage: {best}, σ of the height at most {least:.2g} % above the least ({stage}: " in first
+    assert f"stage: {best}, σ of the height at most {smallest:.2g} % above the least ({stage}: " in first
     assert f"; {wide.loc[stage].idxmin()}: {wide.loc[stage].min():.3g} m [" in first
     assert first.endswith(f"; next {second}, {more:.2g} %.")
 
 
-def test_the_answer_on_several_cases_is_one_sentence():
+def test_answer_on_several_cases_is_one_sentence():
     """Of the filters that all cases have; one that is best everywhere is never above the least."""
     rows = [  # a is 10 % above the least, b up to 100 %
         *(("one", "start", "a", 11.0), ("one", "start", "b", 10.0), ("one", "start", "only here", 1.0)),
@@ -154,17 +154,16 @@ def test_the_answer_on_several_cases_is_one_sentence():
     columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
     stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
     cases = [SimpleNamespace(name=name, swept=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
-    (told,) = answer_texts(words, cases, {"stages": stages})
-    assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in told
-    alone = answer_texts(words, cases, {"stages": stages[stages["filter"] == "b"]})
-    assert [line.rpartition("start: ")[2] for line in alone] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
-    told, *_ = answer_texts(
-        words, cases[1:], {"stages": pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)}
-    )
-    assert told == "Least σ of the height in every stage: a; next b, at most 100 % above it."
+    (sentence,) = answer_texts(words, cases, {"stages": stages})
+    assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in sentence
+    single_answer = answer_texts(words, cases, {"stages": stages[stages["filter"] == "b"]})
+    assert [line.rpartition("start: ")[2] for line in single_answer] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
+    vy_stages = pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)
+    sentence, *_ = answer_texts(words, cases[1:], {"stages": vy_stages})
+    assert sentence == "Least σ of the height in every stage: a; next b, at most 100 % above it."
 
 
-def test_time_per_update_stands_in_the_record_and_the_report_alone(tmp_path):
+def test_time_per_update_is_only_in_the_record_and_the_report(tmp_path):
     """Counted operations are a table; what a clock measured is none."""
     radarsim.run("multimodel_1hz", realisations=8, out=tmp_path, figures=False)
     folder = tmp_path / "multimodel_1hz"

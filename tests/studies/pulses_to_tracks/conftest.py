@@ -19,20 +19,20 @@ CURED = {"name": "cured", "observes": V}
 SPECTRUM = {"name": "spectrum", "observes": V, "estimator": "spectrum"}
 
 
-def made(filters, scans=5, burst=(), prior=(), variance=1e-3, target=POLYNOMIAL, **radar):
+def make_case(filters, scans=5, burst=(), prior=(), variance=1e-3, target=POLYNOMIAL, **radar):
     """A checked case; burst, prior and radar are further keys of these."""
     document = {
         "radar": RADAR | radar,
         "burst": BURST | dict(burst),
         "prior": PRIOR | dict(prior),
         "target": target,
-        "filters": [{"manoeuvre_variance": variance} | one for one in filters],
+        "filters": [{"manoeuvre_variance": variance} | f for f in filters],
         "scans": scans,
     }
     return Case("case", "case", "pulses_to_tracks", config.Keys.model_validate(document), (), 1, 1)
 
 
-def summed(case, n):
+def plan_and_sums(case, n):
     """The plan and the sums of n realisations."""
     plan = study.prepare(case)
     values = np.zeros(plan.layout.size)

@@ -7,27 +7,27 @@ import numpy as np
 from radarsim.physics import manoeuvre_covariance, transition
 
 
-def scored(u, variance, x, forecast, precision, size, first, steps=40, tolerance=1e-3):
+def score(u, variance, x, forecast, precision, size, first, steps=40, tolerance=1e-3):
     """The coefficients x (6,) in turns over the whole burst that complex samples u (N, whole burst of M) make likely.
 
     u holds the first samples only; M is `forecast` and `precision`'s burst. precision (6,) of the forecast; size of the
     coefficients are estimated; `first`: the phase is put at its best before.
     """
-    samples, whole = u
-    tau = np.arange(len(samples)) / whole
+    samples, burst_time = u
+    tau = np.arange(len(samples)) / burst_time
     powers = tau[:, None] ** np.arange(6)
     information = (2 * math.pi) ** 2 / variance * (powers[:, :size].T @ powers[:, :size]) + np.diag(precision[:size])
     x = x.copy()
 
-    def received():
+    def residual_signal():
         return samples * np.exp(-2j * math.pi * (powers @ x))
 
     if first:
-        x[0] += np.angle(received().sum()) / (2 * math.pi)
+        x[0] += np.angle(residual_signal().sum()) / (2 * math.pi)
     for _ in range(steps):
         away = forecast - x
         away[0] -= round(away[0])
-        gradient = 2 * math.pi / variance * (powers.T @ received().imag) + precision * away
+        gradient = 2 * math.pi / variance * (powers.T @ residual_signal().imag) + precision * away
         step = np.linalg.solve(information, gradient[:size])
         x[:size] += step
         if gradient[:size] @ step <= tolerance**2:
@@ -37,10 +37,10 @@ def scored(u, variance, x, forecast, precision, size, first, steps=40, tolerance
 
 def sequence(samples, variance, forecast, precision, size, windows):
     """P4's sequence over windows in pulses from a forecast (6,), then the whole burst without it."""
-    x, whole = forecast.copy(), len(samples)
+    x, pulse_count = forecast.copy(), len(samples)
     for n, pulses in enumerate(windows):
-        x = scored((samples[:pulses], whole), variance, x, forecast, precision, size, n == 0)
-    return scored((samples, whole), variance, x, forecast, np.zeros(6), size, False)
+        x = score((samples[:pulses], pulse_count), variance, x, forecast, precision, size, n == 0)
+    return score((samples, pulse_count), variance, x, forecast, np.zeros(6), size, False)
 
 
 def spectrum(samples, variance, forecast, size, lines, offset):
@@ -50,7 +50,7 @@ def spectrum(samples, variance, forecast, size, lines, offset):
     line = np.argmax(abs(np.fft.fft(turned, lines)))
     x = forecast.copy()
     x[1] = (np.fft.fftfreq(lines, 1 / lines)[line] + offset) * len(n) / lines
-    return scored((samples, len(n)), variance, x, forecast, np.zeros(6), size, True)
+    return score((samples, len(n)), variance, x, forecast, np.zeros(6), size, True)
 
 
 class Track:

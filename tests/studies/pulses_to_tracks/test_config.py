@@ -33,20 +33,20 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("overrides", "said"), FAULTS)
-def test_faults_are_told_at_their_key(overrides, said):
+def test_faults_are_reported_at_their_key(overrides, said):
     with pytest.raises(ConfigError) as caught:
         load("pulses", overrides)
     lines = [line.replace("']:", ":") for line in caught.value.lines]  # a key given in Python: overrides['KEY']
     assert any(said in line for line in lines), lines
 
 
-def test_defaults_are_written_out():
+def test_defaults_are_filled_in():
     spec = load("pulses").cases[0].spec
     cured, gated, mixture = spec.filters[3], spec.filters[5], spec.filters[6]
     assert (cured.forecast, cured.derivatives, cured.use, cured.gate_probability) == ("track", 0, "as_measured", None)
     assert (gated.gate_probability, mixture.lock_probability) == (0.999, 0.95)
     assert spec.filters[0].estimator is None
-    assert [one.hypotheses for one in spec.filters] == [None, None, 1, 1, 1, 1, 1]
+    assert [f.hypotheses for f in spec.filters] == [None, None, 1, 1, 1, 1, 1]
     many = load("pulses", ["filters.6.hypotheses=9"]).cases[0].spec.filters[6]
     assert (many.hypotheses, many.prune_below, many.estimate) == (9, 1e-6, "mean")
     assert spec.span_mps == pytest.approx(300.0, rel=rounding(operations=3))
@@ -59,7 +59,7 @@ def test_pulses_by_their_number_a_second_and_a_duration():
     assert load("pulses", ["burst.pulses_per_second=1.6"]).cases[0].spec == load("pulses").cases[0].spec
 
 
-def test_a_forecast_wider_than_the_span_is_warned_of():
+def test_forecast_wider_than_the_span_warns():
     assert words.warnings(load("pulses")) == []
     (line,) = words.warnings(load("pulses", ["prior.sigma_velocity_mps=100"]))
     assert line.startswith(
@@ -70,7 +70,7 @@ def test_a_forecast_wider_than_the_span_is_warned_of():
     assert words.warnings(load("pulses", ["prior.sigma_velocity_mps=100", gated, *many])) == []
 
 
-def test_no_windows_lead_there():
+def test_forecast_without_windows_is_refused():
     """A burst whose noise leaves no schedule ends in one line."""
     from radarsim.studies.pulses_to_tracks import study
 

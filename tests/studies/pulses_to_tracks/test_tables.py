@@ -11,15 +11,15 @@ from radarsim.report.drawing import Line
 from radarsim.report.statistics import FEW_EVENTS
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import study, tables
-from radarsim.studies.pulses_to_tracks.tables import OF_ALL
+from radarsim.studies.pulses_to_tracks.tables import SIGMA_ALL_NOTE
 from tests.answers import answer_texts
 from tests.studies.pulses_to_tracks import naive
-from tests.studies.pulses_to_tracks.conftest import CURED, made
+from tests.studies.pulses_to_tracks.conftest import CURED, make_case
 from tests.tolerances import assert_rounded, rounding, sigma_error
 
 
 @pytest.fixture(scope="module")
-def found():
+def result():
     return radarsim.run("pulses", realisations=1500)
 
 
@@ -29,15 +29,15 @@ def swept():
     return radarsim.run("pulses_snr", realisations=600, overrides=overrides)
 
 
-def test_curves_have_the_idealisation_exact(found):
-    curves = found.curves
+def test_curves_have_the_idealisation_exact(result):
+    curves = result.curves
     assert set(curves[curves["exact_sigma"].notna()]["filter"]) == {"r", "ideal"}
     assert len(curves) == 7 * 15 * 3
 
 
-def test_locks(found):
-    locks = found.tables["locks"]
-    assert set(locks["filter"]) == set(found.curves["filter"]) - {"r"}
+def test_locks(result):
+    locks = result.tables["locks"]
+    assert set(locks["filter"]) == set(result.curves["filter"]) - {"r"}
     assert (locks["lock_rate_3sigma"] <= locks["lock_rate"]).all()
     assert ((locks["lock_lo"] <= locks["lock_rate"]) & (locks["lock_rate"] <= locks["lock_hi"])).all()
     ideal = locks[locks["filter"] == "ideal"]
@@ -46,8 +46,8 @@ def test_locks(found):
     assert 0.99 < locks[locks["filter"] == "cured, gated"]["taken"].mean() < 1
 
 
-def test_estimates_beside_the_bound(found):
-    table = found.tables["estimates"]
+def test_estimates_against_the_bound(result):
+    table = result.tables["estimates"]
     ideal = table[table["filter"] == "ideal"]
     np.testing.assert_allclose(ideal["sigma_all"], ideal["bound"], rtol=sigma_error(1500))
     assert (table["sigma"] <= table["sigma_all"] * (1 + rounding(operations=1500))).all()
@@ -55,116 +55,116 @@ def test_estimates_beside_the_bound(found):
     np.testing.assert_allclose(table["energy_db"], 17.28, atol=0.011)
 
 
-def test_sigma_of_all_bursts_is_marked_where_few_lost_ones_decide(swept):
+def test_sigma_of_all_bursts_is_marked_where_a_few_losses_decide(swept):
     """At −4 dB 94 of 600 bursts of the spectrum are lost and make its σ_all; at 14 dB none is."""
-    for result, expected in zip(swept.cases, (OF_ALL, None, ""), strict=True):
+    for result, expected in zip(swept.cases, (SIGMA_ALL_NOTE, None, ""), strict=True):
         if expected is None:  # marked already, as losses may be missing
             continue
-        made = tables.tables([result])["estimates"]
-        own = made[made["filter"] == "spectrum"]
+        estimates = tables.tables([result])["estimates"]
+        spectrum_rows = estimates[estimates["filter"] == "spectrum"]
         square, fourth = result.sums["measured"][result.axes.filters.index("spectrum"), :, 0, 1].T
         few = 600 / (600 * fourth / square**2 - 1) < 200
-        assert few.tolist() == [expected == OF_ALL] * 4
-        assert own["note"].tolist() == [expected] * 4
+        assert few.tolist() == [expected == SIGMA_ALL_NOTE] * 4
+        assert spectrum_rows["note"].tolist() == [expected] * 4
 
 
-def test_losses_hold_every_realisation(found):
-    table = found.tables["losses"]
+def test_losses_count_all_realisations(result):
+    table = result.tables["losses"]
     assert (table.groupby(["filter", "component", "k"])["n"].sum() == 1500).all()
     assert table["since_loss"].between(0, 6).all()
 
 
-def test_idealisations(found):
-    table = found.tables["idealisations"]
+def test_idealisations(result):
+    table = result.tables["idealisations"]
     assert set(table["ideal"]) == {"ideal"}
-    own = table[(table["filter"] == "spectrum") & (table["component"] == "Vr")]
-    assert (own["over_ideal_lo"] < 1.06).all()
-    curves = found.curves.set_index(["filter", "component", "k"])
-    row = own[own["k"] == 7].iloc[0]
+    spectrum_rows = table[(table["filter"] == "spectrum") & (table["component"] == "Vr")]
+    assert (spectrum_rows["over_ideal_lo"] < 1.06).all()
+    curves = result.curves.set_index(["filter", "component", "k"])
+    row = spectrum_rows[spectrum_rows["k"] == 7].iloc[0]
     ratio = curves.loc[("spectrum", "Vr", 7), "sigma"] / curves.loc[("ideal", "Vr", 7), "exact_sigma"]
     assert_rounded(row["over_ideal"], ratio, operations=4)
 
 
-def test_the_cure_is_the_cheapest_of_the_sequences(found):
-    passes = found.tables["passes"].set_index("filter")["passes"]
+def test_the_cure_is_the_cheapest_of_the_sequences(result):
+    passes = result.tables["passes"].set_index("filter")["passes"]
     assert passes["ideal"] == 0
     assert passes["cured"] < passes["sequence"]
 
 
-def test_sentences(found):
-    one, experiment = registry.study("pulses_to_tracks"), load("pulses")
-    assert one.question(experiment).startswith("What are the bursts of RLS 4 worth to the track")
-    told = answer_texts(one, found.cases, found.tables)
-    assert told[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
-    assert len(told) == 7
-    ratios = found.tables["idealisations"].query("component == 'r'").groupby("filter").tail(1)
+def test_sentences(result):
+    study, experiment = registry.study("pulses_to_tracks"), load("pulses")
+    assert study.question(experiment).startswith("What are the bursts of RLS 4 worth to the track")
+    sentences = answer_texts(study, result.cases, result.tables)
+    assert sentences[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
+    assert len(sentences) == 7
+    ratios = result.tables["idealisations"].query("component == 'r'").groupby("filter").tail(1)
     ratios = ratios.set_index("filter")["over_ideal"]
     near, best, worst, far = re.fullmatch(
         r"RLS 4: with (.+) σ of the range at the last scan is ([\d.]+) .* times its idealisation's, with (.+) ([\d.]+) "
         r"\[.*\] times\.",
-        told[0],
+        sentences[0],
     ).group(2, 1, 3, 4)
     assert (best, worst) == (ratios.idxmin(), ratios.idxmax())
     assert [float(near), float(far)] == pytest.approx([ratios.min(), ratios.max()], rel=5e-3)
-    (spectrum,) = [line for line in told if line.startswith("RLS 4, spectrum: ")]
+    (spectrum,) = [line for line in sentences if line.startswith("RLS 4, spectrum: ")]
     assert "idealisation" in spectrum
 
 
-def test_of_several_cases_the_answer_is_where_each_filter_is_furthest_from_its_idealisation(swept):
+def test_answer_on_several_cases_names_the_case_furthest_from_the_idealisation(swept):
     last = swept.tables["idealisations"].query("component == 'r'").groupby(["case", "filter"]).tail(1)
     assert swept.answer[0].startswith("σ of the range at the last scan over its idealisation's, at worst of 3 cases: ")
-    for name, own in last.groupby("filter"):
-        worst = own.loc[own["over_ideal"].idxmax()]
+    for name, filter_rows in last.groupby("filter"):
+        worst = filter_rows.loc[filter_rows["over_ideal"].idxmax()]
         where = worst["case"].rpartition("=")[2].replace("-", "−")
-        found = re.search(rf"[:;] {name} ([\d.]+) \[[^]]*\] \(q = {where} dB\)", swept.answer[0])
-        assert float(found[1]) == pytest.approx(worst["over_ideal"], rel=6e-3)
+        match = re.search(rf"[:;] {name} ([\d.]+) \[[^]]*\] \(q = {where} dB\)", swept.answer[0])
+        assert float(match[1]) == pytest.approx(worst["over_ideal"], rel=6e-3)
 
 
-def test_figures(found, swept):
-    assert {"sigma_r", "gain_Vr", "locks", "measured"} <= set(found.figures)
+def test_figures(result, swept):
+    assert {"sigma_r", "gain_Vr", "locks", "measured"} <= set(result.figures)
     assert "threshold" in swept.figures
     assert "losses" not in swept.figures
 
 
-def test_a_filter_looks_the_same_in_every_figure(found):
-    drawn = registry.study("pulses_to_tracks").figures(found.cases, found.tables, load("pulses"))
+def test_filter_has_the_same_look_in_all_figures(result):
+    figures = registry.study("pulses_to_tracks").figures(result.cases, result.tables, load("pulses"))
     looks = {}
     for name in ("sigma_r", "locks"):
-        for mark in (mark for panel in drawn[name].panels for mark in panel.marks if isinstance(mark, Line)):
+        for mark in (mark for panel in figures[name].panels for mark in panel.marks if isinstance(mark, Line)):
             looks.setdefault(mark.label, {})[name] = mark.style
-    missed = found.tables["locks"].assign(lost=lambda rows: (1 - rows["lock_rate"]) * rows["n"])
+    missed = result.tables["locks"].assign(lost=lambda rows: (1 - rows["lock_rate"]) * rows["n"])
     missed = missed.groupby("filter")["lost"].sum().round()
     often = set(missed[missed >= FEW_EVENTS].index)
     assert often
-    assert {name for name, own in looks.items() if set(own) == {"sigma_r", "locks"}} == often
-    assert all(len(set(own.values())) == 1 for own in looks.values())
+    assert {name for name, looks_by_figure in looks.items() if set(looks_by_figure) == {"sigma_r", "locks"}} == often
+    assert all(len(set(looks_by_figure.values())) == 1 for looks_by_figure in looks.values())
 
 
-def test_the_threshold_is_seen(swept):
+def test_threshold_figure_shows_the_rise(swept):
     locks = swept.tables["locks"]
     rate = locks.groupby(["case", "filter"])["lock_rate"].min()
     low, high = (f"pulses_snr burst.snr_db={value}" for value in (-4, 14))
     assert rate[low, "spectrum"] < 0.95 < 0.99 < rate[high, "spectrum"]
 
 
-def test_losses_that_a_sample_may_lack_are_marked(found):
+def test_sigma_is_marked_where_unseen_losses_may_decide(result):
     """1500 tracks may lack the lost burst that decides σ: sequences are marked, what is known to lock is not.
 
     From the third scan on: a velocity of another fold becomes a wrong range only with the next scan.
     """
-    curves = found.tables["curves"].fillna({"note": ""})
+    curves = result.tables["curves"].fillna({"note": ""})
     marked = curves[curves["k"] > 2].groupby("filter")["note"].agg(lambda notes: (notes != "").mean())
     assert (marked[["r", "ideal", "spectrum"]] == 0).all()
     assert (marked[["sequence", "cured", "cured, gated", "cured, mixture"]] == 1).all()
     for name in ("gains", "idealisations", "estimates"):
-        notes = found.tables[name].fillna({"note": ""}).groupby("filter")["note"]
+        notes = result.tables[name].fillna({"note": ""}).groupby("filter")["note"]
         assert notes.agg(lambda own: (own != "").any())[["cured", "cured, mixture"]].all()
 
 
-def test_what_a_lost_burst_adds():
+def test_squares_that_a_lost_burst_adds():
     """The answers of a textbook filter to an error of one burst, or of all from one on, squared and summed."""
     fixed = CURED | {"name": "fixed", "forecast": {"sigma_velocity_mps": 10.0, "sigma_acceleration_mps2": 5.0}}
-    case = made([CURED, fixed], scans=6)
+    case = make_case([CURED, fixed], scans=6)
     plan = study.prepare(case)
     bound, prior = plan.axes.bound[0, :, 0], (30.0, 5.0)
 
@@ -181,4 +181,4 @@ def test_what_a_lost_burst_adds():
         answers = [ends([1.0 if j <= k < j + until else 0.0 for k in range(6)]) for j in range(6)]
         expected = np.square(answers).sum(axis=0) * 300.0**2 / 12
         # Covariances of a track after six scans, whose gains are differences: κ of some thousand at most.
-        np.testing.assert_allclose(plan.axes.losses[f, -1], expected, rtol=rounding(1e3, 60))
+        np.testing.assert_allclose(plan.axes.lost_squares[f, -1], expected, rtol=rounding(1e3, 60))

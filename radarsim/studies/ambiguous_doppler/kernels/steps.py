@@ -1,7 +1,7 @@
-"""Filters of eight realisations over all scans: gains, the filters with one hypothesis, the one that merges.
+"""Filters of eight realisations over all scans: gains, filters with one hypothesis, and the one that merges folds.
 
-A plot is taken range first, velocity after, which needs no inverse and gives the fold a prediction that knows the
-range. Letters, each of eight lanes:
+A plot is taken range first and velocity second: this needs no inverse, and the fold is chosen by a prediction that
+includes the range. Letters, each of eight lanes:
 
     x (3), P (6)   state (range, radial velocity, acceleration) and covariance, packed as in `kernels.algebra`
     F (5), Q (6)   motion over a scan
@@ -10,13 +10,13 @@ range. Letters, each of eight lanes:
 
 `design`, `plots`, `gains`, `out` are addresses.
 
-Plots of eight realisations: range and folded velocity, missed ones, and the truth that each realisation has.
+Plots of eight realisations: range and folded velocity, missed plots, and the truth of each realisation.
 
-Hypotheses on the folds of one realisation, kept from scan to scan: the Bayes filter where none is dropped.
+Hypotheses on the folds of one realisation, kept from scan to scan: the Bayes filter if none is dropped.
 
-Given its folds a filter is linear, so that all hypotheses share gains and covariance; each is three numbers and the
-logarithm of a weight. A scan moves all, weighs them by the range, branches each over the folds that the velocity
-leaves possible, and drops what is too far below the best or beyond the number that is kept. Letters:
+With its folds given a filter is linear, so that all hypotheses share gains and covariance; each is three numbers and
+the logarithm of a weight. At each scan all are predicted and weighted by the range; each branches over the folds that
+the velocity leaves possible; those too far below the best, or beyond the number kept, are dropped. Letters:
 
     r, v, a, w   columns of the list: state and logarithm of the weight, the best one's 0 (lists are rows of eight)
     e            innovation of the velocity, folded to -D/2 … D/2; e + n D are those of the other folds
@@ -43,129 +43,135 @@ def motion(design):
 
 
 @inline
-def range_taken(P, first, taken, variance):
-    """Covariance after a range of that variance, its gain, and 1/(2S); `first` (0 or 1) is a track's first, which sets
-    it."""
+def update_by_range(P, first, detected, variance):
+    """Covariance after a range of that variance, its gain, and 1/(2S).
+
+    first, detected (0 or 1): whether it is the track's first, which sets the range; whether a later one is there."""
     zero = full(0.0)
-    P, gain, S = take_value(P, variance, taken)
-    of_range = lanes.choose3(first, zero, (full(variance), zero, zero), (P[0], P[1], P[2]))
-    return (*of_range, P[3], P[4], P[5]), gain, 0.5 * taken / S
+    P, gain, S = take_value(P, variance, detected)
+    range_covariances = lanes.choose3(first, zero, (full(variance), zero, zero), (P[0], P[1], P[2]))
+    return (*range_covariances, P[3], P[4], P[5]), gain, 0.5 * detected / S
 
 
 @inline
-def prior(design):
-    """Covariance before the first plot; the range is not in it."""
+def prior_covariance(design):
+    """Covariance before the first plot, without the range."""
     zero = full(0.0)
     return zero, zero, zero, full(design[rec.PRIOR]), zero, full(design[rec.PRIOR + 1])
 
 
 @part
 def fill_gains(design, sigma, scans, plots, gains):
-    """Gains of a design over all scans, of a filter whose folds are right: rows GAINS a scan; sigma (2,)."""
+    """Fill in the gains of a design over all scans, with all folds right: GAINS rows a scan; sigma (2,)."""
     F, Q = motion(design)
-    P = prior(design)
+    P = prior_covariance(design)
     for k in range(scans):
-        plot, to = row(plots, k * rec.PLOT), row(gains, k * rec.GAINS)
+        plot, output = row(plots, k * rec.PLOT), row(gains, k * rec.GAINS)
         detected, first = get(plot, rec.DETECTED), get(plot, rec.FIRST)
         if k > 0:
             P = predicted_covariance(P, F, Q)
-        P, g, weight = range_taken(P, first, detected - first, sigma[0] * sigma[0])
-        put(to, rec.WEIGHT, weight)
-        put3(to, rec.RANGE_GAIN, g)
-        taken = get(plot, rec.PAIRED) if design[rec.TAKES_VELOCITY] > 1.0 else detected * design[rec.TAKES_VELOCITY]
-        P, g, S = take_rate(P, sigma[1] * sigma[1], taken)
-        put(to, rec.VARIANCE, S)
-        put3(to, rec.VELOCITY_GAIN, g)
+        P, g, weight = update_by_range(P, first, detected - first, sigma[0] * sigma[0])
+        put(output, rec.WEIGHT, weight)
+        put3(output, rec.RANGE_GAIN, g)
+        takes_velocity = (
+            get(plot, rec.PAIRED) if design[rec.TAKES_VELOCITY] > 1.0 else detected * design[rec.TAKES_VELOCITY]
+        )
+        P, g, S = take_rate(P, sigma[1] * sigma[1], takes_velocity)
+        put(output, rec.VARIANCE, S)
+        put3(output, rec.VELOCITY_GAIN, g)
 
 
 @inline
-def with_range(x, plot, scan):
-    """A state after a plot's range; the track's first sets it."""
+def take_range(x, plot, scan):
+    """The state after a plot's range; the track's first sets it."""
     z = get(plot, rec.RANGE)
     x = add_scaled(x, z - x[0], lanes.get3(scan, rec.RANGE_GAIN))
     return where_greater(get(plot, rec.FIRST), full(0.0), z, x[0]), x[1], x[2]
 
 
 @inline
-def whether_right(right, plot, taken, D):
-    """`right` (0 or 1) where the velocity `taken`, folded back somehow, is the one that was folded; else 0."""
-    off = get(plot, rec.UNFOLDED) - taken
-    off = where_greater(off, full(0.0), off, full(0.0) - off)
-    return where_greater(off * get(plot, rec.DETECTED), full(0.5 * D), full(0.0), right)
+def still_right(right, plot, velocity, D):
+    """`right` (0 or 1) where the unfolded `velocity` lies in the fold of the measured one; else 0."""
+    deviation = get(plot, rec.UNFOLDED) - velocity
+    deviation = where_greater(deviation, full(0.0), deviation, full(0.0) - deviation)
+    return where_greater(deviation * get(plot, rec.DETECTED), full(0.5 * D), full(0.0), right)
 
 
 @inline
-def put_single(to, x, right):
-    """Output of a bank with one hypothesis."""
-    put3(to, rec.MEAN, x)
-    put3(to, rec.BEST, x)
-    put(to, rec.RIGHT, right)
-    put(to, rec.LISTED, right)
-    put(to, rec.COUNT, full(1.0))
-    put(to, rec.PROBABILITY, full(1.0))
+def put_single(output, x, right):
+    """Write the output of a bank with one hypothesis."""
+    put3(output, rec.MEAN, x)
+    put3(output, rec.BEST, x)
+    put(output, rec.RIGHT, right)
+    put(output, rec.LISTED, right)
+    put(output, rec.COUNT, full(1.0))
+    put(output, rec.PROBABILITY, full(1.0))
 
 
 @part
 def run_single(kind, design, spans, plots, gains, out):
-    """A bank with one hypothesis over all scans: of range alone, with the true folds, the nearest, or remainders.
-    `right` of a remainder is that of its scan alone: it rests on two plots, and not on what was before."""
+    """Run a bank with one hypothesis over all scans: range alone, or the true fold, the nearest, or the remainder.
+
+    For a remainder, `right` counts its scan alone: it depends on two plots, not on earlier estimates."""
     F, _ = motion(design)
     zero = full(0.0)
     x, right = (zero, zero, zero), full(1.0)
     for k in range(spans.size):
         plot, scan, D = row(plots, k * rec.PLOT), row(gains, k * rec.GAINS), spans[k]
-        x = with_range(predicted(x, F), plot, scan)
+        x = take_range(predicted(x, F), plot, scan)
         if kind != rec.NONE:
             u = get(plot, rec.UNFOLDED)
             if kind == rec.REMAINDER:
-                right = whether_right(get(plot, rec.PAIRED), plot, get(plot, rec.SOLVED), D)
+                right = still_right(get(plot, rec.PAIRED), plot, get(plot, rec.SOLVED), D)
                 u = get(plot, rec.SOLVED)
             elif kind != rec.UNFOLDS:
                 z = get(plot, rec.VELOCITY)
                 u = z + D * nearest((x[1] - z) / D)
-                right = whether_right(right, plot, u, D)
+                right = still_right(right, plot, u, D)
             x = add_scaled(x, u - x[1], lanes.get3(scan, rec.VELOCITY_GAIN))
         put_single(row(out, k * rec.OUTPUT), x, right)
 
 
 @inline
-def folds_merged(e, S, D):
-    """Mean and variance of the innovation e + n D over all whole n, with weights exp(-(e + n D)²/2S); |e| <= D/2. And
-    the sum of the weights over that of e."""
-    total, mean, square = full(1.0), e, e * e
+def merge_folds(e, S, D):
+    """Mean and variance of the innovation e + n D over all whole n, and the sum of weights over that of e.
+
+    The weights are exp(-(e + n D)²/2S); |e| <= D/2."""
+    weight_sum, mean, square = full(1.0), e, e * e
     limit, scale = lanes.root(S * FARTHEST), -0.5 / S
     n = 1.0
     while lanes.any_greater(limit + 0.5 * D, full(n * D)):
         for sign in (-1.0, 1.0):
             f = e + sign * n * D
             weight = exponential(scale * (f * f - e * e))
-            total, mean, square = total + weight, mean + weight * f, square + weight * f * f
+            weight_sum, mean, square = weight_sum + weight, mean + weight * f, square + weight * f * f
         n += 1.0
-    mean = mean / total
-    return mean, square / total - mean * mean, total
+    mean = mean / weight_sum
+    return mean, square / weight_sum - mean * mean, weight_sum
 
 
 @part
 def run_merged(design, sigma, spans, plots, out):
-    """A bank that merges the folds of each scan into one state, over all scans (GPB1); its covariance is its own."""
+    """Run a bank that merges the folds of each scan into one state (GPB1) over all scans; each lane has its own
+    covariance."""
     F, Q = motion(design)
     zero = full(0.0)
-    x, P, right = (zero, zero, zero), prior(design), full(1.0)
+    x, P, right = (zero, zero, zero), prior_covariance(design), full(1.0)
     for k in range(spans.size):
         plot, D = row(plots, k * rec.PLOT), spans[k]
         detected, first = get(plot, rec.DETECTED), get(plot, rec.FIRST)
         x = predicted(x, F)
         if k > 0:
             P = predicted_covariance(P, F, Q)
-        P, g, _ = range_taken(P, first, detected - first, sigma[0] * sigma[0])
+        P, g, _ = update_by_range(P, first, detected - first, sigma[0] * sigma[0])
         z = get(plot, rec.RANGE)
         x = add_scaled(x, z - x[0], g)
         x = where_greater(first, zero, z, x[0]), x[1], x[2]
         e = get(plot, rec.VELOCITY) - x[1]
         e = e - D * nearest(e / D)
-        right = whether_right(right, plot, x[1] + e, D)
+        right = still_right(right, plot, x[1] + e, D)
         P, g, S = take_rate(P, sigma[1] * sigma[1], detected)
-        mean, variance, _ = folds_merged(e, S, D)
+        mean, variance, _ = merge_folds(e, S, D)
         x = add_scaled(x, mean, g)
         P = add_outer(P, variance, g)
         put_single(row(out, k * rec.OUTPUT), x, right)
@@ -173,39 +179,42 @@ def run_merged(design, sigma, spans, plots, out):
 
 # ---- plots -----------------------------------------------------------------------------------------------------------
 @inline
-def remainder(z, D, z_before, D_before, joint):
-    """The velocity in ± joint/2 that folds to z in a span D and, as nearly as any, to z_before in D_before."""
-    found, least, u = 0.0, D_before, z + D * math.ceil((-0.5 * joint - z) / D)
+def chinese_remainder(z, D, previous_z, previous_D, joint):
+    """The velocity in ± joint/2 that folds to z in a span D, and nearest to the previous z in the previous span."""
+    solution, min_deviation, u = 0.0, previous_D, z + D * math.ceil((-0.5 * joint - z) / D)
     while u < 0.5 * joint:
-        off = u - z_before
-        off = abs(off - D_before * math.floor(off / D_before + 0.5))
-        if off < least:
-            found, least = u, off
+        deviation = u - previous_z
+        deviation = abs(deviation - previous_D * math.floor(deviation / previous_D + 0.5))
+        if deviation < min_deviation:
+            solution, min_deviation = u, deviation
         u += D
-    return found
+    return solution
 
 
 @part
 def solve_remainders(world, plots):
-    """The velocities that follow from a plot and the one before it, of one realisation: plots is its lane's address."""
-    before = -1
+    """Solve each plot and the previous one for the velocity, of one realisation; plots is the address of its lane."""
+    previous = -1
     for k in range(world.truth.shape[0]):
         scan = row(plots, k * rec.PLOT)
         scan[rec.SOLVED * WIDTH] = scan[rec.PAIRED * WIDTH] = 0.0
         if scan[rec.DETECTED * WIDTH] > 0.0:
-            joint = world.joint[world.turn[k], world.turn[before]] if before >= 0 else 0.0
+            joint = world.joint_spans[world.rate_index[k], world.rate_index[previous]] if previous >= 0 else 0.0
             if joint > 0.0:
-                z = row(plots, before * rec.PLOT)[rec.VELOCITY * WIDTH]
+                z = row(plots, previous * rec.PLOT)[rec.VELOCITY * WIDTH]
                 spans = world.spans
-                scan[rec.SOLVED * WIDTH] = remainder(scan[rec.VELOCITY * WIDTH], spans[k], z, spans[before], joint)
+                scan[rec.SOLVED * WIDTH] = chinese_remainder(
+                    scan[rec.VELOCITY * WIDTH], spans[k], z, spans[previous], joint
+                )
                 scan[rec.PAIRED * WIDTH] = 1.0
-            before = k
+            previous = k
 
 
 @part
 def fill_normals(world, first, normals):
-    """Unit normals of realisations first … first + 7: rows of what a target draws (2), of ranges (K), velocities (K).
-    The first normal of draw pair k goes to the range of scan k, the second to its velocity, whether or not there is a
+    """Draw unit normals of realisations first … first + 7: rows for the target (2), the ranges (K), the velocities (K).
+
+    The first normal of draw pair k is for the range of scan k, the second for its velocity, whether or not there is a
     plot."""
     size = WIDTH * world.truth.shape[0]
     ranges, velocities = normals[2 * WIDTH : 2 * WIDTH + size], normals[2 * WIDTH + size :]
@@ -215,44 +224,46 @@ def fill_normals(world, first, normals):
 
 @part
 def put_plots(world, first, normals, plots):
-    """Plots and truth from normals, which are written over, into rows PLOT a scan. The first uniform of draw pair k
-    says whether there is a plot at scan k."""
+    """Fill in plots and truth from normals, which are overwritten: PLOT rows a scan.
+
+    The first uniform of draw pair k decides whether there is a plot at scan k."""
     scans = world.truth.shape[0]
-    zero, one = full(0.0), full(1.0)
-    to, drawn = address(plots), address(normals)
-    noise_r, noise_v = row(drawn, 2), row(drawn, 2 + scans)
-    dv, da = world.spread[0] * get(drawn, 0), world.spread[1] * get(drawn, 1)
+    zero, unit = full(0.0), full(1.0)
+    plot_rows, normal_rows = address(plots), address(normals)
+    noise_r, noise_v = row(normal_rows, 2), row(normal_rows, 2 + scans)
+    added_velocity, added_acceleration = world.spread[0] * get(normal_rows, 0), world.spread[1] * get(normal_rows, 1)
     for k in range(scans):
-        t, scan = world.t[k], row(to, k * rec.PLOT)
-        r = world.truth[k, 0] + dv * t + da * (0.5 * t * t)
-        v = world.truth[k, 1] + dv + da * t
+        t, scan = world.t[k], row(plot_rows, k * rec.PLOT)
+        r = world.truth[k, 0] + added_velocity * t + added_acceleration * (0.5 * t * t)
+        v = world.truth[k, 1] + added_velocity + added_acceleration * t
         put(scan, rec.TRUTH, r)
         put(scan, rec.TRUTH + 1, v)
-        put(scan, rec.TRUTH + 2, world.truth[k, 2] + da)
+        put(scan, rec.TRUTH + 2, world.truth[k, 2] + added_acceleration)
         z, u, span = r + world.sigma[0] * get(noise_r, k), v + world.sigma[1] * get(noise_v, k), world.spans[k]
         put(scan, rec.RANGE, z)
         put(scan, rec.UNFOLDED, u)
         put(scan, rec.VELOCITY, u - span * nearest(u / span))
     started = zero
     for k in range(scans):
-        scan, detected = row(to, k * rec.PLOT), one
-        if world.detection < 1.0:
+        scan, detected = row(plot_rows, k * rec.PLOT), unit
+        if world.detection_probability < 1.0:
             fill_uniform_pairs(world.keys[1], first, k, normals[:WIDTH], normals[WIDTH : 2 * WIDTH])
-            detected = where_greater(full(world.detection), get(drawn, 0), one, zero)
+            detected = where_greater(full(world.detection_probability), get(normal_rows, 0), unit, zero)
         put(scan, rec.DETECTED, detected)
-        put(scan, rec.FIRST, detected * (one - started))
-        started = where_greater(detected, started, one, started)
+        put(scan, rec.FIRST, detected * (unit - started))
+        started = where_greater(detected, started, unit, started)
         put(scan, rec.STARTED, started)
-    if world.joint.any():
+    if world.joint_spans.any():
         for lane in range(WIDTH):
             solve_remainders(world, address(plots[lane:]))
 
 
 # ---- hypotheses ------------------------------------------------------------------------------------------------------
 @part
-def moved_and_weighed(lists, which, count, F, z, scan):
-    """Move `count` hypotheses over a scan and take the range z: columns in place; scan: this lane of the gains."""
-    r, v, a, w = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2), column(lists, which, 3)
+def move_and_weigh(lists, list_index, count, F, z, scan):
+    """Predict `count` hypotheses over a scan and update them with the range z, in place; scan: the lane of gains."""
+    r, v, a = column(lists, list_index, 0), column(lists, list_index, 1), column(lists, list_index, 2)
+    w = column(lists, list_index, 3)
     weight = scan[rec.WEIGHT * WIDTH]
     gain = lanes.lane3(scan, rec.RANGE_GAIN)
     for i in range((count + WIDTH - 1) // WIDTH):
@@ -266,96 +277,109 @@ def moved_and_weighed(lists, which, count, F, z, scan):
 
 
 @part
-def nearest_folds(lists, which, count, z, D, c):
-    """Innovations with the nearest folds and the weights with them, as `branched` reads them; the greatest weight."""
-    v, w = column(lists, which, 1), column(lists, which, 3)
-    to_e, to_w, to_c = column(lists, 2, INNOVATION), column(lists, 2, NEAR), column(lists, 2, FALL)
+def weigh_nearest_folds(lists, list_index, count, z, D, c):
+    """Fill in the innovations with the nearest folds and their weights, as `kernels.hypotheses.branched` reads them.
+
+    Returns the greatest weight."""
+    v, w = column(lists, list_index, 1), column(lists, list_index, 3)
+    innovations, nearest_weights, falls = column(lists, 2, INNOVATION), column(lists, 2, NEAR), column(lists, 2, FALL)
     best, fall = full(NOTHING), full(c)
     for i in range((count + WIDTH - 1) // WIDTH):
         e = z - get(v, i)
         e = e - D * nearest(e / D)
-        near = get(w, i) - c * (e * e)
-        put(to_e, i, e)
-        put(to_w, i, near)
-        put(to_c, i, fall)
-        best = where_greater(near, best, near, best)
-    put(to_w, lists.room // WIDTH - 1, best)  # the last row of a column is free
-    return greatest(row(to_w, lists.room // WIDTH - 1))
+        nearest_weight = get(w, i) - c * (e * e)
+        put(innovations, i, e)
+        put(nearest_weights, i, nearest_weight)
+        put(falls, i, fall)
+        best = where_greater(nearest_weight, best, nearest_weight, best)
+    put(nearest_weights, lists.room // WIDTH - 1, best)  # the last row of a column is free
+    return greatest(row(nearest_weights, lists.room // WIDTH - 1))
 
 
 @part
-def inherited(lists, which, count, best, scan):
-    """Write `count` children into the other list; weights become those above `best`. Gives the number of the best."""
-    r, v, a = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2)
-    to_r, to_v, to_a = column(lists, 1 - which, 0), column(lists, 1 - which, 1), column(lists, 1 - which, 2)
-    to_w = column(lists, 1 - which, 3)
-    weights, found, parents = lists.children, row(lists.children, lists.most // WIDTH), lists.parents
+def put_children(lists, list_index, count, best, scan):
+    """Write `count` children into the other list, weights relative to `best`; returns the index of the best child."""
+    r, v, a = column(lists, list_index, 0), column(lists, list_index, 1), column(lists, list_index, 2)
+    child_r, child_v, child_a = (
+        column(lists, 1 - list_index, 0),
+        column(lists, 1 - list_index, 1),
+        column(lists, 1 - list_index, 2),
+    )
+    child_w = column(lists, 1 - list_index, 3)
+    weights, innovations, parents = lists.children, row(lists.children, lists.most // WIDTH), lists.parents
     gain = lanes.lane3(scan, rec.VELOCITY_GAIN)
-    first, top = 0, NOTHING
+    best_child, best_weight = 0, NOTHING
     for i in range(count):
-        j, f = parents[i], found[i]
-        to_r[i], to_v[i], to_a[i] = add_scaled((r[j], v[j], a[j]), f, gain)
-        to_w[i] = weights[i] - best
-        if weights[i] > top:
-            first, top = i, weights[i]
+        j, f = parents[i], innovations[i]
+        child_r[i], child_v[i], child_a[i] = add_scaled((r[j], v[j], a[j]), f, gain)
+        child_w[i] = weights[i] - best
+        if weights[i] > best_weight:
+            best_child, best_weight = i, weights[i]
     for i in range(count, (count + WIDTH - 1) // WIDTH * WIDTH):
-        to_r[i] = to_v[i] = to_a[i] = 0.0
-        to_w[i] = NOTHING
-    return first
+        child_r[i] = child_v[i] = child_a[i] = 0.0
+        child_w[i] = NOTHING
+    return best_child
 
 
 @part
-def put_estimates(lists, which, count, best, right, to):
-    """Write this lane of the output: the mean of all by their weights, the best, what is known of the right one."""
-    r, v, a, w = column(lists, which, 0), column(lists, which, 1), column(lists, which, 2), column(lists, which, 3)
+def put_estimates(lists, list_index, count, best, right, output):
+    """Write one lane of the output: the weighted mean, the best hypothesis, and whether the right one is listed."""
+    r, v, a, w = (
+        column(lists, list_index, 0),
+        column(lists, list_index, 1),
+        column(lists, list_index, 2),
+        column(lists, list_index, 3),
+    )
     zero = full(0.0)
-    all_, mean_r, mean_v, mean_a = zero, zero, zero, zero
+    group_weights, mean_r, mean_v, mean_a = zero, zero, zero, zero
     for i in range((count + WIDTH - 1) // WIDTH):
         weight = exponential(get(w, i) - w[best])
-        all_, mean_r = all_ + weight, mean_r + weight * get(r, i)
+        group_weights, mean_r = group_weights + weight, mean_r + weight * get(r, i)
         mean_v, mean_a = mean_v + weight * get(v, i), mean_a + weight * get(a, i)
-    sum_ = total(all_)
-    lanes.put_lane3(to, rec.MEAN, (total(mean_r) / sum_, total(mean_v) / sum_, total(mean_a) / sum_))
-    lanes.put_lane3(to, rec.BEST, (r[best], v[best], a[best]))
-    to[rec.RIGHT * WIDTH] = 1.0 if best == right else 0.0
-    to[rec.LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
-    to[rec.COUNT * WIDTH] = count
-    to[rec.PROBABILITY * WIDTH] = 1.0 / sum_
+    weight_sum = total(group_weights)
+    lanes.put_lane3(
+        output, rec.MEAN, (total(mean_r) / weight_sum, total(mean_v) / weight_sum, total(mean_a) / weight_sum)
+    )
+    lanes.put_lane3(output, rec.BEST, (r[best], v[best], a[best]))
+    output[rec.RIGHT * WIDTH] = 1.0 if best == right else 0.0
+    output[rec.LISTED * WIDTH] = 1.0 if right >= 0 else 0.0
+    output[rec.COUNT * WIDTH] = count
+    output[rec.PROBABILITY * WIDTH] = 1.0 / weight_sum
 
 
 @inline
-def child_that_is_right(lists, which, count, right, u, D):
-    """Which of the children is the right hypothesis `right` with the fold of the true velocity u; -1: none."""
-    v, found = column(lists, which, 1), row(lists.children, lists.most // WIDTH)
+def right_child(lists, list_index, count, right, u, D):
+    """The index of the child of hypothesis `right` that has the true fold, that of the velocity u; -1: none."""
+    v, innovations = column(lists, list_index, 1), row(lists.children, lists.most // WIDTH)
     if right >= 0:
         for i in range(count):
-            if lists.parents[i] == right and abs(v[right] + found[i] - u) < 0.5 * D:
+            if lists.parents[i] == right and abs(v[right] + innovations[i] - u) < 0.5 * D:
                 return i
     return -1
 
 
 @part
-def run_remembering(design, most, deepest, spans, plots, gains, out, lists):
-    """A bank that remembers, over all scans of one realisation: plots, gains, out are addresses of its lane."""
+def run_hypotheses(design, max_hypotheses, max_depth, spans, plots, gains, out, lists):
+    """Run a bank that keeps hypotheses over all scans of one realisation; plots, gains, out: addresses of its lane."""
     F, _ = motion(design)
-    which, count, best, right = 0, 0, 0, -1
+    list_index, count, best, right = 0, 0, 0, -1
     for k in range(spans.size):
         plot, scan, D = row(plots, k * rec.PLOT), row(gains, k * rec.GAINS), spans[k]
         if count > 0:
-            moved_and_weighed(lists, which, count, F, plot[rec.RANGE * WIDTH], scan)
+            move_and_weigh(lists, list_index, count, F, plot[rec.RANGE * WIDTH], scan)
         elif plot[rec.FIRST * WIDTH] > 0.0:
             for c in range(4):
-                start = column(lists, which, c)
+                start = column(lists, list_index, c)
                 for i in range(WIDTH):
                     start[i] = 0.0 if c < 3 or i == 0 else NOTHING
-            column(lists, which, 0)[0] = plot[rec.RANGE * WIDTH]
+            column(lists, list_index, 0)[0] = plot[rec.RANGE * WIDTH]
             count, right = 1, 0
         if count > 0 and plot[rec.DETECTED * WIDTH] > 0.0:
             c = 0.5 / scan[rec.VARIANCE * WIDTH]
-            top = nearest_folds(lists, which, count, plot[rec.VELOCITY * WIDTH], D, c)
-            made = branched(lists, which, count, D, top, deepest, most)
-            right = child_that_is_right(lists, which, made, right, plot[rec.UNFOLDED * WIDTH], D)
-            best = inherited(lists, which, made, top, scan)
-            which, count = 1 - which, made
+            best_weight = weigh_nearest_folds(lists, list_index, count, plot[rec.VELOCITY * WIDTH], D, c)
+            child_count = branched(lists, list_index, count, D, best_weight, max_depth, max_hypotheses)
+            right = right_child(lists, list_index, child_count, right, plot[rec.UNFOLDED * WIDTH], D)
+            best = put_children(lists, list_index, child_count, best_weight, scan)
+            list_index, count = 1 - list_index, child_count
         if count > 0:
-            put_estimates(lists, which, count, best, right, row(out, k * rec.OUTPUT))
+            put_estimates(lists, list_index, count, best, right, row(out, k * rec.OUTPUT))

@@ -1,9 +1,9 @@
-"""One block: plots, gains, filters and sums of eight realisations after the other.
+"""One block of realisations: plots, gains, filters and sums, eight realisations at a time.
 
-Realisations whose normals are shifted towards a wrong fold, and the weights that make up for it.
+Realisations whose normals are shifted towards a wrong fold, and the weights that correct for the shift.
 
 The normals z of a realisation are drawn from the mixture α₀ N(0, 1) + Σ α_m N(s_m u_m, 1), u_m unit vectors. The ratio
-of the law that they should have to the one that they have is
+of the density of N(0, 1) to that of the mixture is
 
     w(z) = 1 / (α₀ + Σ α_m exp(s_m u_mᵀ z − s_m²/2)),
 
@@ -19,132 +19,152 @@ from radarsim.kernels.lanes import WIDTH, address, exponential, full, get, put, 
 from radarsim.kernels.random import add_drawn, add_weight, part_of
 from radarsim.studies.ambiguous_doppler.kernels import records as rec
 from radarsim.studies.ambiguous_doppler.kernels import steps, together
-from radarsim.studies.ambiguous_doppler.kernels.records import Banks, Sums, World, memory
+from radarsim.studies.ambiguous_doppler.kernels.records import Banks, Sums, World, work_arrays
 from radarsim.studies.ambiguous_doppler.kernels.steps import fill_gains, fill_normals, put_plots, run_merged, run_single
-from radarsim.studies.ambiguous_doppler.kernels.together import Orders, run_choosing, run_interacting, run_together
+from radarsim.studies.ambiguous_doppler.kernels.together import (
+    Orders,
+    run_interacting,
+    run_interacting_hypotheses,
+    run_intersection,
+)
 
 
 # ---- sums ------------------------------------------------------------------------------------------------------------
 @part
-def run_filters(world, banks, memory, fresh):
-    """Gains and outputs of all banks over the plots in memory; gains are made again where `fresh`."""
+def run_filters(world, banks, memory, recompute_gains):
+    """Run all banks over the plots in memory: fills in gains, if they are to be recomputed, and outputs."""
     scans, plots = world.truth.shape[0], address(memory.plots)
     sigma = address(world.sigma)
-    if fresh:
+    if recompute_gains:
         for d in range(banks.designs.shape[0]):
             fill_gains(
                 address(banks.designs[d]), sigma, scans, plots, row(address(memory.gains), d * scans * rec.GAINS)
             )
     lists = Lists(
-        address(memory.listed), address(memory.children), address(memory.parents), memory.room, memory.parents.size
+        address(memory.hypotheses), address(memory.children), address(memory.parents), memory.room, memory.parents.size
     )
     for b in range(banks.kind.size):
-        kind, part, size = banks.kind[b], banks.parts[b, 0], banks.size[b]
+        kind, design, size = banks.kind[b], banks.members[b, 0], banks.size[b]
         shares, stay = address(banks.shares[b]), banks.stay[b]
-        bank = Orders(address(banks.designs), address(banks.parts[b]), address(banks.orders[b]), size, stay)
+        bank = Orders(address(banks.designs), address(banks.members[b]), address(banks.orders[b]), size, stay)
         outputs = address(memory.out)
         out = row(outputs, b * scans * rec.OUTPUT)
         if kind == rec.WEIGHS:
-            together.run_weighing(outputs, bank, banks.reads[b], shares, scans, out)
+            together.run_fixed_shares(outputs, bank, banks.member_field[b], shares, scans, out)
         elif kind == rec.CHOOSES:
-            run_choosing(outputs, bank, banks.reads[b], shares, scans, out)
+            run_intersection(outputs, bank, banks.member_field[b], shares, scans, out)
         elif kind == rec.INTERACTS:
-            how = banks.unfolding[b]
-            if how != rec.REMEMBERS:
-                run_interacting(bank, how, sigma, world.spans, plots, out, address(memory.interacting))
+            unfolding = banks.unfolding[b]
+            if unfolding != rec.REMEMBERS:
+                run_interacting(bank, unfolding, sigma, world.spans, plots, out, address(memory.interacting_states))
                 continue
-            room = (address(memory.together), address(memory.broad), lists)
-            limits = (np.exp(-banks.deepest[b]), banks.most[b])
+            scratch = (address(memory.order_states), address(memory.broadcast_plot), lists)
+            limits = (np.exp(-banks.max_depth[b]), banks.max_hypotheses[b])
             for lane in range(WIDTH):
-                own = address(memory.out[b * scans * rec.OUTPUT * WIDTH + lane :])
-                run_together(bank, limits, sigma, world.spans, address(memory.plots[lane:]), own, room)
+                lane_output = address(memory.out[b * scans * rec.OUTPUT * WIDTH + lane :])
+                run_interacting_hypotheses(
+                    bank, limits, sigma, world.spans, address(memory.plots[lane:]), lane_output, scratch
+                )
         elif kind == rec.REMEMBERS:
             for lane in range(WIDTH):
-                steps.run_remembering(
-                    address(banks.designs[part]),
-                    banks.most[b],
-                    banks.deepest[b],
+                steps.run_hypotheses(
+                    address(banks.designs[design]),
+                    banks.max_hypotheses[b],
+                    banks.max_depth[b],
                     world.spans,
                     address(memory.plots[lane:]),
-                    address(memory.gains[part * scans * rec.GAINS * WIDTH + lane :]),
+                    address(memory.gains[design * scans * rec.GAINS * WIDTH + lane :]),
                     address(memory.out[b * scans * rec.OUTPUT * WIDTH + lane :]),
                     lists,
                 )
         elif kind == rec.MERGES:
-            run_merged(address(banks.designs[part]), sigma, world.spans, plots, out)
+            run_merged(address(banks.designs[design]), sigma, world.spans, plots, out)
         else:
-            gains = row(address(memory.gains), part * scans * rec.GAINS)
-            run_single(kind, address(banks.designs[part]), world.spans, plots, gains, out)
+            gains = row(address(memory.gains), design * scans * rec.GAINS)
+            run_single(kind, address(banks.designs[design]), world.spans, plots, gains, out)
 
 
 @inline
-def errors(estimate, plot, counted, c):
-    """Error of component c, zero where it does not count."""
-    return counted * (get(estimate, c) - get(plot, rec.TRUTH + c))
+def component_error(estimate, plot, active, c):
+    """The error of component c; zero in lanes that do not count."""
+    return active * (get(estimate, c) - get(plot, rec.TRUTH + c))
 
 
 @part
-def add_scan(plot, estimated, counted, half_span, sums):
-    """Add a scan of a filter: estimated are its rows, the baseline's and the oracle's; counted (lanes); sums addresses.
-    Gives the number of lanes whose velocity is off by over half a span."""
-    beyond, (own, base, oracle), (error, (paired, against), estimates) = full(0.0), estimated, sums
+def add_scan(plot, rows_of_estimates, active, half_span, sums):
+    """Add a scan of a filter; returns the number of lanes whose velocity is off by more than half a span.
+
+    rows_of_estimates: the filter's, the baseline's and the oracle's; active: lanes that count; sums: addresses."""
+    over_half_span, (estimate, baseline, oracle), (error, (paired, oracle_products), estimates) = (
+        full(0.0),
+        rows_of_estimates,
+        sums,
+    )
     for c in range(3):
-        e = errors(own, plot, counted, c)
-        e2, b, o = e * e, errors(base, plot, counted, c), errors(oracle, plot, counted, c)
+        e = component_error(estimate, plot, active, c)
+        e2, baseline_error, oracle_error = (
+            e * e,
+            component_error(baseline, plot, active, c),
+            component_error(oracle, plot, active, c),
+        )
         error[4 * c] += total(e)
         error[4 * c + 1] += total(e2)
         error[4 * c + 2] += total(e2 * e)
         error[4 * c + 3] += total(e2 * e2)
-        paired[c] += total(e2 * (b * b))
-        against[c] += total(e2 * (o * o))
-        estimates[c] += total(counted)
+        paired[c] += total(e2 * (baseline_error * baseline_error))
+        oracle_products[c] += total(e2 * (oracle_error * oracle_error))
+        estimates[c] += total(active)
         if c == 1:
-            beyond = where_greater(e2, full(half_span * half_span), full(1.0), full(0.0))
-    return total(beyond)
+            over_half_span = where_greater(e2, full(half_span * half_span), full(1.0), full(0.0))
+    return total(over_half_span)
 
 
 @part
 def add_calibration(out, plot, calibration):
-    """Count the lanes by the probability of the best hypothesis, and those where it is right; of plots that count."""
+    """Count the lanes with a plot in bins of the best hypothesis's probability, and those in which it is right."""
     for i in range(WIDTH):
         if plot[rec.DETECTED * WIDTH + i] > 0.0:
             p = out[rec.PROBABILITY * WIDTH + i]
-            p = p if p >= 0.0 else 0.0  # not-a-number, which the errors show, is no place in the table
-            number = 3 * min(int(p * rec.BINS), rec.BINS - 1)
-            calibration[number] += 1.0
-            calibration[number + 1] += out[rec.RIGHT * WIDTH + i]
-            calibration[number + 2] += p
+            p = p if p >= 0.0 else 0.0  # not-a-number, which the errors show, has no bin
+            offset = 3 * min(int(p * rec.BINS), rec.BINS - 1)
+            calibration[offset] += 1.0
+            calibration[offset + 1] += out[rec.RIGHT * WIDTH + i]
+            calibration[offset + 2] += p
 
 
 @part
 def add_group(world, banks, memory, sums):
     """Add the outputs of a group of eight realisations to the sums."""
     scans = world.truth.shape[0]
-    whole, out = get(address(memory.counted), 0), address(memory.out)
+    active, out = get(address(memory.active), 0), address(memory.out)
     for k in range(scans):
         plot = row(address(memory.plots), k * rec.PLOT)
-        counted = whole * get(plot, rec.STARTED)
-        put(plot, rec.DETECTED, whole * get(plot, rec.DETECTED))  # read by add_calibration, and no more after it
-        base = row(out, (banks.bank[banks.baseline] * scans + k) * rec.OUTPUT + banks.place[banks.baseline])
+        started = active * get(plot, rec.STARTED)
+        put(plot, rec.DETECTED, active * get(plot, rec.DETECTED))  # read by add_calibration, and no more after it
+        baseline = row(
+            out, (banks.bank[banks.baseline] * scans + k) * rec.OUTPUT + banks.estimate_field[banks.baseline]
+        )
         for f in range(banks.bank.size):
             bank = row(out, (banks.bank[f] * scans + k) * rec.OUTPUT)
-            oracle = base
+            oracle = baseline
             if banks.oracle >= 0:
-                oracle = row(out, (banks.bank[banks.oracle] * scans + k) * rec.OUTPUT + banks.place[banks.oracle])
+                oracle = row(
+                    out, (banks.bank[banks.oracle] * scans + k) * rec.OUTPUT + banks.estimate_field[banks.oracle]
+                )
             folds = address(sums.folds[f, k])
-            estimated, half_span = (row(bank, banks.place[f]), base, oracle), 0.5 * world.spans[k]
+            estimated, half_span = (row(bank, banks.estimate_field[f]), baseline, oracle), 0.5 * world.spans[k]
             powers, products = address(sums.error[f, k]), (address(sums.paired[f, k]), address(sums.oracle[f, k]))
-            into = powers, products, address(sums.estimates[f, k])
-            folds[rec.BEYOND_SUM] += add_scan(plot, estimated, counted, half_span, into)
-            folds[rec.RIGHT_SUM] += total(counted * get(bank, rec.RIGHT))
-            folds[rec.LISTED_SUM] += total(counted * get(bank, rec.LISTED))
-            folds[rec.COUNT_SUM] += total(counted * get(bank, rec.COUNT))
+            targets = powers, products, address(sums.estimates[f, k])
+            folds[rec.BEYOND_SUM] += add_scan(plot, estimated, started, half_span, targets)
+            folds[rec.RIGHT_SUM] += total(started * get(bank, rec.RIGHT))
+            folds[rec.LISTED_SUM] += total(started * get(bank, rec.LISTED))
+            folds[rec.COUNT_SUM] += total(started * get(bank, rec.COUNT))
             kind, unfolding = banks.kind[banks.bank[f]], banks.unfolding[banks.bank[f]]
             if kind == rec.REMEMBERS or (kind == rec.INTERACTS and unfolding == rec.REMEMBERS):
                 add_calibration(bank, plot, address(sums.calibration[f, k]))
             if kind >= rec.INTERACTS:
                 for order in range(3):
-                    w = counted * get(bank, rec.WEIGHTS + order)
+                    w = started * get(bank, rec.WEIGHTS + order)
                     sums.orders[f, k, order, 0] += total(w)
                     sums.orders[f, k, order, 1] += total(w * w)
 
@@ -154,10 +174,10 @@ def add_block(world, banks, memory, sums, first, count):
     """Add the realisations first … first + count - 1 to the sums."""
     for group in range(0, count, WIDTH):
         for n in range(WIDTH):
-            memory.counted[n] = 1.0 if group + n < count else 0.0
+            memory.active[n] = 1.0 if group + n < count else 0.0
         fill_normals(world, first + group, memory.normals)
         put_plots(world, first + group, memory.normals, memory.plots)
-        run_filters(world, banks, memory, group == 0 or world.detection < 1.0)
+        run_filters(world, banks, memory, group == 0 or world.detection_probability < 1.0)
         add_group(world, banks, memory, sums)
 
 
@@ -170,78 +190,81 @@ def fill_outputs(world, banks, memory, first):
 
 
 @kernel
-def fill_drawn(world, normals, plots, first, measured, truth):
-    """`drawn_plots` into measured (2, K, n) and truth (3, K, n or 0), n whole eights; normals, plots: work arrays."""
+def fill_plots_and_truth(world, normals, plots, first, measured, truth):
+    """Fill in measured (2, K, n) and truth (3, K, n or 0) of `simulate_plots`, n a multiple of eight.
+
+    normals, plots: work arrays."""
     scans, groups = measured.shape[1], measured.shape[2] // WIDTH
     for g in range(groups):
         fill_normals(world, first + g * WIDTH, normals)
         put_plots(world, first + g * WIDTH, normals, plots)
         for k in range(scans):
             scan = row(address(plots), k * rec.PLOT)
-            detected, half = get(scan, rec.DETECTED), full(0.5)
+            detected, threshold = get(scan, rec.DETECTED), full(0.5)
             for m in range(2):  # RANGE, VELOCITY
-                value = where_greater(detected, half, get(scan, m), full(np.nan))
+                value = where_greater(detected, threshold, get(scan, m), full(np.nan))
                 put(address(measured), (m * scans + k) * groups + g, value)
             if truth.shape[2] > 0:
                 for c in range(3):
                     put(address(truth), (c * scans + k) * groups + g, get(scan, rec.TRUTH + c))
 
 
-def drawn_plots(world: World, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Range and folded velocity (count, K, 2) of realisations first …, not-a-number where missed, and the truth (count,
-    K, 3), a view that cannot be written where all have the same."""
-    scans, eights, several = len(world.t), -(-count // WIDTH) * WIDTH, world.spread.any()
-    measured, truth = aligned_zeros(2, scans, eights), aligned_zeros(3, scans, eights if several else 0)
-    single = world._replace(joint=np.zeros_like(world.joint))  # no velocity is unfolded from that of the scan before
-    fill_drawn(single, rows(2 + 2 * scans), rows(scans * rec.PLOT), first, measured, truth)
-    same = np.broadcast_to(world.truth, (count, scans, 3))
-    return measured.transpose(2, 1, 0)[:count], truth.transpose(2, 1, 0)[:count] if several else same
+def simulate_plots(world: World, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Range and folded velocity (count, K, 2) of realisations first …, not-a-number where missed, and the truth.
+
+    The truth (count, K, 3) is a read-only view if all realisations have the same."""
+    scans, padded_count, draws_truth = len(world.t), -(-count // WIDTH) * WIDTH, world.spread.any()
+    measured, truth = aligned_zeros(2, scans, padded_count), aligned_zeros(3, scans, padded_count if draws_truth else 0)
+    folded_world = world._replace(joint_spans=np.zeros_like(world.joint_spans))  # no remainders are solved
+    fill_plots_and_truth(folded_world, rows(2 + 2 * scans), rows(scans * rec.PLOT), first, measured, truth)
+    common_truth = np.broadcast_to(world.truth, (count, scans, 3))
+    return measured.transpose(2, 1, 0)[:count], truth.transpose(2, 1, 0)[:count] if draws_truth else common_truth
 
 
 def simulate_block(world: World, banks: Banks, sums: Sums, first: int, count: int) -> None:
     """Add the errors and folds of realisations first … first + count - 1 to the sums."""
-    add_block(world, banks, memory(len(world.t), banks), sums, first, count)
+    add_block(world, banks, work_arrays(len(world.t), banks), sums, first, count)
 
 
-def errors_of(world: World, banks: Banks, first: int, count: int) -> np.ndarray:
+def simulate_errors(world: World, banks: Banks, first: int, count: int) -> np.ndarray:
     """The errors (F, count, K, 3) of realisations first … first + count - 1; NaN where a filter has not started."""
-    scans, work = len(world.t), memory(len(world.t), banks)
-    plots, out = work.plots.reshape(scans, rec.PLOT, WIDTH), work.out.reshape(-1, scans, rec.OUTPUT, WIDTH)
-    rows_of_estimates = banks.place[:, None] + np.arange(3)
-    found = np.empty((len(banks.bank), -(-count // WIDTH), WIDTH, scans, 3))
-    for group in range(found.shape[1]):
-        fill_outputs(world, banks, work, first + group * WIDTH)
+    scans, arrays = len(world.t), work_arrays(len(world.t), banks)
+    plots, out = arrays.plots.reshape(scans, rec.PLOT, WIDTH), arrays.out.reshape(-1, scans, rec.OUTPUT, WIDTH)
+    rows_of_estimates = banks.estimate_field[:, None] + np.arange(3)
+    errors_by_group = np.empty((len(banks.bank), -(-count // WIDTH), WIDTH, scans, 3))
+    for group in range(errors_by_group.shape[1]):
+        fill_outputs(world, banks, arrays, first + group * WIDTH)
         e = out[banks.bank[:, None], :, rows_of_estimates] - plots[:, rec.TRUTH : rec.TRUTH + 3].swapaxes(0, 1)
         e[:, :, plots[:, rec.STARTED] == 0] = np.nan
-        found[:, group] = e.transpose(0, 3, 2, 1)
-    return found.reshape(len(found), -1, scans, 3)[:, :count]
+        errors_by_group[:, group] = e.transpose(0, 3, 2, 1)
+    return errors_by_group.reshape(len(errors_by_group), -1, scans, 3)[:, :count]
 
 
-def simulated(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray]:
+def simulate_outputs(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray]:
     """Plots (K, PLOT, 8) and outputs (B, K, OUTPUT, 8) of the realisations first … first + 7, see `records`."""
-    plots, out, _ = simulated_lists(world, banks, first)
+    plots, out, _ = simulate_hypotheses(world, banks, first)
     return plots, out
 
 
-def simulated_lists(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """As `simulated`, and the columns that the last list of hypotheses is left in, see `kernels.hypotheses.Lists`."""
-    scans, work = len(world.t), memory(len(world.t), banks)
-    fill_outputs(world, banks, work, first)
+def simulate_hypotheses(world: World, banks: Banks, first: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `simulate_outputs`, and the columns of the last list of hypotheses, see `kernels.hypotheses.Lists`."""
+    scans, arrays = len(world.t), work_arrays(len(world.t), banks)
+    fill_outputs(world, banks, arrays, first)
     shape = (len(banks.kind), scans, rec.OUTPUT, WIDTH)
-    return work.plots.reshape(scans, rec.PLOT, WIDTH), work.out.reshape(shape), work.listed
+    return arrays.plots.reshape(scans, rec.PLOT, WIDTH), arrays.out.reshape(shape), arrays.hypotheses
 
 
 # ---- rare ------------------------------------------------------------------------------------------------------------
-# A fold of the best hypothesis is wrong; the velocity is off by over half the span; a fold is wrong, and the right
-# hypothesis left the list at a scan that left it as long as it may be.
+# A fold of the best hypothesis is wrong; the velocity is off by more than half the span; a fold is wrong, and the right
+# hypothesis was dropped at a scan that filled the list.
 WRONG, BEYOND, FULL, EVENTS = 0, 1, 2, 3
 
 
 class Mixture(NamedTuple):
-    """A mixture of M shifted laws beside the plain one, over normals as `steps.fill_normals` has them."""
+    """A mixture of the plain law and M shifted ones, over normals as `steps.fill_normals` has them."""
 
-    key: np.ndarray  #: (2,) of the stream that says which part a realisation is drawn from
-    cumulative: np.ndarray  #: (M + 1,) running sums of the shares α, the plain one first; the last is 1
+    key: np.ndarray  #: (2,) of the stream that decides from which component a realisation is drawn
+    cumulative: np.ndarray  #: (M + 1,) running sums of the shares α, the plain law first; the last is 1
     shift: np.ndarray  #: (M,) s_m
     units: np.ndarray  #: (M, 2 + 2K) u_m
 
@@ -249,72 +272,72 @@ class Mixture(NamedTuple):
 class Losses(NamedTuple):
     """Weighted sums over realisations."""
 
-    events: np.ndarray  #: (F, K, EVENTS, 4) Σw, Σw², the number, and Σw⁴ of the realisations that have it
-    drawn: np.ndarray  #: (3,) realisations that are plain, and Σw, Σw² of all
+    events: np.ndarray  #: (F, K, EVENTS, 4) Σw, Σw², the number, and Σw⁴ of the realisations with the event
+    drawn: np.ndarray  #: (3,) number of plain realisations, and Σw, Σw² of all
 
 
 @part
-def weigh(mixture, normals, weights):
-    """The weights of eight realisations into a row, from the rows of their normals; both are addresses."""
+def put_weights(mixture, normals, weights):
+    """Write the weights of eight realisations into a row, from the rows of their normals; both are addresses."""
     density = full(mixture.cumulative[0])
     for m in range(mixture.shift.size):
-        along, shift = full(0.0), mixture.shift[m]
+        projection, shift = full(0.0), mixture.shift[m]
         for r in range(mixture.units.shape[1]):
-            along = along + mixture.units[m, r] * get(normals, r)
+            projection = projection + mixture.units[m, r] * get(normals, r)
         share = mixture.cumulative[m + 1] - mixture.cumulative[m]
-        density = density + share * exponential(shift * along - 0.5 * shift * shift)
+        density = density + share * exponential(shift * projection - 0.5 * shift * shift)
     put(weights, 0, 1.0 / density)
 
 
 @kernel
-def fill_shifted(world, mixture, first, normals, chosen, weights):
-    """Normals of realisations first … first + 7, each shifted by the part that it is drawn from; chosen, weights (8,).
+def fill_shifted(world, mixture, first, normals, components, weights):
+    """Draw normals of realisations first … first + 7, each shifted by its component of the mixture.
 
-    chosen is the number of the part, 0 the plain law."""
+    Filled: components (8,), 0 the plain law, and weights (8,)."""
     fill_normals(world, first, normals)
     for n in range(WIDTH):
-        chosen[n] = m = part_of(mixture.key, mixture.cumulative, first + n)
-        if m > 0:
+        components[n] = component = part_of(mixture.key, mixture.cumulative, first + n)
+        if component > 0:
             for r in range(mixture.units.shape[1]):
-                normals[WIDTH * r + n] += mixture.shift[m - 1] * mixture.units[m - 1, r]
-    weigh(mixture, address(normals), address(weights))
+                normals[WIDTH * r + n] += mixture.shift[component - 1] * mixture.units[component - 1, r]
+    put_weights(mixture, address(normals), address(weights))
 
 
 @part
 def add_events(world, banks, memory, weights, size, losses):
-    """Add what befell the first `size` of a group of eight realisations, by their weights."""
+    """Add the weights of the first `size` realisations of a group of eight to the events that they have."""
     scans, out = world.truth.shape[0], address(memory.out)
     for f in range(banks.bank.size):
-        most, gone, crowded = banks.most[banks.bank[f]], 0, 0  # a bit for each of the eight
+        max_hypotheses, lost, crowded_out = banks.max_hypotheses[banks.bank[f]], 0, 0  # a bit for each lane
         for k in range(scans):
             plot = row(address(memory.plots), k * rec.PLOT)
             bank = row(out, (banks.bank[f] * scans + k) * rec.OUTPUT)
-            velocity = row(bank, banks.place[f] + 1)
+            velocity = row(bank, banks.estimate_field[f] + 1)
             for n in range(size):
-                if bank[rec.LISTED * WIDTH + n] == 0.0 and gone >> n & 1 == 0:
-                    gone |= 1 << n
-                    crowded |= (1 if bank[rec.COUNT * WIDTH + n] >= most else 0) << n
+                if bank[rec.LISTED * WIDTH + n] == 0.0 and lost >> n & 1 == 0:
+                    lost |= 1 << n
+                    crowded_out |= (1 if bank[rec.COUNT * WIDTH + n] >= max_hypotheses else 0) << n
                 if bank[rec.RIGHT * WIDTH + n] == 0.0:
                     add_weight(weights[n], losses.events[f, k], WRONG)
-                    if crowded >> n & 1 == 1:
+                    if crowded_out >> n & 1 == 1:
                         add_weight(weights[n], losses.events[f, k], FULL)
                 if abs(velocity[n] - plot[(rec.TRUTH + 1) * WIDTH + n]) > 0.5 * world.spans[k]:
                     add_weight(weights[n], losses.events[f, k], BEYOND)
 
 
 @kernel
-def add_weighted_block(world, banks, mixture, memory, room, sums, losses, first, count):
-    """Add the realisations first … first + count - 1: all to the losses, by their weights, plain ones to the sums."""
-    chosen, weights = room
+def add_weighted_block(world, banks, mixture, memory, scratch, sums, losses, first, count):
+    """Add the realisations first … first + count - 1: all to the losses, with their weights, plain ones to the sums."""
+    components, weights = scratch
     for group in range(0, count, WIDTH):
-        fill_shifted(world, mixture, first + group, memory.normals, chosen, weights)
+        fill_shifted(world, mixture, first + group, memory.normals, components, weights)
         put_plots(world, first + group, memory.normals, memory.plots)
         run_filters(world, banks, memory, group == 0)
         size = min(WIDTH, count - group)
         for n in range(WIDTH):
-            memory.counted[n] = 1.0 if n < size and chosen[n] == 0 else 0.0
+            memory.active[n] = 1.0 if n < size and components[n] == 0 else 0.0
         for n in range(size):
-            add_drawn(weights[n], memory.counted[n], losses.drawn)
+            add_drawn(weights[n], memory.active[n], losses.drawn)
         add_events(world, banks, memory, weights, size, losses)
         add_group(world, banks, memory, sums)
 
@@ -322,6 +345,6 @@ def add_weighted_block(world, banks, mixture, memory, room, sums, losses, first,
 def simulate_weighted_block(
     world: World, banks: Banks, mixture: Mixture, sums: Sums, losses: Losses, first: int, count: int
 ) -> None:
-    """Add realisations first … first + count - 1, each plot of which is detected."""
-    room = np.zeros(WIDTH, np.int64), rows(1)
-    add_weighted_block(world, banks, mixture, memory(len(world.t), banks), room, sums, losses, first, count)
+    """Add realisations first … first + count - 1 of a case without missed plots."""
+    scratch = np.zeros(WIDTH, np.int64), rows(1)
+    add_weighted_block(world, banks, mixture, work_arrays(len(world.t), banks), scratch, sums, losses, first, count)
