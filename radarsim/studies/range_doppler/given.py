@@ -96,7 +96,9 @@ def checked(one: GivenGains, scans: Scans) -> np.ndarray:
     made = np.where(read[:, None, :], made, 0.0)
     if not np.isfinite(made).all():
         k = int(np.argmax(~np.isfinite(made).all(axis=(1, 2)))) + 1
-        raise fault(one.gains, f"must make finite gains, those of scan {k} are {made[k - 1].tolist()}", of=_name(one))
+        raise fault(
+            one.gains, f"must make finite gains, those of scan {k} are {made[k - 1].tolist()}", owner=_name(one)
+        )
     return made
 
 
@@ -107,7 +109,7 @@ def noise_of(one: GivenGains) -> Callable[[float], np.ndarray]:
         made = _numbers(one, one.noise, (3, 3), dt_s)
         if not (np.isfinite(made).all() and is_covariance(made)):
             words = f"must give a covariance, finite, symmetric and not negative, got {made.tolist()}"
-            raise fault(one.noise, words, of=_name(one))
+            raise fault(one.noise, words, owner=_name(one))
         return made
 
     return noise
@@ -119,13 +121,13 @@ def _name(one: GivenGains) -> str:
 
 def _numbers(one: GivenGains, function: Callable[..., Any], shape: tuple[int, ...], *arguments: Any) -> np.ndarray:
     """The numbers of this shape that a function of a filter gives. Raises ConfigError where it gives others."""
-    given = call(function, *arguments, of=_name(one))
+    given = call(function, *arguments, owner=_name(one))
     try:
         made = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise fault(function, f"must give numbers {shape}, got {given!r}"[:200], of=_name(one)) from None
+        raise fault(function, f"must give numbers {shape}, got {given!r}"[:200], owner=_name(one)) from None
     if made.shape != shape:
-        raise fault(function, f"must give numbers {shape}, got {made.shape or 'one number'}", of=_name(one))
+        raise fault(function, f"must give numbers {shape}, got {made.shape or 'one number'}", owner=_name(one))
     return made
 
 
