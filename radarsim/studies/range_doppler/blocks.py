@@ -77,4 +77,4 @@ def sums(simulated_problem: Problem, layout_of_sums: Layout, first: int, count: 
         return layout_of_sums.pack(**block_sums._asdict())
     linear_sums = linear.Sums(**{name: np.zeros(shape) for name, shape in layout_of_sums.shapes.items()})
     linear.simulate_block(simulated_problem, first, count, linear_sums)
-    return layout_of_sums.pack(**block_sums._asdict())
+    return layout_of_sums.pack(**linear_sums._asdict())

@@ -217,8 +217,10 @@ class Keys(fields.Lasting):
 
     def _sees_every_plot(self, i: int, filter_keys: FilterKeys) -> Iterator[At]:
         if not isinstance(filter_keys, Filter) and self.radar.detection_probability < 1:
-            message = f"must be 1 with filter {filter_keys.name}: "
+            message = (
+                f"must be 1 with filter {filter_keys.name}: "
                 f"gains of kind {filter_keys.kind} are made for a plot at every scan"
+            )
             yield at("radar.detection_probability", message)
 
     @cross_check

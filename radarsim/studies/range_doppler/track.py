@@ -146,9 +146,9 @@ class _Starting(ABC):
 
     @abstractmethod
     def after(
-        self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
+        self, k: int, t: np.ndarray, z: np.ndarray, is_used: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What `feed` gives of the rows from k on, before which the filter has started; is_used: the numbers it takes."""
+        """The outputs of `feed` for the rows from k on, where the filter has started; is_used: the numbers that it takes."""
 
     def _begin(self, t: float, z: np.ndarray) -> None:
         """Take one more plot, and start from all so far where they suffice."""
