@@ -148,7 +148,7 @@ class _Starting(ABC):
     def after(
         self, k: int, t: np.ndarray, z: np.ndarray, is_used: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The outputs of `feed` for the rows from k on, where the filter has started; is_used: the numbers that it takes."""
+        """The outputs of `feed` for the rows from k on, where the filter has started; is_used: the numbers it takes."""
 
     def _begin(self, t: float, z: np.ndarray) -> None:
         """Take one more plot, and start from all so far where they suffice."""
