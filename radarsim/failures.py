@@ -22,8 +22,8 @@ from radarsim.errors import OF_AUTHORS, ConfigError, RadarsimError
 LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), str(Path(__file__).parent))
 COMPILING = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
 OF_NUMPY = "__array_ufunc__"  # in NumPy's error about the sine of eight realisations
-LONGEST = 300  # characters of a message
-MOST_FRAMES = 8  # of an author's code that are shown
+MAX_MESSAGE_LENGTH = 300  # characters of a message
+MAX_FRAMES = 8  # of an author's code that are shown
 
 _of: ContextVar[str] = ContextVar("_of", default="")
 homes: Callable[[], Iterable[Path]] = tuple  # the folders, or single files, of packages that offer studies or filters
@@ -46,12 +46,12 @@ def place(error: BaseException, installed: bool = False, function: Any = None) -
     function: the author's function; other code in its folder is the author's too.
     """
     code = _code(function)
-    within = (*homes(), *([Path(os.path.realpath(code.co_filename)).parent] if code else []))
+    user_folders = (*homes(), *([Path(os.path.realpath(code.co_filename)).parent] if code else []))
     places = list(_places(error))
-    own = [one for one in places if any(map(Path(os.path.realpath(one.file)).is_relative_to, within))]
-    if not own and not installed:
-        own = [one for one in places if not _is_library(one.file)]
-    return own[-1] if own else None
+    user_lines = [line for line in places if any(map(Path(os.path.realpath(line.file)).is_relative_to, user_folders))]
+    if not user_lines and not installed:
+        user_lines = [line for line in places if not _is_library(line.file)]
+    return user_lines[-1] if user_lines else None
 
 
 def _places(error: BaseException) -> Iterator[Place]:
@@ -60,8 +60,8 @@ def _places(error: BaseException) -> Iterator[Place]:
         yield Place(frame.f_code.co_filename, line, frame.f_code.co_qualname.rpartition("<locals>.")[2])
     if isinstance(error, SyntaxError) and error.filename:
         yield Place(error.filename, error.lineno or 1)
-    elif found := re.search(r'File "([^"]+)", line (\d+)', _message(error)):
-        yield Place(found[1], int(found[2]))
+    elif match := re.search(r'File "([^"]+)", line (\d+)', _message(error)):
+        yield Place(match[1], int(match[2]))
 
 
 def _code(function: Any) -> CodeType | None:
@@ -75,22 +75,24 @@ def _is_library(file: str) -> bool:
     return file.startswith(("<", *LIBRARIES)) or "site-packages" in file
 
 
-def frames(error: BaseException, own: str) -> list[str]:
-    """The last lines of an author's files, in the folder `own`, that led to an error, the deepest last."""
-    every = [one for one in traceback.extract_tb(error.__traceback__) if Path(one.filename).is_relative_to(own)]
-    every = [one for one in every if not _is_library(os.path.relpath(one.filename, own))]
-    return [f"  {one.filename}:{one.lineno}, in {one.name}: {one.line}" for one in every[-MOST_FRAMES:]]
+def frames(error: BaseException, folder: str) -> list[str]:
+    """The last lines of an author's files, in a folder, that led to an error, the deepest last."""
+    user_frames = [
+        frame for frame in traceback.extract_tb(error.__traceback__) if Path(frame.filename).is_relative_to(folder)
+    ]
+    user_frames = [frame for frame in user_frames if not _is_library(os.path.relpath(frame.filename, folder))]
+    return [f"  {frame.filename}:{frame.lineno}, in {frame.name}: {frame.line}" for frame in user_frames[-MAX_FRAMES:]]
 
 
 def words(error: BaseException) -> str:
     """An error in one line: its kind, and the first non-empty line of its message."""
     message = str(error.msg) if isinstance(error, SyntaxError) else _message(error)
     lines = [line.strip() for line in message.splitlines() if line.strip() and not COMPILING.match(line)]
-    line = lines[0][:LONGEST] if lines else ""
+    line = lines[0][:MAX_MESSAGE_LENGTH] if lines else ""
     if OF_NUMPY in message:
         return "a number of a realisation is none of NumPy's: radarsim.kernels.traced has sqrt, exp, sin, … for it"
-    whole = isinstance(error, RadarsimError) or getattr(error, "for_the_author", False)
-    kind = "" if whole else type(error).__name__
+    is_complete = isinstance(error, RadarsimError) or getattr(error, "for_the_author", False)
+    kind = "" if is_complete else type(error).__name__
     return ": ".join(filter(None, (kind, line)))
 
 
@@ -103,39 +105,39 @@ def _message(error: BaseException) -> str:
 
 def summary(error: BaseException) -> str:
     """An error in one line, with its place in brackets."""
-    at = place(error)
-    return f"{words(error)} ({at})" if at else words(error)
+    location = place(error)
+    return f"{words(error)} ({location})" if location else words(error)
 
 
 @contextmanager
 def of_study(name: str) -> Iterator[None]:
     """Functions named by `call` and `fault` within it belong to this study."""
-    before = _of.set(f"study {name}: ")
+    token = _of.set(f"study {name}: ")
     try:
         yield
     finally:
-        _of.reset(before)
+        _of.reset(token)
 
 
-def call(function: Callable[..., Any], *arguments: Any, of: str = "") -> Any:
+def call(function: Callable[..., Any], *arguments: Any, owner: str = "") -> Any:
     """The value of an author's function; ConfigError with its file and line where it fails.
 
-    of: what the function belongs to, if its name does not show it; by default from `of_study`.
+    owner: what the function belongs to, if its name does not show it; by default from `of_study`.
     """
     try:
         return function(*arguments)
     except ConfigError:
         raise
     except OF_AUTHORS as error:
-        at = place(error, function=function)
-        if at is None:
-            raise fault(function, words(error), of=of) from error
-        raise ConfigError(f"{at}: {of or _of.get()}{at.function}: {words(error)}") from error
+        location = place(error, function=function)
+        if location is None:
+            raise fault(function, words(error), owner=owner) from error
+        raise ConfigError(f"{location}: {owner or _of.get()}{location.function}: {words(error)}") from error
 
 
-def fault(function: Any, message: str, name: str = "", of: str = "") -> ConfigError:
+def fault(function: Any, message: str, name: str = "", owner: str = "") -> ConfigError:
     """An error that names a function by its file and line."""
     code = _code(function)
-    where = f"{code.co_filename}:{code.co_firstlineno}: " if code else ""
-    known = getattr(function, "__qualname__", "").rpartition("<locals>.")[2]
-    return ConfigError(f"{where}{of or _of.get()}{name or known or repr(function)[:40]}: {message}")
+    location = f"{code.co_filename}:{code.co_firstlineno}: " if code else ""
+    function_name = getattr(function, "__qualname__", "").rpartition("<locals>.")[2]
+    return ConfigError(f"{location}{owner or _of.get()}{name or function_name or repr(function)[:40]}: {message}")

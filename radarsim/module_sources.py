@@ -114,8 +114,8 @@ def is_users_module(top: str) -> bool:
     spec = module_spec(top)
     if spec is None:
         return False
-    places = [spec.origin] if spec.has_location and spec.origin else list(spec.submodule_search_locations or [])
-    return any(not is_of_programs(place) for place in places)
+    paths = [spec.origin] if spec.has_location and spec.origin else list(spec.submodule_search_locations or [])
+    return any(not is_of_programs(path) for path in paths)
 
 
 def is_within(path: str, folder: str) -> bool:
@@ -127,7 +127,7 @@ def is_within(path: str, folder: str) -> bool:
 def folders_of_programs() -> tuple[str, ...]:
     """Folders of Python, of libraries and of radarsim, whose files are no data of the user's."""
     paths = {PACKAGE, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values()}
-    return tuple({place for path in paths for place in (path, os.path.realpath(path)) if place != os.sep})
+    return tuple({folder for path in paths for folder in (path, os.path.realpath(path)) if folder != os.sep})
 
 
 def is_of_programs(path: str) -> bool:

@@ -155,7 +155,7 @@ def brought_up(text: str) -> str:
     forms, file = 3 if "nplurals=3" in text else 2, ""
     for (context, message, plural), places in sorted(found().items(), key=lambda pair: (pair[1][0], pair[0])):
         before = old.get((context, message))
-        said = dict(before.said) if before and before.plural == plural else {}
+        said = dict(before.translations) if before and before.plural == plural else {}
         said = said or dict.fromkeys(range(forms if plural else 1), "")
         made.append(catalogue.Entry(message, context, plural, said, [f"#: {places[0]}"] * (places[0] != file)))
         file = places[0]

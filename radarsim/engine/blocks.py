@@ -125,34 +125,34 @@ def maximal(nodes: Collection[Node], stop: int) -> list[Node]:
     """Those of the nodes that end by block `stop` and are not contained in another such node, from left to right."""
     inside = {node for node in nodes if node.stop <= stop}
     highest = max((node.level for node in inside), default=0)
-    top = (node for node in inside if not any(other in inside for other in node.above(highest)))
+    top = (node for node in inside if not any(larger in inside for larger in node.above(highest)))
     return sorted(top, key=lambda node: node.first)
 
 
 def gaps(nodes: Collection[Node], stop: int, start: int = 0) -> list[tuple[int, int]]:
     """Runs (first, stop) of the blocks start … stop − 1 outside all of the nodes, which do not overlap."""
-    found, first = [], start
+    runs, first = [], start
     for node in sorted(nodes, key=lambda node: node.first):
         if first < min(node.first, stop):
-            found.append((first, min(node.first, stop)))
+            runs.append((first, min(node.first, stop)))
         first = max(first, node.stop)
-    return [*found, (first, stop)] if first < stop else found
+    return [*runs, (first, stop)] if first < stop else runs
 
 
 def share_of(realisations: int, block: int, part: tuple[int, int]) -> tuple[int, int, int]:
     """A share, as (2, 3) the second of three: its full blocks first … stop − 1, the realisations of its partial one."""
-    full, rest = divmod(realisations, block)
-    first, stop = (min(share_bound(full + (rest > 0), bound, part[1]), full) for bound in (part[0] - 1, part[0]))
-    return first, stop, rest if part[0] == part[1] else 0
+    full, partial = divmod(realisations, block)
+    first, stop = (min(share_bound(full + (partial > 0), bound, part[1]), full) for bound in (part[0] - 1, part[0]))
+    return first, stop, partial if part[0] == part[1] else 0
 
 
-def share_bound(blocks: int, number: int, of: int) -> int:
-    """The block after the last of share `number` of `of`."""
-    return blocks * number // of
+def share_bound(blocks: int, number: int, shares: int) -> int:
+    """The block after the last one of share `number` of so many shares."""
+    return blocks * number // shares
 
 
 def added(left: Sums, right: Sums, first: int) -> Sums:
-    """left + right; NonFiniteError if that overflows. `first` is the first realisation of left, for the message."""
+    """Sum of neighbouring sums; NonFiniteError if it overflows. `first`, the first realisation, is for the message."""
     with np.errstate(over="ignore", invalid="ignore"):
         both = left + right
     if not np.isfinite(both.values).all():
@@ -183,8 +183,8 @@ def _merged(work: Work, first: int, count: int) -> np.ndarray:
     for number, start in enumerate(range(first, first + count, block)):
         values = work.simulate(start, min(block, count))
         if not isinstance(values, np.ndarray) or values.dtype != np.float64 or values.shape != shape:
-            given = f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
-            raise ValueError(f"simulate({start}, …): expected sums float64 {shape}, got {given}")
+            received = f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
+            raise ValueError(f"simulate({start}, …): expected sums float64 {shape}, got {received}")
         while number & 1:
             values = waiting.pop() + values
             number >>= 1

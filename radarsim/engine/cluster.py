@@ -110,8 +110,8 @@ def _exposed(key: str) -> str | None:
     if not hasattr(os, "geteuid"):
         return None
     status = os.stat(key)
-    others = 0o077 if status.st_uid == os.geteuid() else 0o007  # root may let a group read its keys
-    return "holds a private key and can be read by other users: chmod 600" if status.st_mode & others else None
+    foreign_access = 0o077 if status.st_uid == os.geteuid() else 0o007  # root may let a group read its keys
+    return "holds a private key and can be read by other users: chmod 600" if status.st_mode & foreign_access else None
 
 
 def _check(distributed: ModuleType, address: str) -> None:
@@ -181,9 +181,9 @@ class Cluster:
             self._own = _Processes(workers, address, str(dask.config.serialize(settings)))
         self._wait_for_workers(workers or 1)
 
-    def _wait_for_workers(self, wanted: int) -> None:
+    def _wait_for_workers(self, required: int) -> None:
         end = time.monotonic() + WORKERS_S
-        while self._count() < wanted:
+        while self._count() < required:
             if time.monotonic() > end:
                 self.close()
                 raise ConfigError(
@@ -216,8 +216,8 @@ class Cluster:
         """Submit a task; returns at once."""
         number = next(self._numbers)
         key = f"radarsim-{work.identity[:16]}-{piece.name}-{number}"
-        given = (pickle.dumps(work), work.identity, piece)
-        future = self._client.submit(_attempted, *given, key=key, pure=False, priority=-number)
+        arguments = (pickle.dumps(work), work.identity, piece)
+        future = self._client.submit(_attempted, *arguments, key=key, pure=False, priority=-number)
         self._tasks[key] = future, work, piece
         future.add_done_callback(self._done.put)
 

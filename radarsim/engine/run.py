@@ -142,8 +142,8 @@ class Signals:
         """The next of our signals, 0 when patience runs out first, None when the context is left."""
         end = None if patience_s is None else time.monotonic() + patience_s
         while True:
-            left = None if end is None else max(0.0, end - time.monotonic())
-            if not select.select([self._pipe], [], [], left)[0]:
+            remaining = None if end is None else max(0.0, end - time.monotonic())
+            if not select.select([self._pipe], [], [], remaining)[0]:
                 return 0
             number = os.read(self._pipe, 1)
             if not number:
@@ -424,13 +424,13 @@ class Dispatch:
 
     def _tasks(self, pace: Pace) -> Iterator[Node | Partial]:
         missing = self.missing()
-        left = sum(stop - first for first, stop in missing)
+        blocks_left = sum(stop - first for first, stop in missing)
         for first, stop in missing:
             while first < stop:
-                node = widest(first, stop, pace.level(left))
+                node = widest(first, stop, pace.level(blocks_left))
                 yield node
                 first = node.stop
-                left -= 1 << node.level
+                blocks_left -= 1 << node.level
         if self.rest and self.partial is None:
             yield Partial(self.full, self.rest)
 
@@ -493,8 +493,8 @@ class Run(Dispatch):
         self.total = self._writer.store.read(Total(self.asked))
         if self.total is None:
             self._read_pieces(self._writer)
-        held = [self.total] if self.total is not None else self.pieces().values()
-        self.from_store = sum(sums.count for sums in held)
+        sums_read = [self.total] if self.total is not None else self.pieces().values()
+        self.from_store = sum(sums.count for sums in sums_read)
         return self.from_store == self.asked
 
     def finished(self, stopped: str | None) -> Collected:

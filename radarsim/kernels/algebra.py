@@ -1,4 +1,4 @@
-"""The algebra of Kalman filters with three states a coordinate, on whatever adds and multiplies.
+"""The algebra of Kalman filters with three states a coordinate, for plain numbers, arrays and lanes.
 
 Python calls functions marked `inline` as they are, and kernels have them copied into them: written once, for plain
 numbers, arrays of NumPy, and in kernels the lanes of `radarsim.kernels.lanes`. This module loads no compiler;
@@ -103,29 +103,40 @@ def predicted_information(Y, dt):
 
 # ---- an update by one number --------
 @inline
-def take_value(P, R, taken):
+def take_value(P, R, present):
     """Covariance after a measured value of variance R, its gain (3), and the innovation's variance S.
 
-    taken is 1, or 0 where there is none: then P stays as it is and the gain is zero. R/S multiplies what a difference
+    present is 1, or 0 where there is none: then P stays as it is and the gain is zero. R/S multiplies what a difference
     of large numbers would leave: P - P₀ P₀ᵀ/S has P₀₀ R/S in its first row."""
     S = P[0] + R
-    use = taken / S
-    left = 1.0 - taken + R * use
+    use = present / S
+    share_left = 1.0 - present + R * use
     g = P[0] * use, P[1] * use, P[2] * use
-    return (P[0] * left, P[1] * left, P[2] * left, P[3] - g[1] * P[1], P[4] - g[1] * P[2], P[5] - g[2] * P[2]), g, S
+    return (
+        (
+            P[0] * share_left,
+            P[1] * share_left,
+            P[2] * share_left,
+            P[3] - g[1] * P[1],
+            P[4] - g[1] * P[2],
+            P[5] - g[2] * P[2],
+        ),
+        g,
+        S,
+    )
 
 
 @inline
-def take_rate(P, R, taken):
+def take_rate(P, R, present):
     """As `take_value`, of a measured rate: rate and value change places."""
-    (p3, p1, p4, p0, p2, p5), (g1, g0, g2), S = take_value((P[3], P[1], P[4], P[0], P[2], P[5]), R, taken)
+    (p3, p1, p4, p0, p2, p5), (g1, g0, g2), S = take_value((P[3], P[1], P[4], P[0], P[2], P[5]), R, present)
     return (p0, p1, p2, p3, p4, p5), (g0, g1, g2), S
 
 
 @inline
-def take_second_rate(P, R, taken):
+def take_second_rate(P, R, present):
     """As `take_value`, of a measured second rate: it and the value change places."""
-    (p5, p4, p2, p3, p1, p0), (g2, g1, g0), S = take_value((P[5], P[4], P[2], P[3], P[1], P[0]), R, taken)
+    (p5, p4, p2, p3, p1, p0), (g2, g1, g0), S = take_value((P[5], P[4], P[2], P[3], P[1], P[0]), R, present)
     return (p0, p1, p2, p3, p4, p5), (g0, g1, g2), S
 
 
@@ -136,12 +147,12 @@ TAKE = take_value, take_rate, take_second_rate  # by the number of the component
 @inline
 def correct_value(P, R, g):
     """Covariance of an error after a value, with an error of variance R, was taken with the gain g (3)."""
-    left, d1, d2 = 1.0 - g[0], P[1] - g[1] * P[0], P[2] - g[2] * P[0]
+    unweighted, d1, d2 = 1.0 - g[0], P[1] - g[1] * P[0], P[2] - g[2] * P[0]
     n0, n1, n2 = R * g[0], R * g[1], R * g[2]
     return (
-        left * left * P[0] + n0 * g[0],
-        left * d1 + n0 * g[1],
-        left * d2 + n0 * g[2],
+        unweighted * unweighted * P[0] + n0 * g[0],
+        unweighted * d1 + n0 * g[1],
+        unweighted * d2 + n0 * g[2],
         P[3] - g[1] * (P[1] + d1) + n1 * g[1],
         P[4] - g[1] * P[2] - g[2] * d1 + n1 * g[2],
         P[5] - g[2] * (P[2] + d2) + n2 * g[2],
@@ -247,11 +258,11 @@ def factored(s):
     (3·10⁶ for angles of one degree at 200 km), made covariances negative after some 600 scans."""
     minor = s[0] * s[3] - s[1] * s[1]
     m = s[0] * s[4] - s[1] * s[2]
-    whole = minor * (s[0] * s[5] - s[2] * s[2]) - m * m  # the determinant times s00
-    scale = 1.0 / (s[0] * minor * whole)
-    i0, by_minor = scale * minor * whole, scale * s[0] * whole
+    scaled_determinant = minor * (s[0] * s[5] - s[2] * s[2]) - m * m  # the determinant times s00
+    scale = 1.0 / (s[0] * minor * scaled_determinant)
+    i0, by_minor = scale * minor * scaled_determinant, scale * s[0] * scaled_determinant
     i2 = s[0] * minor * (scale * s[0] * minor)
-    return (s[1] * i0, s[2] * i0, m * by_minor), (i0, s[0] * by_minor, i2), whole * i0
+    return (s[1] * i0, s[2] * i0, m * by_minor), (i0, s[0] * by_minor, i2), scaled_determinant * i0
 
 
 @inline

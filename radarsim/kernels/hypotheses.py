@@ -34,22 +34,22 @@ FACTOR = 10.0
 
 
 @kernel
-def log_likelihood(x, P, F, Q, H, z, variance, there, manoeuvre, share, white, score):
+def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, share, white, log_densities):
     """The log-likelihood of n rows of m numbers, for a state of d components.
 
     x (d,) and P (d, d) are what is known at the first row, and are overwritten; F, Q (n, d, d): transition to each row
-    and what the manoeuvre of unit variance adds; H (n, m, d), z, variance (n, m): the numbers, where `there`;
-    manoeuvre: its variance; share: of outliers; white: 1, or 0 where the errors are states. Out: score (n, m), the
-    logarithm of each number's density given those before it, zero where it is not there."""
-    room, p = np.zeros_like(P), np.zeros_like(x)
+    and what the manoeuvre of unit variance adds; H (n, m, d), z, variance (n, m): the numbers, where `present`;
+    manoeuvre: its variance; share: of outliers; white: 1, or 0 where the errors are states. Out: log_densities (n, m),
+    the logarithm of each number's density given those before it, zero where it is missing."""
+    product, p = np.zeros_like(P), np.zeros_like(x)
     for k in range(z.shape[0]):
         if k > 0:
-            extrapolate(x, P, room, p, F[k], Q[k], manoeuvre)
+            extrapolate(x, P, product, p, F[k], Q[k], manoeuvre)
         for j in range(z.shape[1]):
-            score[k, j] = 0.0
-            if there[k, j]:
+            log_densities[k, j] = 0.0
+            if present[k, j]:
                 e, spread = innovation(x, P, H[k, j], z[k, j], p)
-                score[k, j] = take(x, P, p, e, spread + white * variance[k, j], variance[k, j], share)
+                log_densities[k, j] = take(x, P, p, e, spread + white * variance[k, j], variance[k, j], share)
 
 
 @kernel
@@ -67,37 +67,39 @@ def innovation(x, P, h, z, p):
 
 
 @kernel
-def extrapolate(x, P, room, moved, F, Q, manoeuvre):
-    """x = F x and P = F P F' + manoeuvre Q, in place; room (d, d) and moved (d,) are for the sums. P stays symmetric to
-    the last digit, here and in `take`: what its halves differ by grows from row to row."""
+def extrapolate(x, P, product, predicted_x, F, Q, manoeuvre):
+    """x = F x and P = F P F' + manoeuvre Q, in place; product (d, d) and predicted_x (d,) are work arrays.
+
+    P stays symmetric to the last digit, here and in `take`: a difference between its halves grows from row to row."""
     d = x.size
     for a in range(d):
-        moved[a] = 0.0
+        predicted_x[a] = 0.0
         for b in range(d):
-            moved[a] += F[a, b] * x[b]
-            room[a, b] = 0.0
+            predicted_x[a] += F[a, b] * x[b]
+            product[a, b] = 0.0
             for c in range(d):
-                room[a, b] += F[a, c] * P[c, b]
+                product[a, b] += F[a, c] * P[c, b]
     for a in range(d):
-        x[a] = moved[a]
+        x[a] = predicted_x[a]
         for b in range(a + 1):
             P[a, b] = manoeuvre * Q[a, b]
             for c in range(d):
-                P[a, b] += room[a, c] * F[b, c]
+                P[a, b] += product[a, c] * F[b, c]
             P[b, a] = P[a, b]
 
 
 @kernel
 def take(x, P, p, e, S, variance, share):
-    """Take in a number of innovation e, of variance S: x, P in place; variance: of its error, which that of an outlier
-    is FACTOR² times as large as. The logarithm of its density."""
+    """Update x and P in place by a number with innovation e of variance S; returns the logarithm of its density.
+
+    variance: of the number's error; that of an outlier is FACTOR² times as large."""
     T = S + (FACTOR * FACTOR - 1.0) * variance
     plain = np.log(1.0 - share) - 0.5 * (np.log(2.0 * np.pi * S) + e * e / S)
     density, w, v = plain, 1.0, 0.0
     if share > 0.0:
         wide = np.log(share) - 0.5 * (np.log(2.0 * np.pi * T) + e * e / T)
-        most = max(plain, wide)
-        density = most + np.log(np.exp(plain - most) + np.exp(wide - most))
+        larger = max(plain, wide)
+        density = larger + np.log(np.exp(plain - larger) + np.exp(wide - larger))
         w, v = np.exp(plain - density), np.exp(wide - density)
     gain = w / S + v / T
     difference = 1.0 / S - 1.0 / T
@@ -135,7 +137,7 @@ INNOVATION, NEAR, FALL = 0, 1, 2  # columns of e, near and c behind the two list
 
 
 class Lists(NamedTuple):
-    """Room for hypotheses, by addresses (`room`, `most`: numbers per column)."""
+    """Work arrays for hypotheses, by their addresses (`room`, `most`: numbers per column)."""
 
     #: two lists of four columns, `room` numbers each, the last of them w; then e, near and c of the list that is
     #: branched
@@ -148,95 +150,102 @@ class Lists(NamedTuple):
 
 
 @inline
-def column(lists, which, number):
-    """Address of column `number` of list `which`."""
-    return row(lists.columns, (4 * which + number) * (lists.room // WIDTH))
+def column(lists, list_index, column_index):
+    """Address of a column of one of the lists."""
+    return row(lists.columns, (4 * list_index + column_index) * (lists.room // WIDTH))
 
 
 @inline
 def greatest(x):
-    """The greatest of eight lanes, as all of them; by a row of memory."""
-    most = x[0]
+    """The greatest of eight numbers in memory."""
+    maximum = x[0]
     for i in range(1, WIDTH):
-        most = max(most, x[i])
-    return most
+        maximum = max(maximum, x[i])
+    return maximum
 
 
 @part
-def least_kept(weights, count, copy, most):
-    """The `most`-th greatest of `count` weights; most < count. By halves as in Hoare's selection, on a copy. What is
-    kept of it moves to its front without a branch: as good as random, half of the branches would be foretold
-    wrongly."""
+def least_kept(weights, count, copy, limit):
+    """The `limit`-th greatest of `count` weights; limit < count. Hoare's selection on a copy.
+
+    The selected weights move to the front of the copy without a branch: the order is as good as random, so the
+    processor would predict half of the branches wrongly."""
     for i in range(count):
         copy[i] = weights[i]
     while count > 1:
-        pivot, above, equal, kept = copy[count // 2], 0, 0, 0
+        pivot, greater, equals, selected = copy[count // 2], 0, 0, 0
         for i in range(count):
-            above += 1 if copy[i] > pivot else 0
-            equal += 1 if copy[i] == pivot else 0
-        if most <= above:
+            greater += 1 if copy[i] > pivot else 0
+            equals += 1 if copy[i] == pivot else 0
+        if limit <= greater:
             for i in range(count):
                 weight = copy[i]
-                copy[kept] = weight
-                kept += 1 if weight > pivot else 0
-        elif most <= above + equal:
+                copy[selected] = weight
+                selected += 1 if weight > pivot else 0
+        elif limit <= greater + equals:
             return pivot
         else:
-            most -= above + equal
+            limit -= greater + equals
             for i in range(count):
                 weight = copy[i]
-                copy[kept] = weight
-                kept += 1 if weight < pivot else 0
-        count = kept
+                copy[selected] = weight
+                selected += 1 if weight < pivot else 0
+        count = selected
     return copy[0]
 
 
 @part
-def keep_greatest(lists, count, most):
-    """Of `count` children keep the `most` with the greatest weights, of equal ones the first; their least weight."""
-    weights, found = lists.children, row(lists.children, lists.most // WIDTH)
-    least = least_kept(weights, count, row(lists.children, 2 * lists.most // WIDTH), most)
-    above = 0
+def keep_greatest(lists, count, limit):
+    """Keep the `limit` children with the greatest weights, of equal ones the first; returns the least weight."""
+    weights, innovations = lists.children, row(lists.children, lists.most // WIDTH)
+    smallest_weight = least_kept(weights, count, row(lists.children, 2 * lists.most // WIDTH), limit)
+    greater = 0
     for i in range(count):
-        above += 1 if weights[i] > least else 0
-    equal, kept = most - above, 0
+        greater += 1 if weights[i] > smallest_weight else 0
+    equals_to_keep, written = limit - greater, 0
     for i in range(count):
-        take = weights[i] > least
-        if weights[i] == least and equal > 0:
-            take, equal = True, equal - 1
+        take = weights[i] > smallest_weight
+        if weights[i] == smallest_weight and equals_to_keep > 0:
+            take, equals_to_keep = True, equals_to_keep - 1
         if take:
-            weights[kept], found[kept], lists.parents[kept] = weights[i], found[i], lists.parents[i]
-            kept += 1
-    return least
+            weights[written], innovations[written], lists.parents[written] = (
+                weights[i],
+                innovations[i],
+                lists.parents[i],
+            )
+            written += 1
+    return smallest_weight
 
 
 @part
-def branched(lists, which, count, D, best, deepest, most):
-    """Branch `count` hypotheses over their folds, down to best - deepest and FARTHEST, the `most` best: how many."""
+def branched(lists, list_index, count, D, best, deepest, limit):
+    """Branch `count` hypotheses over their folds, down to best - deepest and FARTHEST; returns how many are kept.
+
+    At most the `limit` best are kept."""
     e, near, c = column(lists, 2, INNOVATION), column(lists, 2, NEAR), column(lists, 2, FALL)
-    w = column(lists, which, 3)
-    weights, found = lists.children, row(lists.children, lists.most // WIDTH)
-    least, made = best - deepest, 0
+    w = column(lists, list_index, 3)
+    weights, innovations = lists.children, row(lists.children, lists.most // WIDTH)
+    smallest_weight, children = best - deepest, 0
     for i in range(count):
-        if near[i] < least:
+        if near[i] < smallest_weight:
             continue
-        floor = max(least, near[i] - 0.5 * FARTHEST)
+        weight_floor = max(smallest_weight, near[i] - 0.5 * FARTHEST)
         for n in range(2 * lists.most):
             side = 1.0 if (n & 1) == 1 else -1.0  # folds 0, 1, -1, 2, -2, …
             f = e[i] + side * ((n + 1) // 2) * D
             weight = w[i] - c[i] * f * f
-            if weight < floor:
+            if weight < weight_floor:
                 if side * e[i] <= 0.0:  # the nearer side of the pair: all that follow are farther
                     break
                 continue
-            if made == lists.most:
-                least = max(least, keep_greatest(lists, made, most))
-                floor, made = max(least, floor), most
-                if weight < floor:
+            if children == lists.most:
+                smallest_weight = max(smallest_weight, keep_greatest(lists, children, limit))
+                weight_floor, children = max(smallest_weight, weight_floor), limit
+                if weight < weight_floor:
                     continue
-            weights[made], found[made], lists.parents[made] = weight, f, i
-            made += 1
-    if made > most:
-        keep_greatest(lists, made, most)
-        made = most
-    return made
+            weights[children], innovations[children], lists.parents[children] = weight, f, i
+            children += 1
+    if children > limit:
+        keep_greatest(lists, children, limit)
+        children = limit
+    return children

@@ -82,14 +82,14 @@ def _arithmetic(op, instruction):
         values = (v if t == lanes else _spread(builder, v) for v, t in zip(args, sig.args, strict=True))
         return getattr(builder, instruction)(*values)
 
-    for left, right in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes)):
-        lower_builtin(op, left, right)(generate)
+    for left_type, right_type in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes)):
+        lower_builtin(op, left_type, right_type)(generate)
 
     @type_callable(op)
     def type_operation(context):
-        def resolve(left, right):
-            if lanes in (left, right) and all(isinstance(kind, OPERANDS) for kind in (left, right)):
-                return lanes(*(kind if kind == lanes else types.float64 for kind in (left, right)))
+        def resolve(left_type, right_type):
+            if lanes in (left_type, right_type) and all(isinstance(kind, OPERANDS) for kind in (left_type, right_type)):
+                return lanes(*(kind if kind == lanes else types.float64 for kind in (left_type, right_type)))
             return None
 
         return resolve
@@ -205,18 +205,18 @@ def add_totals(typingctx, pointer, number, a, b, c, d):
     A third of the instructions of four totals: halves are added of two at a time."""
 
     def generate(context, builder, sig, args):
-        def paired(one, other, low, high):
+        def paired(x, y, low, high):
             masks = (ir.Constant(ir.VectorType(ir.IntType(32), 4), places) for places in (low, high))
-            return builder.fadd(*(builder.shuffle_vector(one, other, mask) for mask in masks))
+            return builder.fadd(*(builder.shuffle_vector(x, y, mask) for mask in masks))
 
         none = ir.Constant(VECTOR, ir.Undefined)
         a, b, c, d = (paired(value, none, [0, 1, 2, 3], [4, 5, 6, 7]) for value in args[2:])
         first, second = (paired(x, y, [0, 1, 4, 5], [2, 3, 6, 7]) for x, y in ((a, b), (c, d)))
-        found = paired(first, second, [0, 2, 4, 6], [1, 3, 5, 7])
-        at = builder.bitcast(builder.gep(args[0], [args[1]]), found.type.as_pointer())
-        held = builder.load(at)
-        held.align = 8
-        builder.store(builder.fadd(held, found), at).align = 8
+        totals = paired(first, second, [0, 2, 4, 6], [1, 3, 5, 7])
+        target = builder.bitcast(builder.gep(args[0], [args[1]]), totals.type.as_pointer())
+        stored = builder.load(target)
+        stored.align = 8
+        builder.store(builder.fadd(stored, totals), target).align = 8
         return context.get_dummy_value()
 
     return types.none(pointer, types.intp, lanes, lanes, lanes, lanes), generate
@@ -383,9 +383,9 @@ def emitted_sums(program: traced.Program):
     @intrinsic
     def run(typingctx, arrays, sums):
         def generate(context, builder, sig, args):
-            made = _run(program, builder, _members(builder, args[0]))
-            held = _members(builder, args[1])
-            added = [builder.fadd(a, made[at]) for a, at in zip(held, program.sums, strict=True)]
+            results = _run(program, builder, _members(builder, args[0]))
+            sums_so_far = _members(builder, args[1])
+            added = [builder.fadd(a, results[index]) for a, index in zip(sums_so_far, program.sums, strict=True)]
             return context.make_tuple(builder, kind, added)
 
         return kind(arrays, kind), generate
@@ -409,17 +409,19 @@ def zeros(count: int):
 
 def _run(program, builder, pointers):
     """The results of all operations of a program, whose outputs are written."""
-    made = []
-    for op, *of in program.ops:
+    results = []
+    for op, *operands in program.ops:
         if op in ("row", "plain"):
-            made.append(_read(builder, op, pointers[of[0]], of[1]))
+            results.append(_read(builder, op, pointers[operands[0]], operands[1]))
         elif op == "number":
-            made.append(ir.Constant(VECTOR, [of[0]] * WIDTH))
+            results.append(ir.Constant(VECTOR, [operands[0]] * WIDTH))
         else:
-            made.append(_operation(builder, op, [made[at] for at in of]))
-    for array, number, at in program.outputs:
-        builder.store(made[at], _row_pointer(builder, pointers[array], ir.Constant(ir.IntType(64), number))).align = 8
-    return made
+            results.append(_operation(builder, op, [results[index] for index in operands]))
+    for array, number, index in program.outputs:
+        builder.store(
+            results[index], _row_pointer(builder, pointers[array], ir.Constant(ir.IntType(64), number))
+        ).align = 8
+    return results
 
 
 def _read(builder, op, pointer, number):

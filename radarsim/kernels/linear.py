@@ -160,20 +160,20 @@ def products_of_squares(x, f, g, n, truth):
 def add_sums(x, n, k, truth, observes, start, baseline, sums):
     """Add scan k over the first n realisations of x to the sums; truth (3,)."""
     error, paired, cross = sums
-    beside, compared = source(x, baseline, k, observes, start)
+    baseline_row, baseline_components = source(x, baseline, k, observes, start)
     for f in range(x.shape[0] - 1):
-        row, known = source(x, f, k, observes, start)
-        own = moments(x, row, n, truth)
-        squares = own[3], own[7], own[11]
-        if row != beside:
-            squares = products_of_squares(x, row, beside, n, truth)
-        for c in range(known):
+        row, components = source(x, f, k, observes, start)
+        error_sums = moments(x, row, n, truth)
+        squares = error_sums[3], error_sums[7], error_sums[11]
+        if row != baseline_row:
+            squares = products_of_squares(x, row, baseline_row, n, truth)
+        for c in range(components):
             for power in range(4):
-                error[f, k, c, power] += own[4 * c + power]
-            if c < compared:
+                error[f, k, c, power] += error_sums[4 * c + power]
+            if c < baseline_components:
                 paired[f, k, c] += squares[c]
             for d in range(c):
-                cross[f, k, c + d - 1] += own[12 + c + d - 1]
+                cross[f, k, c + d - 1] += error_sums[12 + c + d - 1]
 
 
 @kernel
@@ -222,21 +222,21 @@ def fill_estimates(x, problem, plots, estimates):
                     x[filters, m, i] = plots[done + i, k, m]
             advance(x, k, problem.dt[k], problem.observes, problem.start, problem.weights, problem.gains)
             for f in range(filters):
-                row, known = source(x, f, k, problem.observes, problem.start)
+                row, components = source(x, f, k, problem.observes, problem.start)
                 for i in range(n):
-                    for m in range(known):
+                    for m in range(components):
                         estimates[done + i, f, k, m] = x[row, m, i]
 
 
 def plain(array, *shape, dtype=np.float64):
     """The array as the kernels take it: of one type, contiguous, writable, broadcast to a shape; itself where it is so.
     Numba counts a read-only array as another type and would compile everything again."""
-    alike = type(array) is np.ndarray and array.shape == shape and array.dtype == dtype
-    if alike and array.flags.c_contiguous and array.flags.writeable:
+    has_form = type(array) is np.ndarray and array.shape == shape and array.dtype == dtype
+    if has_form and array.flags.c_contiguous and array.flags.writeable:
         return array
-    made = np.empty(shape, dtype=dtype)
-    made[...] = array
-    return made
+    converted = np.empty(shape, dtype=dtype)
+    converted[...] = array
+    return converted
 
 
 WHOLE: dict[str, type] = {
@@ -249,8 +249,10 @@ def as_taken(problem: Any, **shapes: tuple[int, ...]) -> Any:
     """A problem with its arrays as the kernels take them, by name: of these shapes, else of their own."""
     arrays = {name: value for name, value in problem._asdict().items() if name in shapes or np.ndim(value)}
     types = {name: WHOLE.get(name, np.float64) for name in arrays}
-    made = {name: plain(one, *shapes.get(name, np.shape(one)), dtype=types[name]) for name, one in arrays.items()}
-    return problem._replace(**made)
+    converted = {
+        name: plain(value, *shapes.get(name, np.shape(value)), dtype=types[name]) for name, value in arrays.items()
+    }
+    return problem._replace(**converted)
 
 
 def simulate_block(problem: Problem, first: int, count: int, sums: Sums) -> None:

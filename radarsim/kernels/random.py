@@ -172,13 +172,13 @@ def fill_uniform_pairs(key, first, pair, a, b):
 @kernel
 def words_to_normals(a, b):
     """Unit normals in place, flat a and b of pairs × LANES numbers: the words of call c stand in row c of either."""
-    x, to, kept = a.view(np.uint64), address(a), address(b)
+    x, first_words, second_words = a.view(np.uint64), address(a), address(b)
     pairs = a.size >> LANE_BITS
     for call in range((pairs - 1) >> 1, -1, -1):
-        even = get(to, call)
+        even = get(first_words, call)
         if 2 * call + 1 < pairs:
-            put(to, 2 * call + 1, get(kept, call))
-        put(to, 2 * call, even)
+            put(first_words, 2 * call + 1, get(second_words, call))
+        put(first_words, 2 * call, even)
     for i in range(a.size):
         a[i], b[i] = normal_pair(x[i])
 
@@ -209,11 +209,12 @@ def fill_uniform_strip(key, first, pair, a, b):
 # ---- mixtures of laws, from which rare events are drawn --------
 @inline
 def part_of(key, cumulative, realisation):
-    """Which part of a mixture a realisation is drawn from, 0 the plain law; cumulative (M + 1,) sums up their shares,
-    the last is 1."""
-    which, _ = uniforms(key[0], key[1], realisation, 0)
+    """The index of the law of a mixture that a realisation is drawn from, 0 for the plain law.
+
+    cumulative (M + 1,): cumulative shares of the laws, the last is 1."""
+    u, _ = uniforms(key[0], key[1], realisation, 0)
     m = 0
-    while which > cumulative[m]:
+    while u > cumulative[m]:
         m += 1
     return m
 
@@ -228,8 +229,8 @@ def add_weight(w, sums, j):
 
 
 @inline
-def add_drawn(w, plain, drawn):
-    """Add a realisation of weight w, drawn as it is or not, to drawn (3,): number of plain ones, Σw and Σw²."""
-    drawn[0] += plain
-    drawn[1] += w
-    drawn[2] += w * w
+def add_drawn(w, plain, weight_sums):
+    """Add a realisation of weight w, drawn from the plain law or not, to weight_sums (3,): plain ones, Σw and Σw²."""
+    weight_sums[0] += plain
+    weight_sums[1] += w
+    weight_sums[2] += w * w

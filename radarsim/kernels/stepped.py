@@ -29,27 +29,34 @@ def world(first: Program, following: Program, pairs: int, rows: int):
     begin, move = emitted(first), emitted(following)
 
     @kernel
-    def draw(keys, start, groups, known, width, numbers, detection, state, a, b, u, plots):
-        scans = known.size // width
+    def draw(keys, start, groups, scan_numbers, width, numbers, detection, state, a, b, u, plots):
+        scans = scan_numbers.size // width
         for g in range(groups):
             for k in range(scans):
                 if k % STRIP == 0:
                     fill_normal_strip(keys[0], start + g * WIDTH, U(k * pairs), a, b)
                 if detection < 1.0 and k & 1 == 0:
                     fill_uniform_pairs(keys[1], start + g * WIDTH, U(k >> 1), u[:WIDTH], u[WIDTH:])
-                to = row(address(plots), (g * scans + k) * rows)
-                there = full(1.0)
+                plot_row = row(address(plots), (g * scans + k) * rows)
+                present = full(1.0)
                 if detection < 1.0 and k > 0:
-                    drawn = get(address(u), k & 1)
-                    there = where_greater(full(detection), drawn, there, full(0.0))
-                put(to, 0, there)
+                    uniform = get(address(u), k & 1)
+                    present = where_greater(full(detection), uniform, present, full(0.0))
+                put(plot_row, 0, present)
                 noise = (k % STRIP) * pairs
-                at = row(address(known), k * width // WIDTH)
-                places = address(state), at, address(numbers), row(address(a), noise), row(address(b), noise), to
+                scan_row = row(address(scan_numbers), k * width // WIDTH)
+                addresses = (
+                    address(state),
+                    scan_row,
+                    address(numbers),
+                    row(address(a), noise),
+                    row(address(b), noise),
+                    plot_row,
+                )
                 if k == 0:
-                    begin(places)
+                    begin(addresses)
                 else:
-                    move(places)
+                    move(addresses)
 
     return draw
 
@@ -62,8 +69,8 @@ def follower(first: Program, following: Program, rows: int, components: int, tes
     begin, step = emitted(first), emitted(following)
 
     @kernel
-    def follow(groups, count, known, width, numbers, plots, state, errors, base, error, paired, believed, nees):
-        scans = known.size // width
+    def follow(groups, count, scan_numbers, width, numbers, plots, state, errors, base, error, paired, believed, nees):
+        scans = scan_numbers.size // width
         sums, products, variances, squares = address(error), address(paired), address(believed), address(nees)
         counted, extra = np.empty(WIDTH), np.zeros((components + 1) * WIDTH)
         for g in range(groups):
@@ -71,15 +78,23 @@ def follower(first: Program, following: Program, rows: int, components: int, tes
                 counted[lane] = 1.0 if g * WIDTH + lane < count else 0.0
             for k in range(scans):
                 n = g * scans + k
-                own, other = row(address(errors), n * components), row(address(base), n * components)
-                at, seen = row(address(known), k * width // WIDTH), row(address(plots), n * rows)
-                places = address(state), at, address(numbers), address(counted), own, seen, address(extra)
+                error_row, baseline_row = row(address(errors), n * components), row(address(base), n * components)
+                scan_row, plot_row = row(address(scan_numbers), k * width // WIDTH), row(address(plots), n * rows)
+                addresses = (
+                    address(state),
+                    scan_row,
+                    address(numbers),
+                    address(counted),
+                    error_row,
+                    plot_row,
+                    address(extra),
+                )
                 if k == 0:
-                    begin(places)
+                    begin(addresses)
                 else:
-                    step(places)
+                    step(addresses)
                 for c in range(components):
-                    e, b = get(own, c), get(other, c)
+                    e, b = get(error_row, c), get(baseline_row, c)
                     square = e * e
                     add_totals(sums, (k * components + c) * 4, e, square, e * square, square * square)
                     products[k * components + c] += total(square * (b * b))

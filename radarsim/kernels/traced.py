@@ -19,24 +19,24 @@ import numpy as np
 
 
 class Unfit(TypeError):
-    """What no formula of a realisation may hold; its message says all to the author of the formula."""
+    """An operation that no formula of a realisation may contain; the message is for the author of the formula."""
 
     for_the_author = True
 
 
 class OneForAll(Unfit):
-    """Python needs one value where there are eight."""
+    """Python needs a single value where there are eight."""
 
 
 class Lane:
-    """A number of each of eight realisations, by its place in a trace."""
+    """A number of each of eight realisations, as the index of an operation in a trace."""
 
     __array_ufunc__ = None  # NumPy's numbers leave arithmetic to the methods here
     __hash__ = None  # type: ignore[assignment]
-    __slots__ = ("at", "trace")
+    __slots__ = ("index", "trace")
 
-    def __init__(self, trace: "Trace", at: int):
-        self.trace, self.at = trace, at
+    def __init__(self, trace: "Trace", index: int):
+        self.trace, self.index = trace, index
 
     def __neg__(self):
         return 0.0 - self
@@ -52,19 +52,20 @@ class Lane:
             return functools.reduce(lambda done, _: done * self, range(power - 1), self)
         raise OneForAll(f"** {power!r} of a number of a realisation: a whole power from 1 on, or exp and log")
 
-    def _one(self, *_: Any) -> Any:
+    def _refuse(self, *_: Any) -> Any:
         raise OneForAll(
             "a number that each realisation has its own of has no one value: write where(condition, yes, no) in place "
             "of if, and, or, not, min, max, and the functions of radarsim.kernels.traced in place of those of math"
         )
 
-    __bool__ = __float__ = __int__ = __index__ = __iter__ = __round__ = __floor__ = __ceil__ = _one
-    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __rpow__ = _one
+    __bool__ = __float__ = __int__ = __index__ = __iter__ = __round__ = __floor__ = __ceil__ = _refuse
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __rpow__ = _refuse
 
 
 class Mask(Lane):
-    """What a comparison of lanes gives: holds or not, lane by lane; `&`, `|` and `~` join such, and truth values. In
-    arithmetic it is 1 where it holds, else 0, as in Python."""
+    """The result of comparing lanes: true or false, lane by lane. `&`, `|` and `~` combine masks and truth values.
+
+    In arithmetic it is 1 where it is true, else 0, as in Python."""
 
     __hash__ = None  # type: ignore[assignment]
     __slots__ = ()
@@ -115,72 +116,72 @@ class Program:
 
     @functools.cached_property
     def digest(self) -> str:
-        """SHA-256 of what is calculated: an edit that changes none of it leaves kernels as they are."""
+        """SHA-256 of the operations: an edit that changes none of them leaves compiled kernels valid."""
         return hashlib.sha256(repr((self.ops, self.outputs, self.sums)).encode()).hexdigest()
 
 
 class Trace:
-    """What a function does with lanes, in order; what is done twice stands once.
+    """The operations that a function applies to lanes, in order; a repeated operation is recorded once.
 
-    The compiler takes all numbers as finite, so of what it finds to be none it makes anything: such a formula is Unfit.
+    The compiler assumes that all numbers are finite, and makes anything of others: a formula that gives one is Unfit.
     """
 
     def __init__(self) -> None:
-        self.known: dict[tuple, int] = {}
+        self._indices: dict[tuple, int] = {}
         self.outputs: list[tuple[int, int, int]] = []
         self.sums: list[int] = []
-        self.always: dict[int, float] = {}  # the value of operations whatever the case
-        self.stated: dict[int, float] = {}  # these, and by the keys of this case
+        self.constants: dict[int, float] = {}  # the values of operations that are the same in every case
+        self.case_values: dict[int, float] = {}  # these, and those that follow from the keys of this case
 
     def put(self, op: str, *operands: Any) -> Lane:
         """An operation on lanes and numbers. Raises Unfit where it can give no number."""
         if op in ("and", "or", "not"):
-            places = tuple(map(self.holds, operands))
+            indices = tuple(map(self.holds, operands))
         elif op == "where":
-            places = operands[0].at, *map(self.place, operands[1:])
+            indices = operands[0].index, *map(self.place, operands[1:])
         else:
-            places = tuple(map(self.place, operands))
-        if op in ("==", "!=") and places[0] == places[1]:
+            indices = tuple(map(self.place, operands))
+        if op in ("==", "!=") and indices[0] == indices[1]:
             raise Unfit("a test for NaN cannot be made; test what would make it, e.g. where(z >= 0, …)")
-        value = _value(op, places, self.always)
-        in_this_case = value if value is not None else _value(op, places, self.stated)
+        value = _value(op, indices, self.constants)
+        in_this_case = value if value is not None else _value(op, indices, self.case_values)
         if value is not None and not math.isfinite(value):
             raise Unfit(f"gives {value:g} in every realisation: it divides by zero, or goes beyond all numbers")
-        at = self._at(op, *places)
+        index = self._index(op, *indices)
         if value is not None:
-            self.always[at] = value
+            self.constants[index] = value
         if in_this_case is not None:
-            self.stated[at] = in_this_case
-        return (Mask if op in COMPARED.values() or op in ("and", "or", "not") else Lane)(self, at)
+            self.case_values[index] = in_this_case
+        return (Mask if op in COMPARED.values() or op in ("and", "or", "not") else Lane)(self, index)
 
-    def place(self, one: Any) -> int:
+    def place(self, value: Any) -> int:
         """The number of the operation that a lane comes from, or that of a constant. Raises Unfit where it is none."""
-        if isinstance(one, Mask):
-            return self.put("where", one, 1.0, 0.0).at
-        if isinstance(one, Lane):
-            return one.at
-        number = float(one)
+        if isinstance(value, Mask):
+            return self.put("where", value, 1.0, 0.0).index
+        if isinstance(value, Lane):
+            return value.index
+        number = float(value)
         if not math.isfinite(number):
             raise Unfit(f"{number} is not finite, and no number to calculate with")
-        at = self._at("number", number)
-        self.always[at] = self.stated[at] = number
-        return at
+        index = self._index("number", number)
+        self.constants[index] = self.case_values[index] = number
+        return index
 
-    def holds(self, one: Any) -> int:
+    def holds(self, value: Any) -> int:
         """The number of the operation that a mask comes from, or that of a truth value. Raises Unfit of others."""
-        if isinstance(one, bool | np.bool_):
-            one = self.put("<", 0.0, float(one))
-        if not isinstance(one, Mask):
-            raise Unfit(f"& and | join comparisons, got {'a number' if isinstance(one, Lane) else repr(one)[:40]}")
-        return one.at
+        if isinstance(value, bool | np.bool_):
+            value = self.put("<", 0.0, float(value))
+        if not isinstance(value, Mask):
+            raise Unfit(f"& and | join comparisons, got {'a number' if isinstance(value, Lane) else repr(value)[:40]}")
+        return value.index
 
-    def _at(self, *operation: Any) -> int:
-        return self.known.setdefault(operation, len(self.known))
+    def _index(self, *operation: Any) -> int:
+        return self._indices.setdefault(operation, len(self._indices))
 
     def rows(self, array: int, like: Any, first: int = 0) -> Any:
         """A structure like another, whose numbers stand in the rows of an array from `first` on."""
         places = iter(range(first, first + count(like)))
-        return mapped(lambda _: Lane(self, self._at("row", array, next(places))), like)
+        return mapped(lambda _: Lane(self, self._index("row", array, next(places))), like)
 
     def plain(self, array: int, like: Any, stated: bool = False) -> Any:
         """A structure like another, whose numbers stand in an array, the same for all realisations.
@@ -189,25 +190,25 @@ class Trace:
         places = iter(range(count(like)))
 
         def lane(number: Any) -> Lane:
-            at = self._at("plain", array, next(places))
+            index = self._index("plain", array, next(places))
             if stated:
-                self.stated[at] = float(number)
-            return Lane(self, at)
+                self.case_values[index] = float(number)
+            return Lane(self, index)
 
         return mapped(lane, like)
 
     def write(self, array: int, value: Any, first: int = 0) -> None:
-        """The numbers of a structure into the rows of an array, from `first` on."""
-        for row, one in enumerate(leaves(value), first):
-            self.outputs.append((array, row, self.place(one)))
+        """Write the numbers of a structure into the rows of an array, from `first` on."""
+        for row, number in enumerate(leaves(value), first):
+            self.outputs.append((array, row, self.place(number)))
 
     def add(self, value: Any) -> None:
-        """Sums of the numbers of a structure."""
+        """Add the numbers of a structure to the sums."""
         self.sums += map(self.place, leaves(value))
 
     def program(self) -> Program:
-        """All that was recorded."""
-        return Program(tuple(self.known), tuple(self.outputs), tuple(self.sums))
+        """The recorded operations as a program."""
+        return Program(tuple(self._indices), tuple(self.outputs), tuple(self.sums))
 
 
 CALCULATED: dict[str, Callable] = {
@@ -217,10 +218,10 @@ CALCULATED: dict[str, Callable] = {
 }  # fmt: skip
 
 
-def _value(op: str, places: tuple[int, ...], of: dict[int, float]) -> float | None:
-    """The value of an operation where it has but one, whatever its other operands, by those of earlier ones."""
-    values = [of.get(at) for at in places]
-    if op == "fsub" and places[0] == places[1]:
+def _value(op: str, indices: tuple[int, ...], values_by_index: dict[int, float]) -> float | None:
+    """The value of an operation if it follows from the known values of its operands, else None."""
+    values = [values_by_index.get(index) for index in indices]
+    if op == "fsub" and indices[0] == indices[1]:
         return 0.0
     if op == "fdiv" and values[1] == 0:
         return math.nan
@@ -233,15 +234,15 @@ def _value(op: str, places: tuple[int, ...], of: dict[int, float]) -> float | No
 
 
 def stated(x: Any) -> float | None:
-    """The value of a number where it is the same in all realisations of a case and is known, else None."""
+    """The value of a number if it is known and the same in all realisations of a case, else None."""
     if isinstance(x, Lane):
-        return x.trace.stated.get(x.at)
+        return x.trace.case_values.get(x.index)
     return float(x) if isinstance(x, int | float) else None
 
 
 # ---- structures: tuples and named records of numbers; text, None, truth values and whole numbers are none --------
 def mapped(function: Callable, *values: Any) -> Any:
-    """A structure with what a function makes of the numbers at each of its places, of structures of one shape."""
+    """Apply a function to the numbers of structures of the same shape, place by place."""
     first = values[0]
     if isinstance(first, tuple):
         parts = [mapped(function, *each) for each in zip(*values, strict=True)]
@@ -281,7 +282,7 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
 
 
 def numbered(value: Any) -> Any:
-    """A structure in which whole numbers are numbers like others."""
+    """A structure with its whole numbers as floats, so that they count as numbers of a realisation."""
     if isinstance(value, tuple):
         parts = [numbered(part) for part in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
@@ -380,12 +381,12 @@ def atan2(y: Any, x: Any) -> Any:
     a, b = abs(x), abs(y)
     steep = b > a
     low, high = where(steep, a, b), where(steep, b, a)
-    beyond = low > high * (math.sqrt(2) - 1)  # π/4 less the angle of (high - low, high + low)
-    above, below = where(beyond, high - low, low), where(beyond, high + low, high)
-    t = above / where(below > 0.0, below, 1.0)
+    is_over_eighth = low > high * (math.sqrt(2) - 1)  # π/4 less the angle of (high - low, high + low)
+    numerator, denominator = where(is_over_eighth, high - low, low), where(is_over_eighth, high + low, high)
+    t = numerator / where(denominator > 0.0, denominator, 1.0)
     u = t * t
     angle = t + t * u * functools.reduce(lambda p, c: p * u + c, ATAN)
-    angle = where(beyond, math.pi / 4 - angle, angle)
+    angle = where(is_over_eighth, math.pi / 4 - angle, angle)
     angle = where(steep, math.pi / 2 - angle, angle)
     angle = where(x < 0.0, math.pi - angle, angle)
     return where(y < 0.0, -angle, angle)
@@ -438,12 +439,12 @@ def normalised(P: Sequence[Any], e: Sequence[Any]) -> Any:
 def elimination(P: Sequence[Any], e: Sequence[Any]) -> tuple[Any, Any]:
     """e' P⁻¹ e of a packed P by its factors L D L', and the least element of D, which is positive where P is."""
     n = len(e)
-    rows, left, sums, pivots = [list(row_of(P, n, i)) for i in range(n)], list(e), [], []
+    rows, rest_of_e, sums, pivots = [list(row_of(P, n, i)) for i in range(n)], list(e), [], []
     for i in range(n):
         pivots.append(rows[i][i])
-        sums.append(left[i] * left[i] / rows[i][i])
+        sums.append(rest_of_e[i] * rest_of_e[i] / rows[i][i])
         for j in range(i + 1, n):
             share = rows[j][i] / rows[i][i]
-            left[j] = left[j] - share * left[i]
+            rest_of_e[j] = rest_of_e[j] - share * rest_of_e[i]
             rows[j] = [a - share * b for a, b in zip(rows[j], rows[i], strict=True)]
     return functools.reduce(lambda a, b: a + b, sums), functools.reduce(least, pivots)

@@ -79,10 +79,10 @@ def current() -> str:
     return _chosen[-1] if _chosen else checked(os.environ.get(VARIABLE) or ENGLISH, VARIABLE)
 
 
-def checked(code: str, by: str) -> str:
+def checked(code: str, source: str) -> str:
     """A language's code from an option or a variable. Raises ConfigError for an unknown one."""
     if code not in known():
-        raise ConfigError(f"{by}: must be one of {', '.join(known())}, got {code!r}")
+        raise ConfigError(f"{source}: must be one of {', '.join(known())}, got {code!r}")
     return code
 
 
@@ -116,40 +116,44 @@ def _read(code: str, package: str) -> tuple[tuple[catalogue.Entry, ...], NullTra
     if code == ENGLISH or not files:
         return (), NullTranslations()
     try:
-        found = tuple(catalogue.entries(files[0].read_text(encoding="utf-8")))
-        return found, GNUTranslations(catalogue.compiled(found))
+        entries = tuple(catalogue.entries(files[0].read_text(encoding="utf-8")))
+        return entries, GNUTranslations(catalogue.compiled(entries))
     except (OSError, ValueError, LookupError) as error:  # the last one of an unknown character set
-        words = (error.strerror if isinstance(error, OSError) else "") or str(error)
+        reason = (error.strerror if isinstance(error, OSError) else "") or str(error)
         if package == OURS:
-            raise ConfigError(f"{files[0]}: {words}") from error
-        faults.append(f"package {package} speaks English: {files[0]}: {words}")
+            raise ConfigError(f"{files[0]}: {reason}") from error
+        faults.append(f"package {package} speaks English: {files[0]}: {reason}")
         return (), NullTranslations()
 
 
 def term(message: str, package: str = "") -> Term:
     """Mark a message for later translation; of the calling package, unless another one is named."""
-    made = Term(message)
-    made.package = package or _top(sys._getframe(1))
-    return made
+    marked = Term(message)
+    marked.package = package or _top(sys._getframe(1))
+    return marked
 
 
 def tr(message: str, /, **values: Any) -> str:
     """A message in the current language, with its placeholders filled."""
-    found = _catalogue(message, sys._getframe(1)) if message else None  # an empty one is a catalogue's header
-    said = found.gettext(message) if found else _numbered(message, sys._getframe(1))
-    return _Filled().vformat(said, (), values) if values else str(said)
+    catalogue_of_message = (
+        _catalogue(message, sys._getframe(1)) if message else None
+    )  # an empty one is a catalogue's header
+    sentence = catalogue_of_message.gettext(message) if catalogue_of_message else _numbered(message, sys._getframe(1))
+    return _Filled().vformat(sentence, (), values) if values else str(sentence)
 
 
-def plural(one: str, many: str, count: int, /, **values: Any) -> str:
+def plural(singular: str, plural_form: str, count: int, /, **values: Any) -> str:
     """A message with a count, `{count}`, in the language's plural form."""
-    found = _catalogue(one, sys._getframe(1)) or NullTranslations()
-    return _Filled().vformat(found.ngettext(one, many, count), (), {"count": count, **values})
+    translations_of_message = _catalogue(singular, sys._getframe(1)) or NullTranslations()
+    return _Filled().vformat(
+        translations_of_message.ngettext(singular, plural_form, count), (), {"count": count, **values}
+    )
 
 
 def in_form(word: Term, context: str) -> str:
     """A word in one of its forms; without a form unchanged."""
-    if context and (found := _catalogue(word, sys._getframe(), context)):
-        return found.pgettext(context, word)
+    if context and (translations_of_word := _catalogue(word, sys._getframe(), context)):
+        return translations_of_word.pgettext(context, word)
     return tr(word)
 
 
@@ -157,11 +161,11 @@ def _numbered(message: str, caller: FrameType) -> str:
     """A message whose catalogue entry stands for all its numbers; else unchanged."""
     if current() == ENGLISH or "{" in message or not NUMBERS.search(message):
         return message
-    like = term(NUMBERS.sub(ANY, message), getattr(message, "package", "") or _top(caller))
-    if (found := _catalogue(like, caller)) is None:
+    pattern = term(NUMBERS.sub(ANY, message), getattr(message, "package", "") or _top(caller))
+    if (translations_of_pattern := _catalogue(pattern, caller)) is None:
         return message
     numbers = iter(NUMBERS.findall(message))
-    return re.sub(ANY, lambda _: numeral(next(numbers)), found.gettext(like))
+    return re.sub(ANY, lambda _: numeral(next(numbers)), translations_of_pattern.gettext(pattern))
 
 
 def called(text: str, names: frozenset[str] = frozenset()) -> str:
@@ -169,27 +173,31 @@ def called(text: str, names: frozenset[str] = frozenset()) -> str:
 
     Unknown names stay, and so does a known one within them.
     """
-    said = _labels(current())
-    if not names or not said:
-        return said.get(text, text)
-    return _any_of(names).sub(lambda found: _called(found[0], said), text)
+    labels = _labels(current())
+    if not names or not labels:
+        return labels.get(text, text)
+    return _any_of(names).sub(lambda match: _called(match[0], labels), text)
 
 
-def _called(name: str, said: Mapping[str, str]) -> str:
-    plain = name.replace("\n", " ")  # of a tick in several lines
-    return said[plain].replace(" ", "\n") if plain != name and plain in said else said.get(name, name)
+def _called(name: str, labels: Mapping[str, str]) -> str:
+    in_one_line = name.replace("\n", " ")  # of a tick in several lines
+    return (
+        labels[in_one_line].replace(" ", "\n")
+        if in_one_line != name and in_one_line in labels
+        else labels.get(name, name)
+    )
 
 
 @cache
 def _labels(code: str) -> Mapping[str, str]:
-    return {one.id: one.said[0] for one in messages(code) if one.context == LABEL}
+    return {entry.id: entry.translations[0] for entry in messages(code) if entry.context == LABEL}
 
 
 @cache
 def _any_of(names: frozenset[str]) -> re.Pattern[str]:
     """Any of names as a word of its own, the longest first: none within a path, a key or its value."""
-    found = "|".join(re.escape(name).replace(r"\ ", r"[ \n]") for name in sorted(names, key=len, reverse=True))
-    return re.compile(rf"(?<![\w.=/-])(?:{found})(?![\w=/]|[.-]\w)")
+    alternatives = "|".join(re.escape(name).replace(r"\ ", r"[ \n]") for name in sorted(names, key=len, reverse=True))
+    return re.compile(rf"(?<![\w.=/-])(?:{alternatives})(?![\w=/]|[.-]\w)")
 
 
 def _catalogue(message: str, caller: FrameType, context: str = "") -> NullTranslations | None:
@@ -197,9 +205,20 @@ def _catalogue(message: str, caller: FrameType, context: str = "") -> NullTransl
     code = current()
     if code == ENGLISH:
         return None
-    own = getattr(message, "package", "") or _top(caller)
-    asked = [own] if own != OURS and own in packages() else [OURS, *(one for one in packages() if one in sys.modules)]
-    return next((translations(code, one) for one in asked if (context, message) in _translated(code, one)), None)
+    package = getattr(message, "package", "") or _top(caller)
+    candidates = (
+        [package]
+        if package != OURS and package in packages()
+        else [OURS, *(candidate for candidate in packages() if candidate in sys.modules)]
+    )
+    return next(
+        (
+            translations(code, candidate)
+            for candidate in candidates
+            if (context, message) in _translated(code, candidate)
+        ),
+        None,
+    )
 
 
 def _top(frame: FrameType) -> str:
@@ -209,7 +228,7 @@ def _top(frame: FrameType) -> str:
 
 @cache
 def _translated(code: str, package: str) -> frozenset[tuple[str, str]]:
-    return frozenset(one.key for one in messages(code, package) if one.done)
+    return frozenset(entry.key for entry in messages(code, package) if entry.done)
 
 
 def numeral(text: str) -> str:
@@ -222,8 +241,8 @@ def numeral(text: str) -> str:
         text = POWER.sub(_raised, text)
     if current() == ENGLISH:
         return text.replace("-", "−")
-    said = translations(current())
-    return text.translate({ord(mark): said.pgettext(NUMBER, mark) for mark in ".,"} | {ord("-"): "−"})
+    catalogue_of_language = translations(current())
+    return text.translate({ord(mark): catalogue_of_language.pgettext(NUMBER, mark) for mark in ".,"} | {ord("-"): "−"})
 
 
 def power_of_ten(exponent: int) -> str:
@@ -231,9 +250,9 @@ def power_of_ten(exponent: int) -> str:
     return f"10{str(exponent).translate(SUPERSCRIPT)}"
 
 
-def _raised(found: re.Match[str]) -> str:
-    power = power_of_ten(int(found["exponent"]))
-    return power if found["mantissa"] == "1" else f"{found['mantissa']}·{power}"
+def _raised(match: re.Match[str]) -> str:
+    power = power_of_ten(int(match["exponent"]))
+    return power if match["mantissa"] == "1" else f"{match['mantissa']}·{power}"
 
 
 def listed(names: Sequence[str]) -> str:
@@ -243,16 +262,16 @@ def listed(names: Sequence[str]) -> str:
     return tr("{first} and {last}", first=", ".join(names[:-1]), last=names[-1])
 
 
-def few(names: Sequence[str], most: int = 4) -> str:
+def few(names: Sequence[str], limit: int = 4) -> str:
     """Names in a sentence; of too many the first ones and the number of the others.
 
     In a list, names that contain a comma are quoted.
     """
-    names = [tr("“{name}”", name=one) if ", " in one and len(names) > 1 else one for one in names]
-    if len(names) <= most + 1:
+    names = [tr("“{name}”", name=name) if ", " in name and len(names) > 1 else name for name in names]
+    if len(names) <= limit + 1:
         return listed(names)
-    first = ", ".join(names[:most])
-    return plural("{first} and {count} more", "{first} and {count} more", len(names) - most, first=first)
+    first = ", ".join(names[:limit])
+    return plural("{first} and {count} more", "{first} and {count} more", len(names) - limit, first=first)
 
 
 class _Filled(Formatter):

@@ -19,7 +19,7 @@ class Entry:
     id: str = ""
     context: str = ""
     plural: str = ""
-    said: dict[int, str] = field(default_factory=dict)
+    translations: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -30,7 +30,7 @@ class Entry:
     @property
     def done(self) -> bool:
         """Whether it is translated, in all its forms."""
-        return bool(self.said) and all(self.said.values())
+        return bool(self.translations) and all(self.translations.values())
 
 
 def entries(text: str) -> list[Entry]:
@@ -45,38 +45,38 @@ def entries(text: str) -> list[Entry]:
 
 
 def _entry(block: Iterable[tuple[int, str]]) -> Entry | None:
-    made, last, empty = Entry(), "", True
+    entry, keyword, empty = Entry(), "", True
     for number, line in block:
         if line.startswith("#"):
-            made.notes.append(line)
+            entry.notes.append(line)
             continue
-        found = LINE.fullmatch(line.strip())
-        if found is None:
+        match = LINE.fullmatch(line.strip())
+        if match is None:
             raise ValueError(f"line {number}: no line of a catalogue: {line}")
-        last, empty = found[1] or last, False
+        keyword, empty = match[1] or keyword, False
         try:
-            piece = ast.literal_eval(found[3])
+            piece = ast.literal_eval(match[3])
         except SyntaxError as error:
             raise ValueError(f"line {number}: {error.msg}: {line}") from error
-        if last == "msgctxt":
-            made.context += piece
-        elif last == "msgid":
-            made.id += piece
-        elif last == "msgid_plural":
-            made.plural += piece
+        if keyword == "msgctxt":
+            entry.context += piece
+        elif keyword == "msgid":
+            entry.id += piece
+        elif keyword == "msgid_plural":
+            entry.plural += piece
         else:
-            form = int(last[7:-1]) if "[" in last else 0
-            made.said[form] = made.said.get(form, "") + piece
-    return None if empty else made
+            form = int(keyword[7:-1]) if "[" in keyword else 0
+            entry.translations[form] = entry.translations.get(form, "") + piece
+    return None if empty else entry
 
 
-def compiled(found: Iterable[Entry]) -> io.BytesIO:
+def compiled(catalogue_entries: Iterable[Entry]) -> io.BytesIO:
     """The translated entries as a compiled catalogue (GNU gettext manual, "The Format of GNU MO Files")."""
-    pairs = sorted(_pair(entry) for entry in found if entry.done)
-    ids, said = [one for one, _ in pairs], [other for _, other in pairs]
+    pairs = sorted(_pair(entry) for entry in catalogue_entries if entry.done)
+    ids, translated = [identifier for identifier, _ in pairs], [translation for _, translation in pairs]
     tables, content = b"", b""
     start = 28 + 16 * len(pairs)
-    for text in (*ids, *said):
+    for text in (*ids, *translated):
         tables += struct.pack("<II", len(text), start + len(content))
         content += text + b"\x00"
     head = struct.pack("<7I", MAGIC, 0, len(pairs), 28, 28 + 8 * len(pairs), 0, start)
@@ -87,12 +87,12 @@ def _pair(entry: Entry) -> tuple[bytes, bytes]:
     name = f"{entry.context}{CONTEXT_ENDS}{entry.id}" if entry.context else entry.id
     if entry.plural:
         name += NEXT_FORM + entry.plural
-    return name.encode(), NEXT_FORM.join(text for _, text in sorted(entry.said.items())).encode()
+    return name.encode(), NEXT_FORM.join(text for _, text in sorted(entry.translations.items())).encode()
 
 
-def written(found: Iterable[Entry]) -> str:
+def written(catalogue_entries: Iterable[Entry]) -> str:
     """Entries as the text of a catalogue."""
-    return "\n".join("\n".join(_lines(entry)) + "\n" for entry in found)
+    return "\n".join("\n".join(_lines(entry)) + "\n" for entry in catalogue_entries)
 
 
 def _lines(entry: Entry) -> Iterator[str]:
@@ -102,9 +102,9 @@ def _lines(entry: Entry) -> Iterator[str]:
     yield f"msgid {_quoted(entry.id)}"
     if entry.plural:
         yield f"msgid_plural {_quoted(entry.plural)}"
-        yield from (f"msgstr[{form}] {_quoted(text)}" for form, text in sorted(entry.said.items()))
+        yield from (f"msgstr[{form}] {_quoted(text)}" for form, text in sorted(entry.translations.items()))
     else:
-        yield f"msgstr {_quoted(entry.said.get(0, ''))}"
+        yield f"msgstr {_quoted(entry.translations.get(0, ''))}"
 
 
 def _quoted(text: str) -> str:

@@ -210,8 +210,8 @@ class OneFile(Study):
 
     # ---- numbers -------------------------------------------------------------------------------------------------
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """The value of a function of the study; ConfigError with its place and the study's name if it fails."""
-        return call(function, *arguments, of=f"study {self.name}: ")
+        """The value of one of the study's functions; ConfigError with its place and the study's name if it fails."""
+        return call(function, *arguments, owner=f"study {self.name}: ")
 
     def scan_period_s(self, spec: Any) -> float:
         """The time between two plots of a config."""

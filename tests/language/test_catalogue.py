@@ -7,14 +7,18 @@ import pytest
 from radarsim.language.catalogue import Entry, compiled, entries, written
 
 RUSSIAN = "nplurals=3; plural=(n%10==1 && n%100!=11 ? 0 : n%10>=2 && n%10<=4 && (n%100<10 || n%100>=20) ? 1 : 2);"
-HEADER = Entry("", said={0: f"Content-Type: text/plain; charset=UTF-8\nPlural-Forms: {RUSSIAN}\n"})
+HEADER = Entry("", translations={0: f"Content-Type: text/plain; charset=UTF-8\nPlural-Forms: {RUSSIAN}\n"})
 MADE = [
     HEADER,
-    Entry("range", said={0: "дальность"}, notes=["#: a.py"]),
-    Entry("range", context="genitive", said={0: "дальности"}),
-    Entry('a "quoted"\n\\path\tand more', said={0: "„так“\n\\и\tтак"}),
-    Entry("{count} scan", plural="{count} scans", said={0: "{count} обзор", 1: "{count} обзора", 2: "{count} обзоров"}),
-    Entry("not yet", said={0: ""}),
+    Entry("range", translations={0: "дальность"}, notes=["#: a.py"]),
+    Entry("range", context="genitive", translations={0: "дальности"}),
+    Entry('a "quoted"\n\\path\tand more', translations={0: "„так“\n\\и\tтак"}),
+    Entry(
+        "{count} scan",
+        plural="{count} scans",
+        translations={0: "{count} обзор", 1: "{count} обзора", 2: "{count} обзоров"},
+    ),
+    Entry("not yet", translations={0: ""}),
 ]
 
 
@@ -36,7 +40,7 @@ def test_the_standard_library_reads_it():
 
 def test_a_text_over_several_lines_and_a_comment():
     text = '# of ours\nmsgid ""\n"σ of "\n"the range"\nmsgstr "СКО "\n"дальности"\n'
-    assert entries(text) == [Entry("σ of the range", said={0: "СКО дальности"}, notes=["# of ours"])]
+    assert entries(text) == [Entry("σ of the range", translations={0: "СКО дальности"}, notes=["# of ours"])]
 
 
 @pytest.mark.parametrize("line", ["msgid without quotes", 'msgwhat "a"', 'msgid "a" "b" c'])

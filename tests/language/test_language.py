@@ -72,7 +72,7 @@ def test_messages_that_differ_in_their_numbers_are_translated_once():
 def test_a_translation_has_as_many_numbers_as_its_message(code):
     entries = [one for one in language.messages(code) if language.ANY in one.id]
     assert len(entries) > 50
-    assert [one.id for one in entries if one.said[0].count(language.ANY) != one.id.count(language.ANY)] == []
+    assert [one.id for one in entries if one.translations[0].count(language.ANY) != one.id.count(language.ANY)] == []
 
 
 def test_what_is_not_translated_is_said_in_english():
@@ -120,7 +120,7 @@ def test_a_translation_has_the_places_of_its_message(code):
         if not entry.id or entry.context:
             continue
         allowed = {*places(entry.id), *places(entry.plural)}
-        for said in entry.said.values():
+        for said in entry.translations.values():
             assert set(places(said)) <= allowed, entry.id
             if not entry.plural:
                 assert set(places(said)) == allowed or entry.id == "{count} {kind}", entry.id
@@ -129,7 +129,7 @@ def test_a_translation_has_the_places_of_its_message(code):
 @pytest.mark.parametrize("code", CODES)
 def test_a_word_that_has_a_form_has_every_form_that_is_asked_for(code):
     entries = language.messages(code)
-    asked = {spec for one in entries for said in one.said.values() for spec in forms(said)}
+    asked = {spec for one in entries for said in one.translations.values() for spec in forms(said)}
     words = {one.id for one in entries if one.context in asked}
     assert words
     for context in asked:
@@ -140,7 +140,7 @@ def test_a_word_that_has_a_form_has_every_form_that_is_asked_for(code):
 def test_no_letter_of_a_translation_is_latin_by_mistake(code):
     """A Latin a, c, e, o, p or x inside a Cyrillic word looks right and is not."""
     for entry in language.messages(code):
-        for said in entry.said.values():
+        for said in entry.translations.values():
             mixed = re.findall(r"[А-Яа-яё][A-Za-z]|[A-Za-z][А-Яа-яё]", said.replace("\\n", " "))
             assert not mixed, said
 

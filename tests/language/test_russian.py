@@ -192,7 +192,7 @@ def test_names_of_a_config_are_said_as_whole_words_alone():
 @pytest.mark.parametrize("code", [code for code in language.known() if code != language.ENGLISH])
 def test_names_of_a_config_stay_apart_and_hold_commas_where_they_did(code):
     """Two filters must not get one name, and a list of names must part where it did."""
-    labels = {one.id: one.said[0] for one in language.messages(code) if one.context == language.LABEL}
+    labels = {one.id: one.translations[0] for one in language.messages(code) if one.context == language.LABEL}
     assert len(set(labels.values())) == len(labels) > 100
     assert [name for name, said in labels.items() if (", " in name) != (", " in said)] == []
 

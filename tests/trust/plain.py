@@ -414,7 +414,7 @@ def alike():
     plots = Plots(np.array([25.0, 5.0]), np.zeros(2), np.array([10.0, 0.0]), 0.7)
     design = patterns.Design(2, 2, pack(process_noise("white_jerk", 1.0, dt)))
     made = {"merged": patterns.mixture(design, plots, truth, dt, 32)}
-    made["in pieces"] = patterns.mixture(design, plots, truth[:9], dt, 16, whole=True)
+    made["in pieces"] = patterns.mixture(design, plots, truth[:9], dt, 16, follow_all=True)
     names = "moment", "bias", "believed", "nees"
     return {f"{how} {name}": np.nan_to_num(getattr(one, name)) for how, one in made.items() for name in names}
 

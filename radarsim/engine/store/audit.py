@@ -117,7 +117,7 @@ def _report_missing(audit: Audit, piece: Piece) -> None:
 def _check_total(audit: Audit, total: Total) -> None:
     """Check that the pieces of a total exist, and add up to it."""
     header, values = audit.pieces[total]
-    full, rest = divmod(total.count, header["block"])
+    full, partial = divmod(total.count, header["block"])
     nodes = audit.nodes()
     forest = Forest(header["block"], values.size)
     inner = maximal(nodes, full)
@@ -129,15 +129,15 @@ def _check_total(audit: Audit, total: Total) -> None:
         while first < stop:
             _report_missing(audit, node := widest(first, stop, 62))
             first = node.stop
-    cut = Partial(full, rest)
-    if rest and cut not in audit.pieces and not any(node in audit.pieces for node in cut.above(64)):
+    cut = Partial(full, partial)
+    if partial and cut not in audit.pieces and not any(node in audit.pieces for node in cut.above(64)):
         _report_missing(audit, cut)
-    if forest.gaps(full) or (rest and cut not in audit.pieces):
+    if forest.gaps(full) or (partial and cut not in audit.pieces):
         return  # nothing to add up: a larger run has merged them
     sums = forest.total()
-    if rest:
+    if partial:
         sums = added(sums, audit.sums(cut), 0) if full else audit.sums(cut)
-    parts: list[Piece] = [total, *inner, *([cut] if rest else [])]
+    parts: list[Piece] = [total, *inner, *([cut] if partial else [])]
     platforms = {name for piece in parts for name in audit.pieces[piece][0]["platforms"]}
     if sums.count != total.count or not agree(sums.values, values, platforms):
         audit.faults.append(f"{block_path(audit.path, total)}: is not the sum of the blocks beside it")

@@ -31,19 +31,19 @@ def take_inventory(
     """The stored part of N realisations of a work, or of a share of them, as (2, 3) the second of three; nothing
     without a directory."""
     pieces, block = set() if store is None else Store(store, work).pieces(), work.block
-    first, stop, rest = share_of(realisations, block, part)
-    asked, full = (stop - first) * block + rest, realisations // block
+    first, stop, partial = share_of(realisations, block, part)
+    requested, full = (stop - first) * block + partial, realisations // block
     if Total(realisations) in pieces:
-        return Inventory(asked, asked, (), None, loose=False)
+        return Inventory(requested, requested, (), None, loose=False)
     nodes = maximal([piece for piece in pieces if isinstance(piece, Node)], full)
     runs, blocks = gaps(nodes, stop, first), full + (realisations % block > 0)
-    if rest and Partial(full, rest) not in pieces:
+    if partial and Partial(full, partial) not in pieces:
         runs.append((runs.pop()[0] if runs and runs[-1][1] == full else full, blocks))
     missing = tuple((begin * block, min(end * block, realisations) - 1) for begin, end in runs)
-    stored = asked - sum(last + 1 - begin for begin, last in missing)
+    stored = requested - sum(last + 1 - begin for begin, last in missing)
     beyond_gap = bool(runs) and any(node.first >= runs[0][1] for node in nodes)
     loose = beyond_gap or (stored > 0 and not any(isinstance(piece, Total) for piece in pieces))
-    return Inventory(asked, stored, missing, missing_shares(runs, blocks) if loose else None, loose)
+    return Inventory(requested, stored, missing, missing_shares(runs, blocks) if loose else None, loose)
 
 
 def missing_shares(missing: Collection[tuple[int, int]], blocks: int) -> tuple[tuple[int, ...], int] | None:

@@ -16,8 +16,8 @@ def floor(spec: Keys, axes: DiscriminatorAxes) -> Floor | None:
     none = np.full(axes.posterior_sigma.shape[1:], np.nan)
     each = tuple(
         None
-        if one.start == "truth"
+        if value.start == "truth"
         else Bound(sigma, np.stack([none] * len(LAGS)), none, ("",) * len(sigma), reached=False)
-        for one, sigma in zip(spec.estimators, axes.posterior_sigma, strict=True)
+        for value, sigma in zip(spec.estimators, axes.posterior_sigma, strict=True)
     )
     return Floor(CRB, each, t_s=axes.duration_s)

@@ -75,9 +75,9 @@ class Ridge:
         windowed = samples[self.stretches] * np.hanning(STRETCH)
         power = np.abs(fft.fft(windowed, PADDED, axis=1)[:, : PADDED // 2 if np.isrealobj(samples) else PADDED]) ** 2
         peak = np.clip(power.argmax(axis=1), 1, power.shape[1] - 2)
-        left, top, right = (power[np.arange(len(peak)), peak + d] for d in (-1, 0, 1))
-        bend = np.minimum(left - 2.0 * top + right, -1e-12 * top)
-        turns = (peak + np.clip(0.5 * (left - right) / bend, -1.0, 1.0)) / PADDED
+        before_peak, at_peak, after_peak = (power[np.arange(len(peak)), peak + d] for d in (-1, 0, 1))
+        bend = np.minimum(before_peak - 2.0 * at_peak + after_peak, -1e-12 * at_peak)
+        turns = (peak + np.clip(0.5 * (before_peak - after_peak) / bend, -1.0, 1.0)) / PADDED
         if np.iscomplexobj(samples):
             turns = turns - np.rint(turns)
         return turns * self.pulses
@@ -86,19 +86,19 @@ class Ridge:
         """Coefficients of a robust polynomial through the ridge: random sample consensus, then a fit to the inliers."""
         powers = self.centres[:, None] ** np.arange(self.size - 1)
         slopes = np.linalg.solve(powers[self.trials], frequencies[self.trials][..., None])[..., 0]
-        near = np.abs(slopes @ powers.T - frequencies) < INLIER * self.pulses
-        best = slopes[near.sum(axis=1).argmax()]
+        is_inlier = np.abs(slopes @ powers.T - frequencies) < INLIER * self.pulses
+        best = slopes[is_inlier.sum(axis=1).argmax()]
         for _ in range(ROUNDS):
-            inside = np.abs(powers @ best - frequencies) < INLIER * self.pulses
-            best = np.linalg.lstsq(powers[inside], frequencies[inside], rcond=None)[0]
+            inliers = np.abs(powers @ best - frequencies) < INLIER * self.pulses
+            best = np.linalg.lstsq(powers[inliers], frequencies[inliers], rcond=None)[0]
         return np.concatenate([[0.0], best / np.arange(1, self.size)])
 
     def refined(self, samples: np.ndarray, coefficients: np.ndarray, count: int) -> np.ndarray:
         """Demodulated, summed over stretches, unwrapped, and the remaining phase fitted."""
         turns = np.polynomial.polynomial.polyval(self.t, coefficients)
         bare = samples * np.exp(-2j * np.pi * (turns - np.rint(turns)))
-        whole = self.pulses // count * count
-        sums = bare[:whole].reshape(-1, count).sum(axis=1)
+        used = self.pulses // count * count
+        sums = bare[:used].reshape(-1, count).sum(axis=1)
         centre = (np.arange(len(sums)) + 0.5 - 0.5 / count) * count / self.pulses
         phase = np.unwrap(np.angle(sums)) / (2.0 * np.pi)
         powers = centre[:, None] ** np.arange(self.size)
@@ -112,23 +112,27 @@ SEED = 2010
 
 @lru_cache(maxsize=16)
 def always_within(
-    burst: Burst, pulses: tuple[int, ...], prior_sigma: tuple[float, ...], factor: float = 3.0, louder: float = 1.0
+    burst: Burst,
+    pulses: tuple[int, ...],
+    prior_sigma: tuple[float, ...],
+    factor: float = 3.0,
+    noise_factor: float = 1.0,
 ) -> float:
     """Share of bursts of which every error stays under `factor` posterior σ at every window, these long in pulses.
 
-    prior_sigma (size,) in the units of θ. louder: σ of the true noise over that of the burst, which the estimator
-    believes. Standard error under 10⁻³."""
+    prior_sigma (size,) in the units of θ. noise_factor: σ of the true noise over that of the burst, which the
+    estimator believes. Standard error under 10⁻³."""
     random = np.random.Generator(np.random.Philox(SEED))
     root = np.diag(1.0 / np.asarray(prior_sigma, dtype=float))
     information = root**2
-    told = random.standard_normal((DRAWS, len(root))) @ root  # information times error: a sum of independent parts
+    score = random.standard_normal((DRAWS, len(root))) @ root  # information times error: a sum of independent parts
     inside = np.ones(DRAWS, dtype=bool)
     for first, last in zip((0, *pulses[:-1]), pulses, strict=True):
         root = _root(burst, first, last, len(prior_sigma))
         information = information + root.T @ root
-        told += louder * random.standard_normal((DRAWS, len(root))) @ root
+        score += noise_factor * random.standard_normal((DRAWS, len(root))) @ root
         covariance = balanced_inverse(information)
-        inside &= (np.abs(told @ covariance) < factor * np.sqrt(np.diag(covariance))).all(axis=1)
+        inside &= (np.abs(score @ covariance) < factor * np.sqrt(np.diag(covariance))).all(axis=1)
     return float(inside.mean())
 
 
@@ -160,7 +164,7 @@ DIGITS = 6  # of a unit vector: the last bits of another processor or LAPACK are
 
 
 class Plan(Protocol):
-    """What of the study's plan is used; see there."""
+    """The part of the study's plan that this search reads."""
 
     @property
     def layout(self) -> Layout: ...
@@ -190,7 +194,7 @@ class Loss(NamedTuple):
 
 
 class Room:
-    """Work arrays for eight bursts, and what is done with them."""
+    """Work arrays for eight bursts, and the steps of the estimator on them."""
 
     def __init__(self, plan: Plan):
         self.plan = plan
@@ -203,7 +207,7 @@ class Room:
 
     @property
     def passes(self) -> np.ndarray:
-        """Passes (8,) of what was followed last."""
+        """Passes (8,) of the last call of `follow`."""
         return self.row(PASSES)
 
     def put(self) -> None:
@@ -211,7 +215,7 @@ class Room:
         strips.put_drawn(self.plan.world.sums, self.plan.world.factor, self.a, self.b, self.drawn)
 
     def follow(self, f: int, errors: np.ndarray, options: np.void | None = None) -> None:
-        """Errors (up to 8, K, 6) of estimator f on what is in place, with its own options or others."""
+        """Errors (up to 8, K, 6) of estimator f on the bursts in the work arrays, with its own options or others."""
         plan = self.plan
         strips.run_strip(
             *(plan.world.physics, self.drawn, plan.tables, plan.windows[f]),
@@ -234,23 +238,24 @@ class Room:
     def lost(self, f: int, z: np.ndarray) -> np.ndarray:
         """Whether estimator f loses its lock (n,) with the normals z (n, 6 + 4B)."""
         last = int(self.plan.options[f]["windows"]) - 1
-        away = np.abs(self.errors(f, z)[: len(z), last]) >= FIVE * self.plan.potential[f, last]
-        return np.asarray(away.any(axis=1))
+        is_outside = np.abs(self.errors(f, z)[: len(z), last]) >= FIVE * self.plan.potential[f, last]
+        return np.asarray(is_outside.any(axis=1))
 
 
 def either_side(room: Room, f: int, unit: np.ndarray) -> Iterator[Loss]:
-    """The nearest losses of estimator f on both sides of a unit vector (6 + 4B,), those within `FARTHEST`. What is
-    found on one side is where to begin on the other, and to end if it is nearly as near there."""
-    ahead = nearest(room, f, unit)
-    if ahead is None:
-        behind = nearest(room, f, -unit)
+    """The nearest losses of estimator f on both sides of a unit vector (6 + 4B,), within MAX_LOSS_DISTANCE.
+
+    The loss on one side is the start of the search on the other, which ends when it is nearly as near there."""
+    positive = nearest(room, f, unit)
+    if positive is None:
+        negative = nearest(room, f, -unit)
     else:
-        enough = ahead.distance + NEARLY if ahead.distance <= FARTHEST else 0.0
-        behind = nearest(room, f, -unit, mirrored(ahead.unit), enough=enough)
-    if behind is not None and (ahead is None or behind.distance < ahead.distance - NEARLY):
-        starts = [unit if ahead is None else ahead.unit, mirrored(behind.unit)]
-        ahead = nearest(room, f, *starts, enough=behind.distance + NEARLY)
-    yield from (loss for loss in (ahead, behind) if loss is not None and loss.distance <= FARTHEST)
+        enough = positive.distance + NEARLY if positive.distance <= FARTHEST else 0.0
+        negative = nearest(room, f, -unit, mirrored(positive.unit), enough=enough)
+    if negative is not None and (positive is None or negative.distance < positive.distance - NEARLY):
+        starts = [unit if positive is None else positive.unit, mirrored(negative.unit)]
+        positive = nearest(room, f, *starts, enough=negative.distance + NEARLY)
+    yield from (loss for loss in (positive, negative) if loss is not None and loss.distance <= FARTHEST)
 
 
 def mirrored(unit: np.ndarray) -> np.ndarray:
@@ -262,24 +267,24 @@ def mirrored(unit: np.ndarray) -> np.ndarray:
 def nearest(room: Room, f: int, *starts: np.ndarray, enough: float = 0.0) -> Loss | None:
     """The nearest loss of estimator f that is found from the nearest of unit vectors (6 + 4B,); None if it has none.
     The search ends where one is near `enough`."""
-    begun = [(crossing(room, f, one, BEGIN, END_OF_SEARCH), one) for one in map(rounded, starts)]
-    found = [(at, one) for at, one in begun if at is not None]
-    if not found:
+    crossings = [(crossing(room, f, start, BEGIN, END_OF_SEARCH), start) for start in map(rounded, starts)]
+    losses = [(distance, start) for distance, start in crossings if distance is not None]
+    if not losses:
         return None
-    at, unit = min(found, key=lambda each: each[0])
+    distance, unit = min(losses, key=lambda loss: loss[0])
     for _ in range(MOST_TURNS):
-        towards = normal(room, f, unit, at) if at > enough else None
-        if towards is None:
+        boundary_normal = normal(room, f, unit, distance) if distance > enough else None
+        if boundary_normal is None:
             break
         for share in TURNS:
-            turned = rounded(share * towards + (1.0 - share) * unit)
-            nearer = crossing(room, f, turned, STEP * (0.5 * at // STEP), at - LEAST_GAIN)
-            if nearer is not None:
-                at, unit = nearer, turned
+            turned = rounded(share * boundary_normal + (1.0 - share) * unit)
+            new_distance = crossing(room, f, turned, STEP * (0.5 * distance // STEP), distance - LEAST_GAIN)
+            if new_distance is not None:
+                distance, unit = new_distance, turned
                 break
         else:
             break
-    return Loss(unit, at)
+    return Loss(unit, distance)
 
 
 def rounded(vector: np.ndarray) -> np.ndarray:
@@ -292,43 +297,45 @@ def crossing(room: Room, f: int, unit: np.ndarray, begin: float, farthest: float
     """How many σ along a unit vector (6 + 4B,) estimator f first loses its lock, to STEP/64; None if not so far."""
     width = STEP
     while width >= STEP / WIDTH**2:
-        at = begin + width * np.arange(1, WIDTH + 1)
-        lost = room.lost(f, at[:, None] * unit)
-        begin, width = (at[np.argmax(lost)] - width, width / WIDTH) if lost.any() else (at[-1], width)
+        distances = begin + width * np.arange(1, WIDTH + 1)
+        lost = room.lost(f, distances[:, None] * unit)
+        begin, width = (distances[np.argmax(lost)] - width, width / WIDTH) if lost.any() else (distances[-1], width)
         if begin >= farthest:
             return None
-    found = float(begin + width * WIDTH)
-    return found if found <= farthest else None
+    distance = float(begin + width * WIDTH)
+    return distance if distance <= farthest else None
 
 
-class Watched(NamedTuple):
-    """What a gradient refers to: which window's estimate, under which options, in differences of how many σ."""
+class GradientReference(NamedTuple):
+    """The estimate whose gradient is taken: its window, the options, and the step of the differences in σ."""
 
     window: int
     options: np.void
     difference: float
 
 
-def normal(room: Room, f: int, unit: np.ndarray, at: float) -> np.ndarray | None:
+def normal(room: Room, f: int, unit: np.ndarray, distance: float) -> np.ndarray | None:
     """The boundary's unit normal (6 + 4B,), outwards, where estimator f loses its lock: at σ along a unit vector. None
     where the two sides do not part in small steps."""
     plan, options = room.plan, room.plan.options[f].copy()
-    sides = np.array([at - STEP / WIDTH**2, at])[:, None] * unit
+    sides = np.array([distance - STEP / WIDTH**2, distance])[:, None] * unit
     size, last, middle = plan.layout.shapes["error"][2], int(options["windows"]) - 1, sides.mean(axis=0)
-    ends = room.errors(f, sides)[:2, : last + 1, :size]
-    astray = (np.abs(ends[1] - ends[0]) / plan.posterior[f, : last + 1, :size] > ASTRAY).any(axis=1)
-    if not astray.any():
-        passed = int(np.argmax(np.abs(ends[1, last]) / plan.potential[f, last, :size]))
-        along = np.where(np.arange(size) == passed, np.sign(ends[1, last]), 0.0)
-        return gradient(room, f, middle, along, Watched(last, options, SMOOTH_DIFFERENCE))
-    k, most = int(np.argmax(astray)), int(options["steps"])
+    errors_on_sides = room.errors(f, sides)[:2, : last + 1, :size]
+    has_separated = (
+        np.abs(errors_on_sides[1] - errors_on_sides[0]) / plan.posterior[f, : last + 1, :size] > ASTRAY
+    ).any(axis=1)
+    if not has_separated.any():
+        component = int(np.argmax(np.abs(errors_on_sides[1, last]) / plan.potential[f, last, :size]))
+        along = np.where(np.arange(size) == component, np.sign(errors_on_sides[1, last]), 0.0)
+        return gradient(room, f, middle, along, GradientReference(last, options, SMOOTH_DIFFERENCE))
+    k, all_steps = int(np.argmax(has_separated)), int(options["steps"])
     options["windows"], sigma = k + 1, plan.posterior[f, k, :size]
-    for steps in range(FEWEST_STEPS, most + 1):
+    for steps in range(FEWEST_STEPS, all_steps + 1):
         options["steps"] = steps
-        ends = room.errors(f, sides, options)[:2, k, :size]
-        apart = from_turn(ends[1] - ends[0]) / sigma
-        if np.linalg.norm(apart) > APART:
-            return gradient(room, f, middle, apart / sigma, Watched(k, options, DIFFERENCE))
+        errors_on_sides = room.errors(f, sides, options)[:2, k, :size]
+        separation = from_turn(errors_on_sides[1] - errors_on_sides[0]) / sigma
+        if np.linalg.norm(separation) > APART:
+            return gradient(room, f, middle, separation / sigma, GradientReference(k, options, DIFFERENCE))
     return None
 
 
@@ -337,17 +344,17 @@ def from_turn(errors: np.ndarray) -> np.ndarray:
     return np.concatenate([errors[..., :1] - np.rint(errors[..., :1]), errors[..., 1:]], axis=-1)
 
 
-def gradient(room: Room, f: int, z: np.ndarray, along: np.ndarray, of: Watched) -> np.ndarray | None:
+def gradient(room: Room, f: int, z: np.ndarray, along: np.ndarray, reference: GradientReference) -> np.ndarray | None:
     """The unit vector (6 + 4B,) in which alongᵀ(error) of a window grows fastest at z, along (size,), by differences.
     None where nothing changes it."""
-    plan, window = room.plan, room.plan.windows[f, of.window]
+    plan, window = room.plan, room.plan.windows[f, reference.window]
     ends = plan.tables[0].reshape(-1, COLUMNS)[int(window["table"]) + int(window["blocks"]) - 1, END]
-    used = SIZE + 4 * int(ends)  # what is drawn later is not in the estimate
-    found, size = np.zeros(len(z)), len(along)
-    before = room.errors(f, z[None], of.options)[:1, of.window, :size]
-    for first in range(0, used, WIDTH):
-        moved = z + of.difference * np.eye(min(WIDTH, used - first), len(z), first)
-        after = room.errors(f, moved, of.options)[: len(moved), of.window, :size]
-        found[first : first + len(moved)] = from_turn(after - before) @ along
-    length = np.linalg.norm(found)
-    return found / length if length > 0.0 else None
+    normals_used = SIZE + 4 * int(ends)  # what is drawn later is not in the estimate
+    differences, size = np.zeros(len(z)), len(along)
+    errors_at_z = room.errors(f, z[None], reference.options)[:1, reference.window, :size]
+    for first in range(0, normals_used, WIDTH):
+        moved_z = z + reference.difference * np.eye(min(WIDTH, normals_used - first), len(z), first)
+        moved_errors = room.errors(f, moved_z, reference.options)[: len(moved_z), reference.window, :size]
+        differences[first : first + len(moved_z)] = from_turn(moved_errors - errors_at_z) @ along
+    length = np.linalg.norm(differences)
+    return differences / length if length > 0.0 else None

@@ -69,15 +69,20 @@ def linear(plan: RarePlan, f: int) -> Linear:
         begin, blocks = int(window["table"]), int(window["blocks"])
         row = table.reshape(-1, COLUMNS)[begin : begin + blocks]
         ends = row[:, END].astype(int)
-        of = np.repeat(np.arange(blocks), np.diff(ends, prepend=0))  # the window's block of each one drawn
-        joining = weights.reshape(-1, WEIGHTS)[int(window["weights"]) : int(window["weights"]) + len(of)]
+        block_of = np.repeat(np.arange(blocks), np.diff(ends, prepend=0))  # the window's block of each one drawn
+        weights_of_blocks = weights.reshape(-1, WEIGHTS)[
+            int(window["weights"]) : int(window["weights"]) + len(block_of)
+        ]
         mean, slope = np.ones((size, blocks)), np.zeros((size, blocks))
         mean[1:], slope[1:] = row[:, M : M + size - 1].T, row[:, S : S + size - 1].T
-        zeroth, first = mean[:, of] + slope[:, of] * joining[:, SHIFT], slope[:, of] * joining[:, RATIO]
-        g = law[: len(of)].T  # the rows of the imaginary parts of Z₀ and Z₁
+        zeroth, first = (
+            mean[:, block_of] + slope[:, block_of] * weights_of_blocks[:, SHIFT],
+            slope[:, block_of] * weights_of_blocks[:, RATIO],
+        )
+        g = law[: len(block_of)].T  # the rows of the imaginary parts of Z₀ and Z₁
         parts = [zeroth * g[1] + first * g[6], zeroth * g[2] + first * g[7], first * g[8], first * g[9]]
         gradient = np.zeros((size, SIZE + count))
-        gradient[:, SIZE : SIZE + 4 * len(of)] = weight * np.stack(parts, axis=2).reshape(size, -1)
+        gradient[:, SIZE : SIZE + 4 * len(block_of)] = weight * np.stack(parts, axis=2).reshape(size, -1)
         powers = window["powers"][:size, None]
         if not plan.options[f]["from_truth"]:
             gradient += window["precision"][:size, None] * powers * forecast
@@ -89,28 +94,28 @@ def linear(plan: RarePlan, f: int) -> Linear:
 def directions(plan: RarePlan, f: int) -> np.ndarray:
     """Unit vectors (M, 6 + 4B) along which estimator f loses lock: its hand-overs', then its last window's components.
     Of the first window the start is the forecast, of which the phase is not used."""
-    maps, found = linear(plan, f), []
-    before = [maps.forecast, *maps.errors[:-1]]
+    maps, units = linear(plan, f), []
+    handed_over = [maps.forecast, *maps.errors[:-1]]
     for k, window in enumerate(plan.windows[f, : len(maps.errors)]):
         if k == 0 and plan.options[f]["from_truth"]:
             continue
         size, drop = len(maps.forecast), int(k == 0)
         root = window["root"][:size, :size]
-        delta = window["powers"][:size, None] * (before[k] - maps.errors[k])
+        delta = window["powers"][:size, None] * (handed_over[k] - maps.errors[k])
         # Σ v vᵀ = (Φ + P)⁻¹ over the root's rows; without the phase the form is a block of Φ + P, not its complement.
         form = np.linalg.inv(root.T @ root)[drop:, drop:]
-        found.append(leading(np.linalg.cholesky(form).T @ delta[drop:]))
+        units.append(leading(np.linalg.cholesky(form).T @ delta[drop:]))
     last = maps.errors[-1]
-    return np.array([*found, *(last / np.linalg.norm(last, axis=1, keepdims=True))])
+    return np.array([*units, *(last / np.linalg.norm(last, axis=1, keepdims=True))])
 
 
 def leading(matrix: np.ndarray) -> np.ndarray:
     """The right singular vector (n,) of the largest singular value of a matrix (m, n), m small; its side is fixed."""
     vectors = np.linalg.eigh(matrix @ matrix.T)[1]
-    found = vectors[:, -1] @ matrix
-    found = found / np.linalg.norm(found)
+    vector = vectors[:, -1] @ matrix
+    vector = vector / np.linalg.norm(vector)
     # An eigenvector's sign is LAPACK's choice.
-    return found * np.sign(found[np.argmax(np.abs(found))])
+    return vector * np.sign(vector[np.argmax(np.abs(vector))])
 
 
 def mixture(plan: RarePlan, f: int, plain: float) -> sums_of.Mixture:
@@ -118,11 +123,11 @@ def mixture(plan: RarePlan, f: int, plain: float) -> sums_of.Mixture:
     the nearest losses on both sides are looked for; each is shifted to, and has a share by the probability of what lies
     beyond it. Raises NoLoss where there is none."""
     room = nearest.Room(plan)
-    found = [loss for unit in directions(plan, f) for loss in nearest.either_side(room, f, unit)]
-    if not found:
+    losses = [loss for unit in directions(plan, f) for loss in nearest.either_side(room, f, unit)]
+    if not losses:
         raise NoLoss(f"loses no lock within {nearest.FARTHEST:g} σ along any direction: far rarer than 10⁻¹²")
-    units, shift = np.array([loss.unit for loss in found]), np.array([loss.distance for loss in found])
-    chance = np.array([math.erfc(one / math.sqrt(2.0)) for one in shift])
+    units, shift = np.array([loss.unit for loss in losses]), np.array([loss.distance for loss in losses])
+    chance = np.array([math.erfc(distance / math.sqrt(2.0)) for distance in shift])
     return made(plan, units, shift, chance + LEAST_SHARE * chance.max(), plain)
 
 
@@ -255,10 +260,10 @@ def phase_of(spec: Keys, burst: model.Burst) -> Phase:
 
 def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     """Standard deviations (size,) of the forecast as the estimators believe them."""
-    given = np.array(spec.prior.given) * spec.prior.scale
+    sigma = np.array(spec.prior.given) * spec.prior.scale
     if spec.prior.sigma is None:
-        given = given * model.spreads(model.fisher(burst, len(given), burst.duration_s))
-    return given
+        sigma = sigma * model.spreads(model.fisher(burst, len(sigma), burst.duration_s))
+    return sigma
 
 
 def designer_of(burst: model.Burst, sigma: np.ndarray, condition: model.Condition) -> model.Designer:
@@ -274,18 +279,18 @@ def designed_windows(burst: model.Burst, sigma: tuple[float, ...], condition: mo
 
 def windows_of(spec: Keys, burst: model.Burst, sigma: np.ndarray) -> list[list[int]]:
     """Window lengths of every estimator in pulses, for the forecast's standard deviations sigma (size,)."""
-    found = []
+    windows_by_estimator = []
     for e in spec.estimators:
         if e.method == "ridge":
-            found.append([burst.pulses])
+            windows_by_estimator.append([burst.pulses])
             continue
         if e.schedule == "designed":
             condition = model.Condition(e.lock_probability, e.main_lobe_threshold, e.tail)
             windows = list(designed_windows(burst, tuple(sigma.tolist()), condition))
         else:
             windows = sorted({burst.pulses_in(duration) for duration in e.schedule})
-        found.append(model.denser(windows, e.density)[: e.first_windows])
-    return found
+        windows_by_estimator.append(model.denser(windows, e.density)[: e.first_windows])
+    return windows_by_estimator
 
 
 def mode_of(spec: Keys) -> int:
@@ -313,30 +318,30 @@ def prepared(case: Case) -> Plan:
     size = len(sigma)
     designer = designer_of(burst, sigma, model.Condition())  # of forms, which no condition enters
     windows = windows_of(spec, burst, sigma)
-    every = sorted({w for own in windows for w in own})
-    image = model.has_image(burst, sigma, every, phase.turns)
+    all_windows = sorted({w for estimator_windows in windows for w in estimator_windows})
+    image = model.has_image(burst, sigma, all_windows, phase.turns)
     per_window = (IMAGE_BLOCKS_PER_WINDOW if image else BLOCKS_PER_WINDOW)[mode]
-    edges = model.block_edges(every, per_window, 8 if mode == DEMODULATED else 1)
+    edges = model.block_edges(all_windows, per_window, 8 if mode == DEMODULATED else 1)
     world = model.world(burst, mode, edges, image, phase.turns, phase.reference)
     tables = model.Tables(edges, world.mean, per_window)
     blocks = tables.window if mode == BLOCK_SUMS else tables.drawn
     designs = [design_of(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
-    mean_information = dict(zip(every, model.fisher_sums(burst, size, every), strict=True))
+    mean_information = dict(zip(all_windows, model.fisher_sums(burst, size, all_windows), strict=True))
     records, options = model.estimators(designs, blocks, burst, sigma, mean_information, designer)
-    whole = np.ones(SIZE)
-    whole[:size] = model.turns_per_parameter(size, burst.duration_s)
+    turns_per_unit = np.ones(SIZE)
+    turns_per_unit[:size] = model.turns_per_parameter(size, burst.duration_s)
     potential, posterior = bounds(burst, windows, phase.theta, sigma)
     if not (np.isfinite(potential).all() and np.isfinite(posterior).all()):
         raise ConfigError(f"{case.name}: truth: the samples of a window do not determine the {size} parameters")
-    count, most = records.shape
+    count, max_windows = records.shape
     plan = Plan(
         layout=Layout(
-            error=(count, most, size, 4),
-            error_all=(count, most, size, 4),
-            locks=(count, most, len(sums_of.LOCKS)),
-            residuals=(count, most, size, sums_of.BINS),
+            error=(count, max_windows, size, 4),
+            error_all=(count, max_windows, size, 4),
+            locks=(count, max_windows, len(sums_of.LOCKS)),
+            residuals=(count, max_windows, size, sums_of.BINS),
             passes=(count, 2),
-            **({} if spec.rare is None else {"losses": (count, most, len(sums_of.LOCKS), 4), "drawn": (3,)}),
+            **({} if spec.rare is None else {"losses": (count, max_windows, len(sums_of.LOCKS), 4), "drawn": (3,)}),
         ),
         axes=axes(spec, burst, windows, phase, sigma, potential, posterior),
         world=world,
@@ -344,18 +349,18 @@ def prepared(case: Case) -> Plan:
         windows=records,
         options=options,
         keys=np.stack([noise_key(case, "noise"), noise_key(case, "prior")]),
-        truth=padded(phase.theta) * whole,
-        prior_sigma=padded(sigma) * whole * spec.prior.error_scale,
-        potential=padded(potential, 1.0) * whole,
-        posterior=padded(posterior, 1.0) * whole,
+        truth=padded(phase.theta) * turns_per_unit,
+        prior_sigma=padded(sigma) * turns_per_unit * spec.prior.error_scale,
+        potential=padded(potential, 1.0) * turns_per_unit,
+        posterior=padded(posterior, 1.0) * turns_per_unit,
         ridges=tuple(i for i, e in enumerate(spec.estimators) if e.method == "ridge"),
     )
     if spec.rare is None:
         return plan
-    sought = [e.name for e in spec.estimators].index(spec.rare.estimator)
+    target = [e.name for e in spec.estimators].index(spec.rare.estimator)
     keys = np.concatenate([plan.keys, [noise_key(case, "rare")]])
     try:
-        return replace(plan, keys=keys, mixture=mixture(plan, sought, PLAIN_SHARE))
+        return replace(plan, keys=keys, mixture=mixture(plan, target, PLAIN_SHARE))
     except NoLoss as error:
         raise ConfigError(f"{case.name}: rare: {spec.rare.estimator} {error}") from None
 
@@ -387,18 +392,18 @@ def bounds(
     burst: model.Burst, windows: list[list[int]], theta: np.ndarray, sigma: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Potential spreads (F, K, size) of each window without and with the prior; ones where there is no window."""
-    size, most = len(sigma), max(map(len, windows))
-    shape = (len(windows), most, size)
+    size, max_windows = len(sigma), max(map(len, windows))
+    shape = (len(windows), max_windows, size)
     potential, posterior = np.ones(shape), np.ones(shape)
-    every = sorted({w for own in windows for w in own})
-    known = np.diag(model.phase_prior(sigma))
-    found = {
-        window: (model.spreads(information), model.spreads(information + known))
-        for window, information in zip(every, model.fisher_sums(burst, size, every, theta), strict=True)
+    all_windows = sorted({w for estimator_windows in windows for w in estimator_windows})
+    prior_information = np.diag(model.phase_prior(sigma))
+    spreads = {
+        window: (model.spreads(information), model.spreads(information + prior_information))
+        for window, information in zip(all_windows, model.fisher_sums(burst, size, all_windows, theta), strict=True)
     }
-    for f, own in enumerate(windows):
-        for k, window in enumerate(own):
-            potential[f, k], posterior[f, k] = found[window]
+    for f, estimator_windows in enumerate(windows):
+        for k, window in enumerate(estimator_windows):
+            potential[f, k], posterior[f, k] = spreads[window]
     return potential, posterior
 
 
@@ -413,27 +418,27 @@ def axes(
 ) -> DiscriminatorAxes:
     """Labels: filters are the estimators, scans their windows; each has window lengths of its own."""
     names, size = tuple(e.name for e in spec.estimators), len(sigma)
-    most = max(map(len, windows))
-    durations = np.full((len(names), most), np.nan)
-    for f, own in enumerate(windows):
-        durations[f, : len(own)] = np.array(own) * burst.pulse_period_s
+    max_windows = max(map(len, windows))
+    durations = np.full((len(names), max_windows), np.nan)
+    for f, estimator_windows in enumerate(windows):
+        durations[f, : len(estimator_windows)] = np.array(estimator_windows) * burst.pulse_period_s
     available = np.repeat(np.isfinite(durations)[..., None], size, axis=2)
-    whole = model.fisher(burst, size, burst.duration_s)
+    information = model.fisher(burst, size, burst.duration_s)
     return DiscriminatorAxes(
         filters=names,
         components=COMPONENTS[:size],
-        k=np.arange(1, most + 1),
-        t_s=durations[int(np.argmax([len(own) for own in windows]))],
+        k=np.arange(1, max_windows + 1),
+        t_s=durations[int(np.argmax([len(estimator_windows) for estimator_windows in windows]))],
         available=available,
         baseline=0,
         exact_sigma=np.where(available, potential, np.nan),
         exact_bias=np.where(available, 0.0, np.nan),
         duration_s=durations,
-        pulses=tuple(tuple(own) for own in windows),
+        pulses=tuple(tuple(estimator_windows) for estimator_windows in windows),
         posterior_sigma=np.where(available, posterior, np.nan),
         prior_sigma=sigma,
-        potential_closed_form=model.spreads(whole),
-        potential_covariance=model.balanced_inverse(whole),
+        potential_closed_form=model.spreads(information),
+        potential_covariance=model.balanced_inverse(information),
         energy_ratio=model.energy_ratio(burst, 1.0) * durations,
         burst_s=burst.duration_s,
         shortest_window_s=model.shortest_window(burst),
@@ -444,8 +449,8 @@ def axes(
 
 def doppler_error(burst: model.Burst, phase: Phase) -> float:
     """Root-mean-square difference in Hz between the true Doppler frequency and that of the fitted parameters."""
-    rest = (phase.turns - phase.reference)[0]
-    return float(np.sqrt(np.mean((np.diff(rest) / burst.pulse_period_s) ** 2)))
+    residual = (phase.turns - phase.reference)[0]
+    return float(np.sqrt(np.mean((np.diff(residual) / burst.pulse_period_s) ** 2)))
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:

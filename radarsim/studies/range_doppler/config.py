@@ -132,8 +132,10 @@ class FilterKeys(Model):
         if self.observes not in (("range",), ("range", "velocity")):
             yield at("observes", "must be [range] or [range, velocity]")
         elif self.plots_to_start < PLOTS_NEEDED[len(self.observes)]:
-            least = PLOTS_NEEDED[len(self.observes)]
-            yield at("initial_scans", f"must be >= {least} for a filter that observes {' and '.join(self.observes)}")
+            min_plots = PLOTS_NEEDED[len(self.observes)]
+            yield at(
+                "initial_scans", f"must be >= {min_plots} for a filter that observes {' and '.join(self.observes)}"
+            )
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
@@ -164,9 +166,9 @@ class Filter(FilterKeys):
     )
 
 
-def variance_of(one: FilterKeys) -> float | Best:
+def variance_of(filter_keys: FilterKeys) -> float | Best:
     """A filter's D_M, (m/s³)²; not-a-number where it has none, as one of a package may."""
-    return getattr(one, "manoeuvre_variance", math.nan)
+    return getattr(filter_keys, "manoeuvre_variance", math.nan)
 
 
 class Keys(fields.Lasting):
@@ -191,19 +193,20 @@ class Keys(fields.Lasting):
 
     @cross_check
     def _long_enough(self) -> Iterator[At]:
-        starts = fields.readable(self.filters, lambda one: (one.plots_to_start, one.name))
+        starts = fields.readable(self.filters, lambda filter_keys: (filter_keys.plots_to_start, filter_keys.name))
         plots, slowest = max(starts, key=lambda start: start[0], default=(0, ""))
         if self.plots < plots:
-            which = "scans" if self.duration_s is None else "duration_s"
-            many = "" if which == "scans" else " scans of radar.scan_period_s"
-            yield at(which, f"must be >= {plots}{many} for the initialisation of filter {slowest}")
+            duration_key = "scans" if self.duration_s is None else "duration_s"
+            unit_text = "" if duration_key == "scans" else " scans of radar.scan_period_s"
+            yield at(duration_key, f"must be >= {plots}{unit_text} for the initialisation of filter {slowest}")
         yield from fields.of_each(self.filters, self._counts_from)
 
-    def _counts_from(self, i: int, one: FilterKeys) -> Iterator[At]:
-        best = variance_of(one)
-        if isinstance(best, Best) and not isinstance(one, Filter):
+    def _counts_from(self, i: int, filter_keys: FilterKeys) -> Iterator[At]:
+        best = variance_of(filter_keys)
+        if isinstance(best, Best) and not isinstance(filter_keys, Filter):
             yield at(
-                f"filters.{i}.manoeuvre_variance", f"must be a number: the best one of kind {one.kind} is not known"
+                f"filters.{i}.manoeuvre_variance",
+                f"must be a number: the best one of kind {filter_keys.kind} is not known",
             )
         elif isinstance(best, Best) and best.from_k > self.plots:
             yield at(f"filters.{i}.manoeuvre_variance.from_k", f"must be <= the number of scans, {self.plots}")
@@ -212,10 +215,13 @@ class Keys(fields.Lasting):
     def _of_every_plot(self) -> Iterator[At]:
         yield from fields.of_each(self.filters, self._sees_every_plot)
 
-    def _sees_every_plot(self, i: int, one: FilterKeys) -> Iterator[At]:
-        if not isinstance(one, Filter) and self.radar.detection_probability < 1:
-            words = f"must be 1 with filter {one.name}: gains of kind {one.kind} are made for a plot at every scan"
-            yield at("radar.detection_probability", words)
+    def _sees_every_plot(self, i: int, filter_keys: FilterKeys) -> Iterator[At]:
+        if not isinstance(filter_keys, Filter) and self.radar.detection_probability < 1:
+            message = (
+                f"must be 1 with filter {filter_keys.name}: "
+                f"gains of kind {filter_keys.kind} are made for a plot at every scan"
+            )
+            yield at("radar.detection_probability", message)
 
     @cross_check
     def _accuracies_in_proportion(self) -> Iterator[At]:
@@ -234,8 +240,8 @@ class Keys(fields.Lasting):
         if not any(True for _ in self._accuracies_in_proportion()):  # else that is the fault
             yield from fields.of_each(self.filters, self._in_proportion)
 
-    def _in_proportion(self, i: int, one: FilterKeys) -> Iterator[At]:
-        variance = variance_of(one)
+    def _in_proportion(self, i: int, filter_keys: FilterKeys) -> Iterator[At]:
+        variance = variance_of(filter_keys)
         if isinstance(variance, Best) or math.isnan(variance):
             return
         radar, dt = self.radar, self.radar.scan_period_s
@@ -243,7 +249,7 @@ class Keys(fields.Lasting):
         if not 1e-28 <= variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
             ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
             yield at(name, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
-        elif "velocity" in one.observes and variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
+        elif "velocity" in filter_keys.observes and variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
             ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
             yield at(name, f"out of proportion: {ratio} must be <= 1e12")
 
@@ -255,16 +261,16 @@ class Keys(fields.Lasting):
 
 def can_fold(spec: Keys) -> bool:
     """Whether the config can be carried over to folded velocities: it has nothing that only this study knows."""
-    target, plain = spec.target, all(isinstance(one, Filter) for one in spec.filters)
-    drawn = any(getattr(target, name, 0) for name in ("sigma_position_m", "sigma_velocity_mps"))
-    noises = {getattr(one, "process_noise", "") for one in spec.filters}
-    given = all(isinstance(variance_of(one), float) for one in spec.filters)
+    target, has_study_filters = spec.target, all(isinstance(filter_keys, Filter) for filter_keys in spec.filters)
+    has_random_flight = any(getattr(target, name, 0) for name in ("sigma_position_m", "sigma_velocity_mps"))
+    noises = {getattr(filter_keys, "process_noise", "") for filter_keys in spec.filters}
+    has_fixed_variances = all(isinstance(variance_of(filter_keys), float) for filter_keys in spec.filters)
     radar = spec.radar.model_copy(update={"detection_probability": 1.0})
     return (
-        plain
-        and given
+        has_study_filters
+        and has_fixed_variances
         and noises == {"random_jerk"}
         and radar.as_the_papers
-        and not drawn
+        and not has_random_flight
         and target.kind != "jerk_pulse"
     )

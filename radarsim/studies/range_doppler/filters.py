@@ -59,8 +59,8 @@ class Plots(NamedTuple):
     @property
     def inputs(self) -> np.ndarray:
         """What the plots add to the columns of E, (2, C): their mean error, and a column for each bias drawn."""
-        drawn = np.diag(self.sigma_bias)[:, self.sigma_bias > 0]
-        return np.concatenate([self.bias[:, None], drawn, np.zeros((2, self.of_truth))], axis=1)
+        random_biases = np.diag(self.sigma_bias)[:, self.sigma_bias > 0]
+        return np.concatenate([self.bias[:, None], random_biases, np.zeros((2, self.of_truth))], axis=1)
 
 
 class Errors(NamedTuple):
@@ -78,13 +78,13 @@ class Errors(NamedTuple):
 def defects(x: np.ndarray, dt: float, plots: Plots, drawn: np.ndarray | None = None) -> np.ndarray:
     """F x − x⁺ of the truth x (K, 3) at every scan from the one before, for the columns of E: (K, 3, C).
 
-    drawn (K, 3, 1 + of_truth): beside x, the mean and the columns of a truth that is drawn; None: it is not."""
-    made = np.zeros((len(x), 3, plots.inputs.shape[1]))
-    made[1:, :, 0] = np.array(algebra.predicted(x[:-1].T, algebra.constant_acceleration(dt))).T - x[1:]
+    random_truth (K, 3, 1 + of_truth): beside x, the mean and the columns of a truth that is drawn; None: it is not."""
+    defect = np.zeros((len(x), 3, plots.inputs.shape[1]))
+    defect[1:, :, 0] = np.array(algebra.predicted(x[:-1].T, algebra.constant_acceleration(dt))).T - x[1:]
     if drawn is not None:
-        made[:, :, 0] += drawn[:, :, 0]
-        made[:, :, made.shape[2] - plots.of_truth :] = drawn[:, :, 1:]
-    return made
+        defect[:, :, 0] += drawn[:, :, 0]
+        defect[:, :, defect.shape[2] - plots.of_truth :] = drawn[:, :, 1:]
+    return defect
 
 
 def started(weights: np.ndarray, believed: np.ndarray, plots: Plots, defect: np.ndarray, dt: float) -> Errors:
@@ -105,22 +105,22 @@ def scans(errors: Errors, observes: int, plots: Plots, Q: Any, defect: np.ndarra
     independent. Q packed, of numbers or arrays (B,); defect (K, 3, C) of these scans."""
     (P, S, E), F = errors, algebra.constant_acceleration(dt)
     inputs: Any = plots.inputs[:, :, None]
-    of_scans: Any = defect[:, :, :, None]
-    if alone := isinstance(Q[0], float) and E.size == 3:  # of plain numbers alone Python is faster
-        E, inputs, of_scans = E.ravel().tolist(), inputs.ravel().tolist(), defect.reshape(-1, 3).tolist()
-    R, settled = [float(sigma) ** 2 for sigma in plots.sigma[:observes]], False
+    defects_of_scans: Any = defect[:, :, :, None]
+    if has_plain_numbers := isinstance(Q[0], float) and E.size == 3:  # of plain numbers alone Python is faster
+        E, inputs, defects_of_scans = E.ravel().tolist(), inputs.ravel().tolist(), defect.reshape(-1, 3).tolist()
+    R, is_steady = [float(sigma) ** 2 for sigma in plots.sigma[:observes]], False
     gains: list[Any] = []
     add, forward = algebra.add_scaled.function, algebra.predicted.function  # a call less in each of many scans
-    for of_scan in of_scans:
-        E = add(forward(E, F), 1.0, of_scan)
-        if not settled:
-            before, gains = (P, S), []
+    for scan_defect in defects_of_scans:
+        E = add(forward(E, F), 1.0, scan_defect)
+        if not is_steady:
+            previous, gains = (P, S), []
             P, S = algebra.predicted_covariance(P, F, Q), algebra.predicted_covariance(S, F, algebra.NO_NOISE)
             for m in range(observes):
                 P, gain, _ = algebra.TAKE[m](P, R[m], 1.0)
                 S = algebra.CORRECT[m](S, R[m], gain)
                 gains.append(gain)
-            settled = alone and before == (P, S)  # to the last bit, and so they stay
+            is_steady = has_plain_numbers and previous == (P, S)  # to the last bit, and so they stay
         for m, gain in enumerate(gains):
             E = add(E, inputs[m] - E[m], gain)
         yield Errors(P, S, E)
@@ -174,11 +174,11 @@ def true_motion(case: Case) -> tuple[np.ndarray, np.ndarray]:
     target, t = case.spec.target, scan_times(case.spec)
     x = checked_truth(target, t, case.name)
     spread = sigma_flight(target)
-    away = np.hypot(np.max(spread[:3]), np.max(spread[3:]) * t) * APART
-    if (x[:, 0] < away).any():
-        k = int(np.argmax(x[:, 0] < away))
+    min_range_m = np.hypot(np.max(spread[:3]), np.max(spread[3:]) * t) * APART
+    if (x[:, 0] < min_range_m).any():
+        k = int(np.argmax(x[:, 0] < min_range_m))
         fault = f"its random spread may reach the radar: at {t[k]:g} s it is {x[k, 0]:.4g} m away"
-        raise ConfigError(f"{case.name}: target: {fault}, {APART:g} standard deviations are {away[k]:.4g} m")
+        raise ConfigError(f"{case.name}: target: {fault}, {APART:g} standard deviations are {min_range_m[k]:.4g} m")
     return t, x
 
 
@@ -196,38 +196,40 @@ def drawn_defects(target: Target, t: np.ndarray, x: np.ndarray) -> np.ndarray:
         return np.full((scans, 3, 1), np.nan)
     dt = float(t[1])
     unit = np.array([1.0, dt, dt**2])
-    middle = left(x[None], dt)[0]
+    middle_defect = left(x[None], dt)[0]
     total, products = np.zeros(3 * scans), np.zeros((3 * scans, 3 * scans))
     for weights, shifts in displacements(spread):
-        away = ((left(displaced(path, shifts, t), dt) - middle) * unit).reshape(len(weights), -1)
-        total += weights @ away
-        products += away.T @ (weights[:, None] * away)
+        deviations = ((left(displaced(path, shifts, t), dt) - middle_defect) * unit).reshape(len(weights), -1)
+        total += weights @ deviations
+        products += deviations.T @ (weights[:, None] * deviations)
     variances, vectors = np.linalg.eigh(products - np.outer(total, total))
-    kept = variances > KEPT_SHARE * max(variances[-1], 0.0) / len(variances)
-    columns = vectors[:, kept][:, ::-1] * np.sqrt(variances[kept][::-1])
-    made: np.ndarray = np.column_stack([total, columns]).reshape(scans, 3, -1) / unit[:, None]
-    return made
+    is_relevant = variances > KEPT_SHARE * max(variances[-1], 0.0) / len(variances)
+    columns = vectors[:, is_relevant][:, ::-1] * np.sqrt(variances[is_relevant][::-1])
+    moments: np.ndarray = np.column_stack([total, columns]).reshape(scans, 3, -1) / unit[:, None]
+    return moments
 
 
 def left(x: np.ndarray, dt: float) -> np.ndarray:
     """F x − x⁺ of truths x (M, K, 3), at every scan from the one before; zero at the first."""
-    made: np.ndarray = np.zeros_like(x)
-    made[:, 1:] = x[:, :-1] @ transition(dt).T - x[:, 1:]
-    return made
+    defect: np.ndarray = np.zeros_like(x)
+    defect[:, 1:] = x[:, :-1] @ transition(dt).T - x[:, 1:]
+    return defect
 
 
 def displacements(spread: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Weights (M,) and displacements (M, 6) whose weighted means are those over what is drawn, some at a time.
     Gauss–Hermite quadrature in each number that is drawn; spread (6,) are their standard deviations."""
-    drawn = np.flatnonzero(spread)
-    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES[len(drawn)])
-    places = np.stack(np.meshgrid(*[nodes] * len(drawn), indexing="ij"), axis=-1).reshape(-1, len(drawn))
-    shares = np.stack(np.meshgrid(*[weights / weights.sum()] * len(drawn), indexing="ij"), axis=-1)
-    shifts = np.zeros((len(places), 6))
-    shifts[:, drawn] = places * spread[drawn]
-    each = shares.reshape(-1, len(drawn)).prod(axis=1)
-    ends = [*range(0, len(each), AT_ONCE), len(each)]
-    return [(each[a:b], shifts[a:b]) for a, b in pairwise(ends)]
+    random_numbers = np.flatnonzero(spread)
+    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES[len(random_numbers)])
+    points = np.stack(np.meshgrid(*[nodes] * len(random_numbers), indexing="ij"), axis=-1).reshape(
+        -1, len(random_numbers)
+    )
+    point_weights = np.stack(np.meshgrid(*[weights / weights.sum()] * len(random_numbers), indexing="ij"), axis=-1)
+    shifts = np.zeros((len(points), 6))
+    shifts[:, random_numbers] = points * spread[random_numbers]
+    weights_of_points = point_weights.reshape(-1, len(random_numbers)).prod(axis=1)
+    bounds = [*range(0, len(weights_of_points), AT_ONCE), len(weights_of_points)]
+    return [(weights_of_points[a:b], shifts[a:b]) for a, b in pairwise(bounds)]
 
 
 def displaced(path: np.ndarray, shifts: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -260,40 +262,40 @@ def observation(observes: int) -> np.ndarray:
     return np.eye(3)[:observes]
 
 
-def least_squares(times: np.ndarray, there: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def least_squares(times: np.ndarray, present: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Weighted least squares on plots at times (n,), s, as a state at time 0: weights (3, 2, n), covariance (3, 3).
 
-    there (n, 2) says which numbers there are; sigma (2,) holds the standard deviations of range (m) and radial velocity
+    present (n, 2): which numbers there are; sigma (2,) holds the standard deviations of range (m) and radial velocity
     (m/s). None where they do not determine a state. Solved in scaled units (state per interval, rows per sigma) so that
     periods of milliseconds and of hours are equally well conditioned."""
     unit = max(float(np.ptp(times)), 1e-9) / max(len(times) - 1, 1)
     scale = np.array([1.0, 1.0 / unit, 1.0 / unit**2])
-    A = np.concatenate([transition(t)[:2] * scale / sigma[:, None] for t in times])[there.ravel()]
+    A = np.concatenate([transition(t)[:2] * scale / sigma[:, None] for t in times])[present.ravel()]
     if np.linalg.matrix_rank(A) < 3:
         return None
     solution = scale[:, None] * np.linalg.pinv(A)
     weights = np.zeros((3, len(times), 2))
-    weights[:, there] = solution
+    weights[:, present] = solution
     return (weights / sigma).swapaxes(1, 2), solution @ solution.T
 
 
 def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
     """As `least_squares`, on the first `start` scans, at the last of them: weights (3, 2, start), covariance (3, 3)."""
-    there = np.broadcast_to(np.arange(2) < observes, (start, 2))
-    found = least_squares(dt * np.arange(1 - start, 1), there, sigma)
-    if found is None:
+    present = np.broadcast_to(np.arange(2) < observes, (start, 2))
+    solution = least_squares(dt * np.arange(1 - start, 1), present, sigma)
+    if solution is None:
         raise ValueError("too few plots for a start")
-    return found
+    return solution
 
 
 def noise_by_time(noise: str, manoeuvre_variance: float, period: float) -> np.ndarray:
     """Process noise over any time t, (2, 6) packed: Q_ij = a_ij t^(5 − i − j) + b_ij t^(6 − i − j), i and j from 0.
     What `physics.process_noise` adds over a scan period (s), for plots at uneven times: the jerk stays constant between
     two plots; white jerk keeps its density; of the acceleration's steps there are as many as periods."""
-    made = np.zeros((2, 6))
-    of_a_second = np.array(algebra.pack(process_noise(noise, manoeuvre_variance, 1.0)))
-    made[int(noise == "random_jerk")] = of_a_second * (1.0 if noise == "random_jerk" else period)
-    return made
+    coefficients = np.zeros((2, 6))
+    noise_per_second = np.array(algebra.pack(process_noise(noise, manoeuvre_variance, 1.0)))
+    coefficients[int(noise == "random_jerk")] = noise_per_second * (1.0 if noise == "random_jerk" else period)
+    return coefficients
 
 
 def design(
@@ -313,7 +315,7 @@ def design(
         algebra.constant_acceleration(dt),
         tuple(map(float, algebra.pack(process_noise(noise, manoeuvre_variance, dt)))),
     )
-    R, there = tuple(map(float, sigma**2)), (True, observes == 2)
+    R, present = tuple(map(float, sigma**2)), (True, observes == 2)
     weights, covariance = least_squares_start(observes, start, sigma, dt)
     gains, believed = np.zeros((scans, 3, 2)), np.zeros((scans, 6))
     available = np.ones((scans, 3), dtype=bool)
@@ -321,27 +323,27 @@ def design(
     believed[: start - 1, [0, 3][:observes]] = sigma[:observes] ** 2
     P = tuple(map(float, algebra.pack(covariance)))
     believed[start - 1] = P
-    after: list[tuple[float, ...]] = []
-    while len(after) < scans - start:
-        before = P
-        P, of_range, of_velocity = updated(P, F, Q, R, there)
-        after.append(P + of_range + of_velocity)
-        if before == P:  # stationary to the last bit, and so it stays
-            after += [after[-1]] * (scans - start - len(after))
-    found = np.array(after).reshape(-1, 12)
-    believed[start:], gains[start:] = found[:, :6], found[:, 6:].reshape(-1, 2, 3).swapaxes(1, 2)
+    scans_after_start: list[tuple[float, ...]] = []
+    while len(scans_after_start) < scans - start:
+        previous = P
+        P, range_gain, velocity_gain = updated(P, F, Q, R, present)
+        scans_after_start.append(P + range_gain + velocity_gain)
+        if previous == P:  # stationary to the last bit, and so it stays
+            scans_after_start += [scans_after_start[-1]] * (scans - start - len(scans_after_start))
+    designed_scans = np.array(scans_after_start).reshape(-1, 12)
+    believed[start:], gains[start:] = designed_scans[:, :6], designed_scans[:, 6:].reshape(-1, 2, 3).swapaxes(1, 2)
     return LinearFilter(observes, start, weights, gains, algebra.unpack(believed.T), available, Q)
 
 
-def updated(P: Any, F: Any, Q: Any, R: Any, there: Any) -> tuple[Any, Any, Any]:
-    """A covariance after a scan, packed, and its gains (3,) on the range and velocity where there are any; R (2,)."""
-    P, of_range, of_velocity = algebra.predicted_covariance(P, F, Q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    if there[0]:
-        P, of_range, _ = algebra.take_value(P, R[0], 1.0)
-    if there[1]:  # taken after the range, so that it moves what that makes of the estimate
-        P, of_velocity, _ = algebra.take_rate(P, R[1], 1.0)
-        of_range = algebra.add_scaled(of_range, -of_range[1], of_velocity)
-    return P, of_range, of_velocity
+def updated(P: Any, F: Any, Q: Any, R: Any, present: Any) -> tuple[Any, Any, Any]:
+    """A covariance after a scan, packed, and its gains (3,) on range and velocity where they are present; R (2,)."""
+    P, range_gain, velocity_gain = algebra.predicted_covariance(P, F, Q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    if present[0]:
+        P, range_gain, _ = algebra.take_value(P, R[0], 1.0)
+    if present[1]:  # taken after the range, so that it moves what that makes of the estimate
+        P, velocity_gain, _ = algebra.take_rate(P, R[1], 1.0)
+        range_gain = algebra.add_scaled(range_gain, -range_gain[1], velocity_gain)
+    return P, range_gain, velocity_gain
 
 
 # ---- closed form -----------------------------------------------------------------------------------------------------
@@ -413,9 +415,9 @@ def noise_variances(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np
     A, P = damping(c), believed(c)
     X, p11 = A**3, P[0, 0]
     b, d = A**2 / 2 - A * (X - 8) / 4 * p11, X - 2
-    of_range = P[0, 0] - P[0, 2] ** 2 * A / d - step * (P[0, 1] - P[0, 2] * p11 * A / d)
-    of_velocity = P[1, 1] - (1 + p11**2 * A) / d - step * (P[1, 2] - (A - p11 + p11 * b * A) / d)
-    return np.array([of_range, of_velocity, P[2, 2] - (1.5 * A**2 - 2 * b + b**2 * A) / d])
+    range_variance = P[0, 0] - P[0, 2] ** 2 * A / d - step * (P[0, 1] - P[0, 2] * p11 * A / d)
+    velocity_variance = P[1, 1] - (1 + p11**2 * A) / d - step * (P[1, 2] - (A - p11 + p11 * b * A) / d)
+    return np.array([range_variance, velocity_variance, P[2, 2] - (1.5 * A**2 - 2 * b + b**2 * A) / d])
 
 
 def steady_gains(c: np.ndarray | float, step: np.ndarray | float = 0.0) -> np.ndarray:
@@ -448,18 +450,20 @@ def errors_of_many(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
     """Steady variances (3, n) of the filters of many radars at once, each in units of its own; C_θ = 0: range alone. As
     `steady_state`, by doubling: each round of the Riccati equation's iteration does as many scans as all before
     (Anderson, Int. J. Control 28, 1978, 295-306), and so does each of the sum of what the noise leaves."""
-    n, unit = len(Lambda), np.maximum(1.0, Lambda ** (-1 / 3))  # time in memories τ₂, where longer than a scan
-    F = np.stack([transition(1 / u) for u in unit])
-    Q = np.stack([manoeuvre_covariance(one**2 * u**6, 1 / u) for one, u in zip(Lambda, unit, strict=True)])
+    n, time_unit = len(Lambda), np.maximum(1.0, Lambda ** (-1 / 3))  # time in memories τ₂, where longer than a scan
+    F = np.stack([transition(1 / u) for u in time_unit])
+    Q = np.stack(
+        [manoeuvre_covariance(noise_index**2 * u**6, 1 / u) for noise_index, u in zip(Lambda, time_unit, strict=True)]
+    )
     information = np.zeros((n, 3, 3))  # HᵀR⁻¹H
-    information[:, 0, 0], information[:, 1, 1] = 1.0, C_theta / unit**2
+    information[:, 0, 0], information[:, 1, 1] = 1.0, C_theta / time_unit**2
     P, A, G = Q, F.transpose(0, 2, 1), information
     for _ in range(DOUBLINGS):
         W = np.linalg.inv(np.eye(3) + G @ P)
         P, A, G = (P + A.transpose(0, 2, 1) @ P @ W @ A, A @ W @ A, G + A @ W @ G @ A.transpose(0, 2, 1))
-    kept = np.linalg.inv(np.eye(3) + P @ information)  # I − KH
-    believed = kept @ P
-    S, M = believed @ information @ believed.transpose(0, 2, 1), kept @ F  # K R Kᵀ, with K = believed HᵀR⁻¹
+    I_minus_KH = np.linalg.inv(np.eye(3) + P @ information)  # I − KH
+    believed = I_minus_KH @ P
+    S, M = believed @ information @ believed.transpose(0, 2, 1), I_minus_KH @ F  # K R Kᵀ, with K = believed HᵀR⁻¹
     for _ in range(DOUBLINGS):
         S, M = S + M @ S @ M.transpose(0, 2, 1), M @ M
     return np.diagonal(S, axis1=1, axis2=2).T
@@ -467,21 +471,21 @@ def errors_of_many(C_theta: np.ndarray, Lambda: np.ndarray) -> np.ndarray:
 
 # ---- exact -----------------------------------------------------------------------------------------------------------
 def error_recursion(
-    one: LinearFilter, plots: Plots, truth: np.ndarray, dt: float, drawn: np.ndarray | None = None
+    filter_: LinearFilter, plots: Plots, truth: np.ndarray, dt: float, random_truth: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lasting errors E (K, 3, C) and covariance S (K, 3, 3) due to noise, at every scan of a truth (K, 3).
 
-    drawn: see `defects`. Before the start the estimates are the plots."""
-    defect, observes, begun = defects(truth, dt, plots, drawn), one.observes, one.start - 1
+    random_truth: see `defects`. Before the start the estimates are the plots."""
+    defect, observes, start_index = defects(truth, dt, plots, random_truth), filter_.observes, filter_.start - 1
     E, S = np.zeros_like(defect), np.zeros((len(truth), 6))
-    E[:begun, :observes], S[:begun, 0] = plots.inputs[:observes], plots.sigma[0] ** 2
-    S[:begun, 3] = plots.sigma[1] ** 2 if observes > 1 else 0.0
-    start = started(one.weights, one.believed[begun], plots, defect, dt)
-    E[begun], S[begun] = start.E[:, :, 0], start.S
-    further = list(scans(start, observes, plots, one.noise, defect[one.start :], dt))
-    if further:
-        E[one.start :] = np.array([errors.E for errors in further]).reshape(len(further), 3, -1)
-        S[one.start :] = [errors.S for errors in further]
+    E[:start_index, :observes], S[:start_index, 0] = plots.inputs[:observes], plots.sigma[0] ** 2
+    S[:start_index, 3] = plots.sigma[1] ** 2 if observes > 1 else 0.0
+    start = started(filter_.weights, filter_.believed[start_index], plots, defect, dt)
+    E[start_index], S[start_index] = start.E[:, :, 0], start.S
+    later_errors = list(scans(start, observes, plots, filter_.noise, defect[filter_.start :], dt))
+    if later_errors:
+        E[filter_.start :] = np.array([errors.E for errors in later_errors]).reshape(len(later_errors), 3, -1)
+        S[filter_.start :] = [errors.S for errors in later_errors]
     return E, algebra.unpack(S.T)
 
 
@@ -502,9 +506,9 @@ def steady_state(
     Q = process_noise(noise, manoeuvre_variance * unit**6 / sigma[0] ** 2, step)
     extrapolated = solve_discrete_are(F.T, H.T, Q, R)
     K = np.linalg.solve(H @ extrapolated @ H.T + R, H @ extrapolated).T
-    kept = np.eye(3) - K @ H
-    believed = kept @ extrapolated @ kept.T + K @ R @ K.T
-    true = solve_discrete_lyapunov(kept @ F, K @ R @ K.T)
+    I_minus_KH = np.eye(3) - K @ H
+    believed = I_minus_KH @ extrapolated @ I_minus_KH.T + K @ R @ K.T
+    true = solve_discrete_lyapunov(I_minus_KH @ F, K @ R @ K.T)
     to_units = np.outer(scale, scale)
     return believed * to_units, true * to_units
 
@@ -522,13 +526,13 @@ def normalised_error(
     unit = scale[..., :, None] * scale[..., None, :]
     mean, variance = np.full(available.shape[:-1], np.nan), np.full(available.shape[:-1], np.nan)
     for pattern in np.unique(available.reshape(-1, 3), axis=0):
-        known, where = np.flatnonzero(pattern), np.all(available == pattern, axis=-1)
-        if known.size:
-            P, M = ((part * unit)[where][:, known][:, :, known] for part in (believed, moment))
-            m = (bias * scale)[where][:, known, None]
+        components, has_pattern = np.flatnonzero(pattern), np.all(available == pattern, axis=-1)
+        if components.size:
+            P, M = ((part * unit)[has_pattern][:, components][:, :, components] for part in (believed, moment))
+            m = (bias * scale)[has_pattern][:, components, None]
             P[np.linalg.slogdet(P).sign == 0] = np.nan  # of a filter that diverges, by rounding; solve would raise
             ratio = np.linalg.solve(P, M)
             shift = (m * np.linalg.solve(P, m)).sum(axis=(1, 2))
-            mean[where] = np.trace(ratio, axis1=1, axis2=2) / known.size
-            variance[where] = 2 * (np.einsum("nij,nji->n", ratio, ratio) - shift**2) / known.size**2
+            mean[has_pattern] = np.trace(ratio, axis1=1, axis2=2) / components.size
+            variance[has_pattern] = 2 * (np.einsum("nij,nji->n", ratio, ratio) - shift**2) / components.size**2
     return mean, variance

@@ -13,8 +13,8 @@ def floor(spec: Keys, axes: Axes) -> Floor | None:
     """A polynomial has the second degree, or its own where that is higher; of other motions none is defined, but
     where flights are drawn. A drawn bias of the plots is one more unknown of each realisation."""
     radar, t = spec.radar, np.asarray(axes.t_s, dtype=float)
-    drawn = filters.is_drawn(spec.target)
-    if drawn and len(t) <= filters.DRAWN_SCANS:
+    has_random_flight = filters.is_drawn(spec.target)
+    if has_random_flight and len(t) <= filters.DRAWN_SCANS:
         prior, maps, products = of_flights(spec, t)
     elif spec.target.kind == "polynomial":
         size = max(3, len(spec.target.coefficients))
@@ -24,16 +24,16 @@ def floor(spec: Keys, axes: Axes) -> Floor | None:
         return None
     sigma = np.array([radar.sigma_range_m, radar.sigma_velocity_mps])
     biases = np.array([radar.sigma_bias_range_m, radar.sigma_bias_velocity_mps])
-    found: dict[tuple[int, int], Bound] = {}
+    bounds: dict[tuple[int, int], Bound] = {}
 
     def below(observes: int, start: int) -> Bound:
-        asked = observes, start if radar.detection_probability < 1 else 0
-        if asked not in found:
-            found[asked] = of_plots(start, prior, maps, products[:, :observes], sigma, biases, spec)
-        return found[asked]
+        bound_key = observes, start if radar.detection_probability < 1 else 0
+        if bound_key not in bounds:
+            bounds[bound_key] = of_plots(start, prior, maps, products[:, :observes], sigma, biases, spec)
+        return bounds[bound_key]
 
-    each = tuple(below(len(one.observes), one.plots_to_start) for one in spec.filters)
-    return Floor(floors.POSTERIOR if drawn else floors.CRB, each, below(2, PLOTS_NEEDED[2]))
+    filter_bounds = tuple(below(len(filter_.observes), filter_.plots_to_start) for filter_ in spec.filters)
+    return Floor(floors.POSTERIOR if has_random_flight else floors.CRB, filter_bounds, below(2, PLOTS_NEEDED[2]))
 
 
 def of_plots(
@@ -47,33 +47,51 @@ def of_plots(
 ) -> Bound:
     """Of plots whose numbers d have derivatives with these mean products (K, D, p, p)."""
     scans, numbers, size = products.shape[:3]
-    of_bias = np.flatnonzero(biases[:numbers])
-    wide = size + len(of_bias)
-    information, before, every = np.zeros((scans, wide, wide)), np.zeros((wide, wide)), np.zeros((scans, 3, wide))
-    before[:size, :size], every[..., :size] = prior, maps
+    bias_numbers = np.flatnonzero(biases[:numbers])
+    full_size = size + len(bias_numbers)
+    information, prior_information, derivatives = (
+        np.zeros((scans, full_size, full_size)),
+        np.zeros((full_size, full_size)),
+        np.zeros((scans, 3, full_size)),
+    )
+    prior_information[:size, :size], derivatives[..., :size] = prior, maps
     for d in range(numbers):
         information[:, :size, :size] += products[:, d] / sigma[d] ** 2
-    for i, d in enumerate(of_bias.tolist(), start=size):  # the derivative of number d by its bias is 1
+    for i, d in enumerate(bias_numbers.tolist(), start=size):  # the derivative of number d by its bias is 1
         information[:, i, :size] = information[:, :size, i] = maps[:, d] / sigma[d] ** 2
-        information[:, i, i], before[i, i] = 1 / sigma[d] ** 2, 1 / biases[d] ** 2
+        information[:, i, i], prior_information[i, i] = 1 / sigma[d] ** 2, 1 / biases[d] ** 2
     if (chance := spec.radar.detection_probability) == 1:
-        return floors.static(before, information, every, not filters.is_drawn(spec.target))
-    each, alone = np.ones((scans, 3), dtype=int), (True, numbers == 2, False)
+        return floors.static(prior_information, information, derivatives, not filters.is_drawn(spec.target))
+    multiplicity, plot_numbers = np.ones((scans, 3), dtype=int), (True, numbers == 2, False)
     settles = 0 if prior.any() else -(-size // numbers)
-    return floors.missed(before, information, every, np.full(scans, chance), each, (start,) * 3, settles, alone)
+    return floors.missed(
+        prior_information,
+        information,
+        derivatives,
+        np.full(scans, chance),
+        multiplicity,
+        (start,) * 3,
+        settles,
+        plot_numbers,
+    )
 
 
 def of_flights(spec: Keys, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Information (p, p) on what is drawn of a flight, and means over it of the derivatives (K, 3, p) of range,
     velocity and acceleration, and of their products (K, 2, p, p) of the first two (Van Trees 1968)."""
     spread = filters.sigma_flight(spec.target)
-    path, drawn = filters.flight(spec.target, t), np.flatnonzero(spread)
-    maps, products = np.zeros((len(t), 3, len(drawn))), np.zeros((len(t), 2, len(drawn), len(drawn)))
+    path, random_numbers = filters.flight(spec.target, t), np.flatnonzero(spread)
+    maps, products = (
+        np.zeros((len(t), 3, len(random_numbers))),
+        np.zeros((len(t), 2, len(random_numbers), len(random_numbers))),
+    )
     for weights, shifts in filters.displacements(spread):
-        each = derivatives(path, shifts, t)[..., drawn]
-        maps += np.einsum("m,mkci->kci", weights, each)
-        products += np.einsum("m,mkdi,mkdj->kdij", weights, each[:, :, :2], each[:, :, :2])
-    return np.diag(spread[drawn] ** -2.0), maps, products
+        derivatives_of_nodes = derivatives(path, shifts, t)[..., random_numbers]
+        maps += np.einsum("m,mkci->kci", weights, derivatives_of_nodes)
+        products += np.einsum(
+            "m,mkdi,mkdj->kdij", weights, derivatives_of_nodes[:, :, :2], derivatives_of_nodes[:, :, :2]
+        )
+    return np.diag(spread[random_numbers] ** -2.0), maps, products
 
 
 def derivatives(path: np.ndarray, shifts: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -55,14 +55,16 @@ class Mixture:
     beside: np.ndarray
 
     @classmethod
-    def of(cls, found: np.ndarray) -> "Mixture":
-        """Of the sums that `kernels.patterns.add_means` has found."""
-        started, nees, bias, moment, believed = found[:, 0], found[:, 1], found[:, 2:5], found[:, 5:8], found[:, 8:11]
-        available = started[:, None] + found[:, patterns.FIRST : patterns.OWN]
-        both = found[:, patterns.OWN :].reshape(len(found), -1, 2, 3).swapaxes(0, 1)
+    def of(cls, sums: np.ndarray) -> "Mixture":
+        """The mixture of the sums that `kernels.patterns.add_means` has made."""
+        started, nees, bias, moment, believed = sums[:, 0], sums[:, 1], sums[:, 2:5], sums[:, 5:8], sums[:, 8:11]
+        available = started[:, None] + sums[:, patterns.FIRST : patterns.OWN]
+        in_common = sums[:, patterns.OWN :].reshape(len(sums), -1, 2, 3).swapaxes(0, 1)
         with np.errstate(invalid="ignore", divide="ignore"):
             bias, moment, believed = (part / available for part in (bias, moment, believed))
-            return cls(started, available, bias, moment, believed, nees / started, both[:, :, 1] / both[:, :, 0])
+            return cls(
+                started, available, bias, moment, believed, nees / started, in_common[:, :, 1] / in_common[:, :, 0]
+            )
 
 
 def mixture(
@@ -70,42 +72,44 @@ def mixture(
     plots: Plots,
     truth: np.ndarray,
     dt: float,
-    most: int = KEPT[-1],
-    beside: Sequence[Design] = (),
-    drawn: np.ndarray | None = None,
+    max_patterns: int = KEPT[-1],
+    companions: Sequence[Design] = (),
+    random_truth: np.ndarray | None = None,
     from_k: int = 0,
-    whole: bool = False,
+    follow_all: bool = False,
 ) -> Mixture:
-    """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; beside it others.
+    """Means over all patterns of plots, of a filter on the truth (K, 3) at scans dt (s) apart; and of its companions.
 
-    drawn: of a truth that is drawn, as `filters.defects` takes it. from_k: nothing is known before this scan,
-    counted from 1. whole: beyond `most` patterns none are merged."""
-    defect = defects(truth, dt, plots, drawn)
+    random_truth: of a truth that is drawn, as `filters.defects` takes it. from_k: nothing is known before this scan,
+    counted from 1. follow_all: beyond `max_patterns` none are merged, but followed piece by piece."""
+    defect = defects(truth, dt, plots, random_truth)
     scans, _, columns = defect.shape
-    others = [(one.observes, one.start) for one in beside]
+    companion_designs = [(companion.observes, companion.start) for companion in companions]
     world = patterns.World(
         defect=np.ascontiguousarray(defect),
         Q=np.array(design.Q),
         R=plots.sigma**2,
         inputs=np.ascontiguousarray(plots.inputs),
         of_plot=np.stack([plots.bias, plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2], axis=1),
-        others=np.array(others, dtype=np.int64).reshape(-1, 2),
+        others=np.array(companion_designs, dtype=np.int64).reshape(-1, 2),
         detection=float(plots.detection),
         dt=float(dt),
         observes=design.observes,
         start=design.start,
-        enough=max(start for _, start in [(design.observes, design.start), *others]),
-        most=most,
-        whole=whole,
+        enough=max(start for _, start in [(design.observes, design.start), *companion_designs]),
+        most=max_patterns,
+        whole=follow_all,
         from_k=from_k,
     )
-    waiting = most_waiting(design.start, scans, plots.detection)
-    sums = scans, patterns.OWN + patterns.BESIDE * len(others)
-    if waiting > MOST_WAITING:
+    max_waiting = most_waiting(design.start, scans, plots.detection)
+    sums = scans, patterns.OWN + patterns.BESIDE * len(companion_designs)
+    if max_waiting > MOST_WAITING:
         return Mixture.of(np.full(sums, np.nan))
-    found = np.zeros(sums)
-    patterns.add_means(patterns.room(min(most, 1 << min(scans, 30)), columns, waiting, scans), world, found)
-    return Mixture.of(found)
+    pattern_sums = np.zeros(sums)
+    patterns.add_means(
+        patterns.room(min(max_patterns, 1 << min(scans, 30)), columns, max_waiting, scans), world, pattern_sums
+    )
+    return Mixture.of(pattern_sums)
 
 
 def most_waiting(start: int, scans: int, detection: float) -> int:
@@ -122,7 +126,7 @@ def settled(fine: Mixture, coarse: Mixture, from_k: int = 0) -> bool:
     pairs = [(fine.moment[late], coarse.moment[late]), (fine.beside[:, late], coarse.beside[:, late])]
     if from_k == 0:
         pairs.append((fine.nees, coarse.nees))
-    return all(bool((close(one, other) | np.isnan(one)).all()) for one, other in pairs)
+    return all(bool((close(fine_mean, coarse_mean) | np.isnan(fine_mean)).all()) for fine_mean, coarse_mean in pairs)
 
 
 def close(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
@@ -135,9 +139,9 @@ def close(fine: np.ndarray, coarse: np.ndarray) -> np.ndarray:
 PATTERN_SCANS = 60  # of a run with missed plots: beyond, the mean over patterns takes minutes
 
 
-def designs(made: Designed) -> list[Design]:
+def designs(designed_case: Designed) -> list[Design]:
     """The filters of a case."""
-    return [Design(d.observes, d.start, d.noise) for d in made.filters]
+    return [Design(d.observes, d.start, d.noise) for d in designed_case.filters]
 
 
 @dataclass(frozen=True)
@@ -154,35 +158,45 @@ FOUND: dict[tuple, Means] = {}  # of the last filters and worlds: a filter of th
 MOST_MEANS = 128
 
 
-def means(design: Design, beside: Sequence[Design], made: Designed) -> Means:
+def means(design: Design, companions: Sequence[Design], designed_case: Designed) -> Means:
     """The means of one filter over the patterns; the last ones computed are kept."""
-    seen = [part[: design.observes] for part in made.plots[:3]]
-    arrays = (*seen, made.x, made.drawn)
-    others = tuple((one.observes, one.start) for one in beside)
-    asked = made.dt, made.asked_from_k, made.roughly, made.plots.detection
-    key = (design, others, *asked, *(array.tobytes() for array in arrays))
-    found = FOUND.pop(key) if key in FOUND else over_patterns(design, beside, made)
+    plot_arrays = [part[: design.observes] for part in designed_case.plots[:3]]
+    arrays = (*plot_arrays, designed_case.x, designed_case.drawn)
+    companion_designs = tuple((companion.observes, companion.start) for companion in companions)
+    settings = designed_case.dt, designed_case.asked_from_k, designed_case.roughly, designed_case.plots.detection
+    key = (design, companion_designs, *settings, *(array.tobytes() for array in arrays))
+    result = FOUND.pop(key) if key in FOUND else over_patterns(design, companions, designed_case)
     if len(FOUND) >= MOST_MEANS:
         del FOUND[next(iter(FOUND))]
-    FOUND[key] = found
-    return found
+    FOUND[key] = result
+    return result
 
 
-def over_patterns(design: Design, beside: Sequence[Design], made: Designed) -> Means:
+def over_patterns(design: Design, companions: Sequence[Design], designed_case: Designed) -> Means:
     """The means of one filter over the patterns, of which as many are kept as it takes."""
 
-    def kept(most: int, whole: bool = False) -> Mixture:
-        return mixture(design, made.plots, made.x, made.dt, most, beside, made.drawn, made.asked_from_k, whole)
+    def kept(max_patterns: int, follow_all: bool = False) -> Mixture:
+        return mixture(
+            design,
+            designed_case.plots,
+            designed_case.x,
+            designed_case.dt,
+            max_patterns,
+            companions,
+            designed_case.drawn,
+            designed_case.asked_from_k,
+            follow_all,
+        )
 
-    if made.roughly or 2 ** len(made.t) <= WHOLE:
-        one = kept(KEPT[0]) if made.roughly else kept(AT_ONCE, whole=True)
-        return Means(np.sqrt(one.moment), one.bias, one.nees, np.sqrt(one.beside))
+    if designed_case.roughly or 2 ** len(designed_case.t) <= WHOLE:
+        single = kept(KEPT[0]) if designed_case.roughly else kept(AT_ONCE, follow_all=True)
+        return Means(np.sqrt(single.moment), single.bias, single.nees, np.sqrt(single.beside))
     mixtures = map(kept, KEPT)
     coarse, fine = next(mixtures), next(mixtures)
-    while not settled(fine, coarse, made.asked_from_k) and (finer := next(mixtures, None)) is not None:
+    while not settled(fine, coarse, designed_case.asked_from_k) and (finer := next(mixtures, None)) is not None:
         coarse, fine = fine, finer
-    known = close(fine.moment, coarse.moment)
-    whole_state = close(fine.nees, coarse.nees) & known.all(axis=1)
-    others = np.where(close(fine.beside, coarse.beside), np.sqrt(fine.beside), np.nan)
-    sigma, bias = (np.where(known, values, np.nan) for values in (np.sqrt(fine.moment), fine.bias))
-    return Means(sigma, bias, np.where(whole_state, fine.nees, np.nan), others)
+    is_known = close(fine.moment, coarse.moment)
+    whole_state = close(fine.nees, coarse.nees) & is_known.all(axis=1)
+    companion_sigma = np.where(close(fine.beside, coarse.beside), np.sqrt(fine.beside), np.nan)
+    sigma, bias = (np.where(is_known, values, np.nan) for values in (np.sqrt(fine.moment), fine.bias))
+    return Means(sigma, bias, np.where(whole_state, fine.nees, np.nan), companion_sigma)

@@ -76,8 +76,8 @@ class Plan:
 
 def prepare(case: Case) -> Plan:
     """Design the filters of a case, its truth, and the exact values of its errors."""
-    made = designed(case)
-    return Plan(case, made, axes(made))
+    designed_case = designed(case)
+    return Plan(case, designed_case, axes(designed_case))
 
 
 def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
@@ -116,35 +116,39 @@ def costly(case: Case) -> bool:
     return bool(2**case.spec.plots > patterns.AT_ONCE)
 
 
-def axes(made: Designed) -> RangeDopplerAxes:
+def axes(designed_case: Designed) -> RangeDopplerAxes:
     """Labels and exact values."""
-    spec, radar = made.spec, made.spec.radar
+    spec, radar = designed_case.spec, designed_case.spec.radar
     names = tuple(f.name for f in spec.filters)
     baseline = names.index(spec.baseline) if spec.baseline else 0
-    available = np.stack([d.available for d in made.filters])
-    known = exact_values(made, baseline) if radar.detection_probability == 1 else exact_means(made, baseline)
+    available = np.stack([d.available for d in designed_case.filters])
+    exact = (
+        exact_values(designed_case, baseline)
+        if radar.detection_probability == 1
+        else exact_means(designed_case, baseline)
+    )
     return RangeDopplerAxes(
         filters=names,
         components=COMPONENTS,
-        k=np.arange(1, len(made.t) + 1),
-        t_s=made.t,
+        k=np.arange(1, len(designed_case.t) + 1),
+        t_s=designed_case.t,
         available=available,
         baseline=baseline,
-        exact_sigma=np.where(available, known.sigma, np.nan),
-        exact_bias=np.where(available, known.bias, np.nan),
-        believed=known.believed,
-        exact_nees=known.nees,
-        exact_gain=known.gain,
-        observes=made.observes,
-        manoeuvre_variance=np.array(made.variances),
+        exact_sigma=np.where(available, exact.sigma, np.nan),
+        exact_bias=np.where(available, exact.bias, np.nan),
+        believed=exact.believed,
+        exact_nees=exact.nees,
+        exact_gain=exact.gain,
+        observes=designed_case.observes,
+        manoeuvre_variance=np.array(designed_case.variances),
         process_noise=tuple(f.process_noise if isinstance(f, Filter) else "" for f in spec.filters),
-        settled_gain=np.stack([given.settled(d) for d in made.filters]),
-        sigma=made.plots.sigma,
-        scan_period_s=made.dt,
-        C_theta=float(made.plots.sigma[0] ** 2 / (made.dt**2 * made.plots.sigma[1] ** 2)),
+        settled_gain=np.stack([given.settled(d) for d in designed_case.filters]),
+        sigma=designed_case.plots.sigma,
+        scan_period_s=designed_case.dt,
+        C_theta=float(designed_case.plots.sigma[0] ** 2 / (designed_case.dt**2 * designed_case.plots.sigma[1] ** 2)),
         wavelength_m=radar.wavelength_m,
         repetition_rate_hz=radar.repetition_rate_hz,
-        speed_mps=float(np.abs(made.x[:, 1]).max()),
+        speed_mps=float(np.abs(designed_case.x[:, 1]).max()),
         plain=radar.as_the_papers,
     )
 
@@ -160,16 +164,20 @@ class Known:
     believed: np.ndarray
 
 
-def exact_values(made: Designed, baseline: int) -> Known:
+def exact_values(designed_case: Designed, baseline: int) -> Known:
     """Of filters that get every plot."""
     errors = [
-        (given if d.given else filters).error_recursion(d, made.plots, made.x, made.dt, made.drawn)
-        for d in made.filters
+        (given if d.given else filters).error_recursion(
+            d, designed_case.plots, designed_case.x, designed_case.dt, designed_case.drawn
+        )
+        for d in designed_case.filters
     ]
     lasting, covariance = np.stack([E for E, _ in errors]), np.stack([S for _, S in errors])
-    bias, further = lasting[..., 0], lasting[..., 1:]
-    covariance = covariance + np.einsum("fkic,fkjc->fkij", further, further)
-    available, believed = (np.stack([getattr(d, what) for d in made.filters]) for what in ("available", "believed"))
+    bias, random_columns = lasting[..., 0], lasting[..., 1:]
+    covariance = covariance + np.einsum("fkic,fkjc->fkij", random_columns, random_columns)
+    available, believed = (
+        np.stack([getattr(d, attribute) for d in designed_case.filters]) for attribute in ("available", "believed")
+    )
     moment = covariance + bias[..., :, None] * bias[..., None, :]
     with np.errstate(invalid="ignore"):  # a filter that diverges has variances below zero by rounding: no σ
         root = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3) + bias**2)
@@ -187,20 +195,22 @@ def gains(sigma: np.ndarray, base: np.ndarray) -> np.ndarray:
         return 100 * (1 - sigma / base)
 
 
-def exact_means(made: Designed, baseline: int) -> Known:
+def exact_means(designed_case: Designed, baseline: int) -> Known:
     """Of filters that miss plots, as means over the patterns: not-a-number where these are too many to be exact."""
-    shape = (len(made.filters), len(made.t), 3)
+    shape = (len(designed_case.filters), len(designed_case.t), 3)
     sigma, bias, gain = (np.full(shape, np.nan) for _ in range(3))
     nees = np.full(shape[:2], np.nan)
     from radarsim.studies.range_doppler import patterns
 
-    if len(made.t) <= patterns.PATTERN_SCANS:
-        own = patterns.designs(made)
-        base = patterns.means(own[baseline], own, made)
-        for f, design in enumerate(own):
-            of = base if f == baseline else patterns.means(design, [own[baseline]], made)
-            sigma[f], bias[f], nees[f] = of.sigma, of.bias, of.nees
-            gain[f] = gains(of.beside[0], base.beside[f])
+    if len(designed_case.t) <= patterns.PATTERN_SCANS:
+        filter_designs = patterns.designs(designed_case)
+        baseline_means = patterns.means(filter_designs[baseline], filter_designs, designed_case)
+        for f, design in enumerate(filter_designs):
+            filter_means = (
+                baseline_means if f == baseline else patterns.means(design, [filter_designs[baseline]], designed_case)
+            )
+            sigma[f], bias[f], nees[f] = filter_means.sigma, filter_means.bias, filter_means.nees
+            gain[f] = gains(filter_means.beside[0], baseline_means.beside[f])
     return Known(sigma, bias, gain, nees, np.zeros((*shape, 3)))
 
 

@@ -58,8 +58,8 @@ def drawing(case: Case) -> Draw:
 def variances_of(case: Case) -> Sequence[float]:
     """D_M of each filter, (m/s³)²: as given, or the best on the config's target."""
     spec: Keys = case.spec
-    stated = [variance for variance in map(config.variance_of, spec.filters) if isinstance(variance, float)]
-    return stated if len(stated) == len(spec.filters) else designed(case).variances
+    fixed_variances = [variance for variance in map(config.variance_of, spec.filters) if isinstance(variance, float)]
+    return fixed_variances if len(fixed_variances) == len(spec.filters) else designed(case).variances
 
 
 class Tracker:
@@ -89,19 +89,29 @@ class Tracker:
     def feed(self, recorded: Mapping[str, np.ndarray]) -> Track:
         """The estimates over the next rows: columns (n,), not-a-number where a value is missing."""
         t, z = recorded["t_s"], np.stack([recorded["range_m"], recorded["velocity_mps"]], axis=1)
-        made = [one.feed(t, z) for one in self.filters]
-        estimate, sigma, nis = (np.stack([part[i] for part in made]) for i in range(3))
+        outputs = [track_filter.feed(t, z) for track_filter in self.filters]
+        estimate, sigma, nis = (np.stack([part[i] for part in outputs]) for i in range(3))
         residual = z[None] - estimate[..., :2]
-        taken = np.arange(2) < np.array([one.observes for one in self.filters])[:, None]
+        is_used = np.arange(2) < np.array([track_filter.observes for track_filter in self.filters])[:, None]
         # A number that was taken in has drawn the estimate to itself; of another the errors add.
-        spread = self.sigma**2 + np.where(taken[:, None], -1.0, 1.0) * sigma[..., :2] ** 2
-        for of, one in zip(spread, self.filters, strict=True):
-            if isinstance(one, _Given):
-                of[len(t) - len(one.left) :] = one.left
-        believed = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
+        spread = self.sigma**2 + np.where(is_used[:, None], -1.0, 1.0) * sigma[..., :2] ** 2
+        for filter_spread, track_filter in zip(spread, self.filters, strict=True):
+            if isinstance(track_filter, _Given):
+                filter_spread[len(t) - len(track_filter.left) :] = track_filter.left
+        residual_sigma = np.where(np.isfinite(residual), np.sqrt(np.maximum(spread, 0.0)), np.nan)
         labels = (("range_m", "m"), ("velocity_mps", "m/s"))
         return Track(
-            self.names, COMPONENTS, t, estimate, sigma, None, labels, residual, MEASURED, nis, residual_sigma=believed
+            self.names,
+            COMPONENTS,
+            t,
+            estimate,
+            sigma,
+            None,
+            labels,
+            residual,
+            MEASURED,
+            nis,
+            residual_sigma=residual_sigma,
         )
 
 
@@ -119,26 +129,26 @@ class _Starting(ABC):
         """Estimates, standard deviations (n, 3), and normalised innovations squared (n, 2) over the next rows."""
         n = len(t)
         estimate, sigma, nis = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, 2), np.nan)
-        taken = np.isfinite(z) & (np.arange(2) < self.observes)
+        is_used = np.isfinite(z) & (np.arange(2) < self.observes)
         k = 0
         while self.x is None and k < n:
-            self._begin(t[k], np.where(taken[k], z[k], np.nan))
+            self._begin(t[k], np.where(is_used[k], z[k], np.nan))
             if self.x is None:
-                estimate[k, :2] = np.where(taken[k], z[k], np.nan)
-                sigma[k, :2] = np.where(taken[k], self.sigma, np.nan)
+                estimate[k, :2] = np.where(is_used[k], z[k], np.nan)
+                sigma[k, :2] = np.where(is_used[k], self.sigma, np.nan)
             else:
                 estimate[k], sigma[k] = self.x, np.sqrt(self.P[[0, 3, 5]])
             k += 1
         if k < n:
-            estimate[k:], sigma[k:], nis[k:] = self.after(k, t, z, taken)
+            estimate[k:], sigma[k:], nis[k:] = self.after(k, t, z, is_used)
         self.last = t[-1]
         return estimate, sigma, nis
 
     @abstractmethod
     def after(
-        self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
+        self, k: int, t: np.ndarray, z: np.ndarray, is_used: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """What `feed` gives of the rows from k on, before which the filter has started; taken: the numbers it takes."""
+        """The outputs of `feed` for the rows from k on, where the filter has started; is_used: the numbers it takes."""
 
     def _begin(self, t: float, z: np.ndarray) -> None:
         """Take one more plot, and start from all so far where they suffice."""
@@ -146,11 +156,11 @@ class _Starting(ABC):
             self.held = [*self.held[-(LONGEST_START - 1) :], (t, z)]
         if len(self.held) < self.needed or not np.isfinite(z).any():
             return
-        times = np.array([at for at, _ in self.held]) - t
+        times = np.array([plot_time for plot_time, _ in self.held]) - t
         values = np.stack([plot for _, plot in self.held])
-        found = least_squares(times, np.isfinite(values), self.sigma)
-        if found is not None:
-            weights, covariance = found
+        solution = least_squares(times, np.isfinite(values), self.sigma)
+        if solution is not None:
+            weights, covariance = solution
             self.x, self.P = np.einsum("ijk,kj->i", weights, np.nan_to_num(values)), np.array(pack(covariance))
             self.held = []
 
@@ -163,14 +173,14 @@ class _One(_Starting):
         self.noise = noise
 
     def after(
-        self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
+        self, k: int, t: np.ndarray, z: np.ndarray, is_used: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         dt = np.diff(t[k:], prepend=self.last if k == 0 else t[k - 1])
         n = len(dt)
-        made = np.empty((n, 3)), np.empty((n, 3)), np.full((n, 2), np.nan)
-        given = self.x, self.P, dt, np.where(taken, z, 0.0)[k:], taken[k:].astype(float), self.sigma**2, self.noise
-        missed.filter_rows(*given, *made)
-        return made
+        outputs = np.empty((n, 3)), np.empty((n, 3)), np.full((n, 2), np.nan)
+        inputs = self.x, self.P, dt, np.where(is_used, z, 0.0)[k:], is_used[k:].astype(float), self.sigma**2, self.noise
+        missed.filter_rows(*inputs, *outputs)
+        return outputs
 
 
 class _Given(_Starting):
@@ -181,10 +191,10 @@ class _Given(_Starting):
         self.options, self.left = options, np.empty((0, 2))
 
     def after(
-        self, k: int, t: np.ndarray, z: np.ndarray, taken: np.ndarray
+        self, k: int, t: np.ndarray, z: np.ndarray, is_used: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         assert self.x is not None  # it has started
-        scans = Scans(t, taken, self.sigma, k, unpack(self.P))
+        scans = Scans(t, is_used, self.sigma, k, unpack(self.P))
         estimate, sigma, nis, self.left = followed(self.options, scans, self.x, z)
         return estimate, sigma, nis
 
@@ -193,11 +203,13 @@ def in_a_turn(case: Case, filter_name: str, variance: float) -> Turning:
     """The largest exact error of range (m) of a filter over a flight of TURN, as stated and with another manoeuvre
     variance: straight flight until the filter has settled, the turn, and straight flight again, no plot missed."""
     dt = case.spec.radar.scan_period_s
-    (options,) = (one for one in case.spec.filters if one.name == filter_name)
-    stated = variances_of(case)[case.spec.filters.index(options)]
-    variances = {"stated": stated, "changed": variance}
-    lasting_s = math.radians(TURNED_DEG) / (TURN_G * STANDARD_GRAVITY_MPS2 / TURN_SPEED_MPS)
-    start_s, scans = SETTLED * dt, 2 * SETTLED + math.ceil(lasting_s / dt)
+    (options,) = (
+        variance_of_filter for variance_of_filter in case.spec.filters if variance_of_filter.name == filter_name
+    )
+    configured = variances_of(case)[case.spec.filters.index(options)]
+    variances = {"stated": configured, "changed": variance}
+    turn_s = math.radians(TURNED_DEG) / (TURN_G * STANDARD_GRAVITY_MPS2 / TURN_SPEED_MPS)
+    start_s, scans = SETTLED * dt, 2 * SETTLED + math.ceil(turn_s / dt)
     target = Turn.model_validate(
         {
             "kind": "turn",
@@ -206,24 +218,25 @@ def in_a_turn(case: Case, filter_name: str, variance: float) -> Turning:
             "aspect_rad": math.pi,
             "acceleration_g": TURN_G,
             "start_s": start_s,
-            "duration_s": lasting_s,
+            "duration_s": turn_s,
         }
     )
     filters = tuple(
-        options.model_copy(update={"name": name, "manoeuvre_variance": one}) for name, one in variances.items()
+        options.model_copy(update={"name": name, "manoeuvre_variance": variance_of_filter})
+        for name, variance_of_filter in variances.items()
     )
     radar = case.spec.radar.model_copy(update={"detection_probability": 1.0})
-    changed = {"radar": radar, "target": target, "filters": filters, "baseline": "stated", "scans": scans}
-    axes = prepare(replace(case, spec=case.spec.model_copy(update=changed))).axes
+    changes = {"radar": radar, "target": target, "filters": filters, "baseline": "stated", "scans": scans}
+    axes = prepare(replace(case, spec=case.spec.model_copy(update=changes))).axes
     worst = axes.exact_sigma[:, SETTLED:, 0].max(axis=1)
     return Turning(*COMPONENTS[0], TURN_G, *worst.tolist())
 
 
 def likely(spec: Keys, filter_name: str | None) -> Filter | None:
     """The filter of a name, where there is one, else the one that takes most of a plot; None: a package's filter."""
-    named = [f for f in spec.filters if f.name == filter_name]
-    own = [f for f in named or spec.filters if isinstance(f, Filter)]
-    return max(own, key=lambda one: len(one.observes), default=None)
+    same_name = [f for f in spec.filters if f.name == filter_name]
+    study_filters = [f for f in same_name or spec.filters if isinstance(f, Filter)]
+    return max(study_filters, key=lambda candidate: len(candidate.observes), default=None)
 
 
 class PlotLikelihood:
@@ -241,27 +254,27 @@ class PlotLikelihood:
         self.rows, self.usual_s = sum(len(columns["t_s"]) for columns in tracks), usual_interval_s(tracks)
         radar, self.observes = case.spec.radar, len(options.observes)
         sigmas = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
-        stated = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": variance}
-        self.keys, self.stated = tuple(stated), np.array(list(stated.values()), dtype=float)
+        configured = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": variance}
+        self.keys, self.stated = tuple(configured), np.array(list(configured.values()), dtype=float)
         self.least = self.stated * np.array([1e-4] * self.observes + [LEAST_MANOEUVRE])
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
         self.problems = [problem for columns in tracks if (problem := self._problem(columns)) is not None]
 
     def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
         """A track from its first range on; None where it has none."""
-        ranged = np.isfinite(columns["range_m"])
-        if not ranged.any():
+        has_range = np.isfinite(columns["range_m"])
+        if not has_range.any():
             return None
-        first = int(ranged.argmax())
+        first = int(has_range.argmax())
         t = columns["t_s"][first:]
         dt = np.diff(t, prepend=t[0])
         z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)[first:, : self.observes]
-        there = np.isfinite(z)
-        there[0, 0] = False  # it starts the track
+        present = np.isfinite(z)
+        present[0, 0] = False  # it starts the track
         F, Q = np.stack([transition(step) for step in dt]), unpack(missed.noise_over(self.noise, dt))
         H = np.tile(observation(self.observes), (len(t), 1, 1))
-        settled = int(np.searchsorted(np.cumsum(ranged[first:]), STARTING, side="right"))
-        return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), there, settled, dt / self.usual_s)
+        settled = int(np.searchsorted(np.cumsum(has_range[first:]), STARTING, side="right"))
+        return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), present, settled, dt / self.usual_s)
 
     def _scores(self, values: np.ndarray, outliers: float, bias: float, correlation: float) -> np.ndarray:
         """Sums over all tracks for each number that counts; the first plots, which find the state, are left out."""
@@ -269,19 +282,28 @@ class PlotLikelihood:
         variances, total = np.square(values[: self.observes]), np.zeros(self.observes)
         offset = np.zeros(self.observes)
         offset[1:] = bias * values[1 : self.observes]
-        for one in self.problems:
+        for problem in self.problems:
             x, P = np.zeros(3), np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
-            x[0] = one.z[0, 0]
-            score, spread = np.empty(one.z.shape), np.tile(variances, (len(one.z), 1))
-            z = one.z - offset if bias else one.z
-            model, scale, white = (x, P, one.F, one.Q, one.H), manoeuvre, 1.0
+            x[0] = problem.z[0, 0]
+            score, spread = np.empty(problem.z.shape), np.tile(variances, (len(problem.z), 1))
+            z = problem.z - offset if bias else problem.z
+            model, scale, white = (x, P, problem.F, problem.Q, problem.H), manoeuvre, 1.0
             if correlation:
-                first = np.zeros((3, self.observes))  # it is where the first plot is, and errs by its error
-                first[0, 0] = -math.sqrt(variances[0])
-                model = lasting(x, P, first, one.F, manoeuvre * one.Q, one.H, spread, correlation**one.intervals)
+                error_covariance = np.zeros((3, self.observes))  # it is where the first plot is, and errs by its error
+                error_covariance[0, 0] = -math.sqrt(variances[0])
+                model = lasting(
+                    x,
+                    P,
+                    error_covariance,
+                    problem.F,
+                    manoeuvre * problem.Q,
+                    problem.H,
+                    spread,
+                    correlation**problem.intervals,
+                )
                 scale, white = 1.0, 0.0
-            log_likelihood(*model, z, spread, one.there, scale, outliers, white, score)
-            total += score[one.settled :].sum(axis=0)
+            log_likelihood(*model, z, spread, problem.there, scale, outliers, white, score)
+            total += score[problem.settled :].sum(axis=0)
         return total
 
     def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:

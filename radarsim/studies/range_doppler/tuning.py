@@ -41,25 +41,25 @@ class Seen(NamedTuple):
 def manoeuvre_variances(filters: tuple[Filter, ...], seen: Seen) -> tuple[float, ...]:
     """D_M of each filter, (m/s³)²: as given, or the best for these plots; not-a-number where it has none."""
     return tuple(
-        best(one, wanted, seen) if isinstance(wanted, Best) else wanted
-        for one in filters
-        for wanted in (variance_of(one),)
+        best(filter_, variance, seen) if isinstance(variance, Best) else variance
+        for filter_ in filters
+        for variance in (variance_of(filter_),)
     )
 
 
-def best(one: Filter, wanted: Best, seen: Seen) -> float:
+def best(filter_: Filter, criterion: Best, seen: Seen) -> float:
     """The manoeuvre variance that a filter's config asks for, (m/s³)², for these plots."""
     low, high = limits(len(seen.x), seen.plots.sigma, seen.dt)
-    whole = seen._replace(plots=seen.plots._replace(detection=1.0))
+    without_misses = seen._replace(plots=seen.plots._replace(detection=1.0))
 
-    def cost(logs: np.ndarray, of: Seen) -> np.ndarray:
-        return objective(wanted, errors(one, 10.0**logs, of))
+    def cost(logs: np.ndarray, inputs: Seen) -> np.ndarray:
+        return objective(criterion, errors(filter_, 10.0**logs, inputs))
 
     grid = np.linspace(low, high, round((high - low) * A_DECADE) + 1)
-    middle = closer(grid, lambda logs: cost(logs, whole), CLOSER)
+    middle = closer(grid, lambda logs: cost(logs, without_misses), CLOSER)
     if seen.plots.detection < 1:
-        near = np.arange(-ABOUT, ABOUT + 1e-9, 1 / A_DECADE_FEW)
-        middle = closer(np.clip(middle + near, low, high), lambda logs: cost(logs, seen), 1)
+        around_best = np.arange(-ABOUT, ABOUT + 1e-9, 1 / A_DECADE_FEW)
+        middle = closer(np.clip(middle + around_best, low, high), lambda logs: cost(logs, seen), 1)
     return float(f"{10.0**middle:.4g}")
 
 
@@ -67,17 +67,17 @@ def closer(grid: np.ndarray, cost: Callable[[np.ndarray], np.ndarray], times: in
     """The number of least cost, looked for on a grid (n,) and then `times` closer about the best so far."""
     for _ in range(times + 1):
         costs = cost(grid)
-        at = int(np.argmax(costs <= costs.min() * (1 + ALIKE)))  # of what is level, the least D_M
-        middle = float(grid[at])
-        grid = np.linspace(grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)], POINTS)
+        index = int(np.argmax(costs <= costs.min() * (1 + ALIKE)))  # of what is level, the least D_M
+        middle = float(grid[index])
+        grid = np.linspace(grid[max(index - 1, 0)], grid[min(index + 1, len(grid) - 1)], POINTS)
     return middle
 
 
 def limits(scans: int, sigma: np.ndarray, dt: float) -> tuple[float, float]:
     """Logarithms to ten of the least and the greatest D_M that are looked at; sigma (2,) of the plots."""
     unit = sigma[0] ** 2 / dt**6
-    least = min(LEAST, (3.0 * scans) ** -6)
-    return float(np.log10(least * unit)), float(np.log10(min(MOST * unit, TO_VELOCITY * sigma[1] ** 2 / dt**4)))
+    smallest = min(LEAST, (3.0 * scans) ** -6)
+    return float(np.log10(smallest * unit)), float(np.log10(min(MOST * unit, TO_VELOCITY * sigma[1] ** 2 / dt**4)))
 
 
 def at_a_limit(variance: float, scans: int, sigma: np.ndarray, dt: float) -> bool:
@@ -86,26 +86,28 @@ def at_a_limit(variance: float, scans: int, sigma: np.ndarray, dt: float) -> boo
     return not low + 1e-3 < np.log10(variance) < high - 1e-3
 
 
-def objective(wanted: Best, sigma: np.ndarray) -> np.ndarray:
+def objective(criterion: Best, sigma: np.ndarray) -> np.ndarray:
     """What is to be least (B,), of σ (B, K, 3)."""
-    of = sigma[:, wanted.from_k - 1 :, COMPONENTS[wanted.minimise]]
-    if np.isnan(of).all():
+    sigma_of_component = sigma[:, criterion.from_k - 1 :, COMPONENTS[criterion.minimise]]
+    if np.isnan(sigma_of_component).all():
         raise ValueError("no filter has an estimate there")
-    if wanted.over == "last":
-        return of[:, -1]
-    return np.asarray(np.nanmax(of, axis=1) if wanted.over == "worst" else np.nanmean(of, axis=1))
+    if criterion.over == "last":
+        return sigma_of_component[:, -1]
+    return np.asarray(
+        np.nanmax(sigma_of_component, axis=1) if criterion.over == "worst" else np.nanmean(sigma_of_component, axis=1)
+    )
 
 
-def errors(one: Filter, variances: np.ndarray, seen: Seen) -> np.ndarray:
+def errors(filter_: Filter, variances: np.ndarray, seen: Seen) -> np.ndarray:
     """σ (B, K, 3) of a filter with each of the manoeuvre variances (B,); not-a-number where it has no estimate."""
-    observes, start = len(one.observes), one.plots_to_start
-    Q = np.stack([process_noise(one.process_noise, float(v), seen.dt) for v in variances], axis=2)
+    observes, start = len(filter_.observes), filter_.plots_to_start
+    Q = np.stack([process_noise(filter_.process_noise, float(v), seen.dt) for v in variances], axis=2)
     if seen.plots.detection < 1:
         from radarsim.studies.range_doppler.patterns import Design, mixture  # loads the compiler
 
-        designs = (Design(observes, start, tuple(map(float, pack(one)))) for one in np.moveaxis(Q, 2, 0))
-        found = (mixture(design, seen.plots, seen.x, seen.dt, FEW, drawn=seen.drawn) for design in designs)
-        return np.stack([np.sqrt(one.moment) for one in found])
+        designs = (Design(observes, start, tuple(map(float, pack(filter_)))) for filter_ in np.moveaxis(Q, 2, 0))
+        mixtures = (mixture(design, seen.plots, seen.x, seen.dt, FEW, random_truth=seen.drawn) for design in designs)
+        return np.stack([np.sqrt(filter_.moment) for filter_ in mixtures])
     return side_by_side(observes, start, Q, seen)
 
 
@@ -162,19 +164,19 @@ def designed(case: Case) -> Designed:
     spec: Keys = case.spec
     dt = spec.radar.scan_period_s
     t, x = filters.true_motion(case)
-    drawn = filters.drawn_defects(spec.target, t, x)
-    plots = plots_of(spec)._replace(of_truth=drawn.shape[2] - 1)
+    random_truth = filters.drawn_defects(spec.target, t, x)
+    plots = plots_of(spec)._replace(of_truth=random_truth.shape[2] - 1)
     try:
-        variances = manoeuvre_variances(spec.filters, Seen(plots, x, dt, drawn))
+        variances = manoeuvre_variances(spec.filters, Seen(plots, x, dt, random_truth))
     except ValueError as error:
         raise ConfigError(f"{case.name}: filters: manoeuvre_variance: {error}") from None
-    made = (
+    linear_filters = (
         filters.design(len(f.observes), f.plots_to_start, variance, plots.sigma, dt, len(t), f.process_noise)
         if isinstance(f, Filter)
         else given.designed(f, plots.sigma, t)
         for f, variance in zip(spec.filters, variances, strict=True)
     )
-    return Designed(spec, t, x, drawn, plots, variances, tuple(made), case.asked_from_k, case.roughly)
+    return Designed(spec, t, x, random_truth, plots, variances, tuple(linear_filters), case.asked_from_k, case.roughly)
 
 
 def plots_of(spec: Keys) -> Plots:

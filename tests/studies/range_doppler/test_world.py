@@ -290,7 +290,7 @@ def test_patterns_followed_to_the_end_piece_by_piece_are_those_side_by_side(most
     for design in designs:
         given = design, plots, truth, DT
         beside = patterns.mixture(*given, 1 << 13, designs, from_k=from_k)
-        pieces = patterns.mixture(*given, most, designs, from_k=from_k, whole=True)
+        pieces = patterns.mixture(*given, most, designs, from_k=from_k, follow_all=True)
         for name in ("started", "available", "bias", "moment", "believed", "nees", "beside"):
             size = np.sqrt(beside.moment) if name == "bias" else None
             assert_rounded(getattr(pieces, name), getattr(beside, name), size=size, operations=1 << 13)

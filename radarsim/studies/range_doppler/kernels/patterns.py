@@ -48,19 +48,19 @@ class Room(NamedTuple):
     scan: np.ndarray  #: (D,) after which scan
 
 
-def room(most: int, columns: int, waiting: int, scans: int) -> Room:
-    """Arrays for `most` patterns of so many columns of E, which double at a scan, and for those that wait."""
+def room(max_patterns: int, columns: int, waiting: int, scans: int) -> Room:
+    """Arrays for `max_patterns` patterns of so many columns of E, which double at a scan, and for those that wait."""
     high = 12 + 3 * columns + FURTHER
-    count = (2 * most + waiting + 4 * WIDTH) // WIDTH * WIDTH
+    count = (2 * max_patterns + waiting + 4 * WIDTH) // WIDTH * WIDTH
     cells = 1 << (2 * count).bit_length()
     places = aligned_zeros(count * (PLACES + 1))
     group, lighter = np.zeros((2, count), dtype=np.int64)
     table, owner = np.zeros((2, cells), dtype=np.int64)
-    held, following = np.zeros((2, waiting + 1, 6 + 3 * columns + FURTHER))
+    waiting_rows, following = np.zeros((2, waiting + 1, 6 + 3 * columns + FURTHER))
     rows, spare = aligned_zeros(count * high), aligned_zeros(count * high)
     pieces, (size, scan) = aligned_zeros((scans + 1) * 2 * PIECE * high), np.zeros((2, scans + 1), dtype=np.int64)
     labels = group, lighter, table, owner
-    return Room(rows, spare, places, places.view(np.int64), *labels, held, following, pieces, size, scan)
+    return Room(rows, spare, places, places.view(np.int64), *labels, waiting_rows, following, pieces, size, scan)
 
 
 @inline
@@ -93,14 +93,14 @@ def pad(rows, n, high):
 @inline
 def likeness(p, q, r):
     """(1 + ρ) / (1 − ρ) of a correlation: where it is near ±1 it is 1 − |ρ| that must agree."""
-    rho, least = p / root(q * r), full(1e-15)
-    return (1.0 + rho + least) / (1.0 - rho + least)
+    rho, tiny = p / root(q * r), full(1e-15)
+    return (1.0 + rho + tiny) / (1.0 - rho + tiny)
 
 
 @part
 def locate(room, rows, n, high):
     """Where the believed covariances lie, and how probable the patterns are."""
-    places, most = address(room.places), 0
+    places, max_bits = address(room.places), 0
     for j in range(blocks_of(n)):
         p, to = row(rows, j * high), row(places, j * PLACES)
         p0, p3, p5 = get(p, 0), get(p, 3), get(p, 5)
@@ -108,72 +108,73 @@ def locate(room, rows, n, high):
         put(to, 3, root(likeness(get(p, 1), p0, p3)))
         put(to, 4, root(likeness(get(p, 2), p0, p5)))
         put(to, 5, root(likeness(get(p, 4), p3, p5)))
-    of_weight = room.bits[PLACES * len(room.group) :]
+    weight_bits = room.bits[PLACES * len(room.group) :]
     for b in range(n):
         room.places[PLACES * len(room.group) + b] = rows[at(b, high) + (high - FURTHER) * WIDTH]
-        most = max(most, of_weight[b])
+        max_bits = max(max_bits, weight_bits[b])
     for b in range(n):
-        less = (most - of_weight[b]) * OF_BITS
-        room.lighter[b] = NONE if less > NEGLIGIBLE else int(less / LIGHTER + 0.5)
+        powers_below = (max_bits - weight_bits[b]) * OF_BITS
+        room.lighter[b] = NONE if powers_below > NEGLIGIBLE else int(powers_below / LIGHTER + 0.5)
 
 
 @part
-def grouped(room, rows, n, high, alike):
-    """Number the groups of patterns that are alike to a fraction, by the order of their first; how many there are."""
-    table, mask, made = room.table, len(room.table) - 1, 0
+def grouped(room, rows, n, high, fraction):
+    """Number the groups of patterns that agree to a fraction, by the order of their first; how many there are."""
+    table, mask, groups = room.table, len(room.table) - 1, 0
     table[:] = NONE
     for b in range(n):
         lighter = room.lighter[b]
         if lighter == NONE:
             room.group[b] = NONE
             continue
-        first, scale = at(b, PLACES), LN_2 * OF_BITS / (alike * float(1 << lighter))
+        first, scale = at(b, PLACES), LN_2 * OF_BITS / (fraction * float(1 << lighter))
         cell = lighter * 2147483647 + int(rows[at(b, high) + (high - FURTHER + 1) * WIDTH]) * 104395303
         for i in range(PLACES):
             value = float(room.bits[first + i * WIDTH] - ONE_S_BITS) * scale
             cell = cell * 1000003 + int(np.floor(value))
         cell = (cell ^ (cell >> 29)) & 0x7FFFFFFFFFFFFFFF
-        place = (cell * 0x1E3779B97F4A7C15 >> 20) & mask
-        while table[place] != NONE and table[place] != cell:
-            place = (place + 1) & mask
-        if table[place] == NONE:
-            table[place], room.owner[place] = cell, made
-            made += 1
-        room.group[b] = room.owner[place]
-    return made
+        slot = (cell * 0x1E3779B97F4A7C15 >> 20) & mask
+        while table[slot] != NONE and table[slot] != cell:
+            slot = (slot + 1) & mask
+        if table[slot] == NONE:
+            table[slot], room.owner[slot] = cell, groups
+            groups += 1
+        room.group[b] = room.owner[slot]
+    return groups
 
 
 @part
-def weigh(rows, n, columns, towards):
-    """Blocks of patterns from S to second moments, all times their probability (towards 1), or from sums of these back
-    (−1), in place."""
+def weigh(rows, n, columns, direction):
+    """Blocks of patterns from S to second moments, all times their probability (direction 1), or from sums of these
+    back (−1), in place."""
     high = height(columns)
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
         w = get(p, high - FURTHER)
-        scale = w if towards == 1 else 1.0 / w
-        if towards == -1:
+        scale = w if direction == 1 else 1.0 / w
+        if direction == -1:
             for i in range(high - FURTHER):
                 put(p, i, get(p, i) * scale)
         for c in range(columns):
-            put6(p, 6, algebra.add_outer(get6(p, 6), float(towards), get3(p, 12 + c, columns)))
-        if towards == 1:
+            put6(p, 6, algebra.add_outer(get6(p, 6), float(direction), get3(p, 12 + c, columns)))
+        if direction == 1:
             for i in range(high - FURTHER):
                 put(p, i, get(p, i) * scale)
 
 
 @part
-def merge(room, rows, spare, n, columns, most, alike):
-    """Patterns that are alike made one, in `spare`, so that there are at most `most`; how many, and how alike. A group
-    has the mean of its members' P and the first two moments of their errors. alike: where to begin."""
+def merge(room, rows, spare, n, columns, max_patterns, fraction):
+    """Merge similar patterns into `spare`, until `max_patterns` are left; returns their number and the fraction.
+
+    A group has the mean of its members' P and the first two moments of their errors. fraction: the first to try."""
     high = height(columns)
     locate(room, rows, n, high)
-    made = grouped(room, rows, n, high, alike)
-    while made > most:
-        alike *= min(max(LEAST_STEP, np.sqrt(made / most)), MOST_STEP)
-        made = grouped(room, rows, n, high, alike)
+    groups = grouped(room, rows, n, high, fraction)
+    while groups > max_patterns:
+        fraction *= min(max(LEAST_STEP, np.sqrt(groups / max_patterns)), MOST_STEP)
+        groups = grouped(room, rows, n, high, fraction)
     weigh(rows, n, columns, 1)
-    for i in range(blocks_of(made) * WIDTH * high):
+    for i in range(blocks_of(groups) * WIDTH * high):
         spare[i] = 0.0
     for b in range(n):
         if room.group[b] != NONE:
@@ -181,12 +182,12 @@ def merge(room, rows, spare, n, columns, most, alike):
             for i in range(high - FURTHER + 1):
                 spare[to + i * WIDTH] += rows[source + i * WIDTH]
             spare[to + (high - FURTHER + 1) * WIDTH] = rows[source + (high - FURTHER + 1) * WIDTH]
-    pad(spare, made, high)
-    for b in range(made, blocks_of(made) * WIDTH):  # whatever is divided by
+    pad(spare, groups, high)
+    for b in range(groups, blocks_of(groups) * WIDTH):  # whatever is divided by
         spare[at(b, high) + (high - FURTHER) * WIDTH] = 1.0
-    weigh(spare, made, columns, -1)
-    pad(spare, made, high)
-    return made, max(ALIKE, alike * max(0.5, np.sqrt(made / (FILLED * most))))
+    weigh(spare, groups, columns, -1)
+    pad(spare, groups, high)
+    return groups, max(ALIKE, fraction * max(0.5, np.sqrt(groups / (FILLED * max_patterns))))
 
 
 # ---- patterns --------------------------------------------------------------------------------------------------------
@@ -287,14 +288,14 @@ def branch(rows, n, columns, world):
 @part
 def refer(L, columns, dt, defect):
     """Refer a start in the making to the next scan, in place: L ← F⁻ᵀ L F⁻¹; Y gains L times the defect."""
-    made = algebra.predicted_information((L[0], L[1], L[2], L[3], L[4], L[5]), dt)
-    L[0], L[1], L[2], L[3], L[4], L[5] = made
+    information = algebra.predicted_information((L[0], L[1], L[2], L[3], L[4], L[5]), dt)
+    L[0], L[1], L[2], L[3], L[4], L[5] = information
     for c in range(columns):
         y0, y1, y2 = L[6 + c], L[6 + columns + c], L[6 + 2 * columns + c]
         moved = y0, y1 - dt * y0, y2 - dt * y1 + 0.5 * dt * dt * y0
-        more = algebra.times(made, (defect[0, c], defect[1, c], defect[2, c]))
+        defect_share = algebra.times(information, (defect[0, c], defect[1, c], defect[2, c]))
         for i in range(3):
-            L[6 + i * columns + c] = moved[i] + more[i]
+            L[6 + i * columns + c] = moved[i] + defect_share[i]
 
 
 @part
@@ -313,39 +314,40 @@ def begin(rows, n, L, columns):
 
 
 @part
-def wait(room, rows, n, held, world, defect):
-    """The patterns that have not started, `held` of them, through a scan: those with their plots begin. How many have
-    started then, and how many wait."""
-    columns, kept = defect.shape[1], 0
+def wait(room, rows, n, waiting_count, world, defect):
+    """Take the patterns that have not started through a scan: those with all their plots begin.
+
+    Returns how many have started then, and how many wait."""
+    columns, still_waiting = defect.shape[1], 0
     last = 6 + 3 * columns
-    for b in range(held):
-        old = room.waiting[b]
-        refer(old, columns, world.dt, defect)
-        weight, count = old[last], old[last + 1]
+    for b in range(waiting_count):
+        current = room.waiting[b]
+        refer(current, columns, world.dt, defect)
+        weight, count = current[last], current[last + 1]
         if weight * (1.0 - world.detection) > NEGLIGIBLE_PROBABILITY:
-            new = room.following[kept]
-            for c in range(new.size):
-                new[c] = old[c]
-            new[last], new[last + 2] = weight * (1.0 - world.detection), 0.0
-            kept += 1
+            next_row = room.following[still_waiting]
+            for c in range(next_row.size):
+                next_row[c] = current[c]
+            next_row[last], next_row[last + 2] = weight * (1.0 - world.detection), 0.0
+            still_waiting += 1
         if weight * world.detection > NEGLIGIBLE_PROBABILITY:
             for m in range(world.observes):
-                old[3 * m] += 1.0 / world.R[m]  # of 00, 01, 02, 11, …
+                current[3 * m] += 1.0 / world.R[m]  # of 00, 01, 02, 11, …
                 for c in range(columns):
-                    old[6 + m * columns + c] += world.inputs[m, c] / world.R[m]
-            old[last], old[last + 1], old[last + 2] = weight * world.detection, count + 1.0, 1.0
+                    current[6 + m * columns + c] += world.inputs[m, c] / world.R[m]
+            current[last], current[last + 1], current[last + 2] = weight * world.detection, count + 1.0, 1.0
             if count + 1.0 == world.start:
-                begin(rows, n, old, columns)
+                begin(rows, n, current, columns)
                 n += 1
             else:
-                for c in range(old.size):
-                    room.following[kept, c] = old[c]
-                kept += 1
-    for b in range(kept):
+                for c in range(current.size):
+                    room.following[still_waiting, c] = current[c]
+                still_waiting += 1
+    for b in range(still_waiting):
         for c in range(room.waiting.shape[1]):
             room.waiting[b, c] = room.following[b, c]
     pad(rows, n, height(columns))
-    return n, kept
+    return n, still_waiting
 
 
 @inline
@@ -370,13 +372,13 @@ def second_moment(p, columns):
 
 
 @part
-def note_started(rows, n, columns, world, found):
-    """Add to the means of a scan, found (OWN + G BESIDE,): those of the patterns in which the filter has started. Their
+def note_started(rows, n, columns, world, sums):
+    """Add to the means of a scan, sums (OWN + G BESIDE,): those of the patterns in which the filter has started. Their
     probability, NEES, bias (3), e² (3), believed variance (3), each times the probability; of each filter beside it the
     probability (3) that it has an estimate too, and e² there (3)."""
-    high, none = height(columns), full(0.0)
+    high, zeros = height(columns), full(0.0)
     last = high - FURTHER
-    w0 = q0 = b0 = b1 = b2 = m0 = m1 = m2 = v0 = v1 = v2 = none
+    w0 = q0 = b0 = b1 = b2 = m0 = m1 = m2 = v0 = v1 = v2 = zeros
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
         w, P, M = get(p, last), get6(p, 0), second_moment(p, columns)
@@ -385,98 +387,108 @@ def note_started(rows, n, columns, world, found):
         m0, m1, m2 = m0 + w * M[0], m1 + w * M[3], m2 + w * M[5]
         v0, v1, v2 = v0 + w * P[0], v1 + w * P[3], v2 + w * P[5]
     for i, sum_of in enumerate((w0, q0, b0, b1, b2, m0, m1, m2, v0, v1, v2)):
-        found[i] += lanes.total(sum_of)
+        sums[i] += lanes.total(sum_of)
     for g in range(len(world.others)):
-        note_beside(rows, n, columns, world.others[g], found[OWN + g * BESIDE :])
+        note_beside(rows, n, columns, world.others[g], sums[OWN + g * BESIDE :])
 
 
 @part
-def note_beside(rows, n, columns, other, found):
+def note_beside(rows, n, columns, companion, sums):
     """Of the started patterns those in which another filter has an estimate as well: probabilities (3), e² (3)."""
-    high, none, one = height(columns), full(0.0), full(1.0)
-    last, enough = high - FURTHER, full(other[1] - 0.5)
-    sees = full(1.0 if other[0] == 2 else 0.0)
-    s0 = s1 = s2 = m0 = m1 = m2 = none
+    high, zeros, ones = height(columns), full(0.0), full(1.0)
+    last, enough = high - FURTHER, full(companion[1] - 0.5)
+    sees = full(1.0 if companion[0] == 2 else 0.0)
+    s0 = s1 = s2 = m0 = m1 = m2 = zeros
     for j in range(blocks_of(n)):
         p = row(rows, j * high)
         w, M, hit, count = get(p, last), second_moment(p, columns), get(p, last + 2), get(p, last + 1)
-        w0 = w * where_greater(count, enough, one, hit)
-        w1 = w * where_greater(count, enough, one, sees * hit)
-        w2 = w * where_greater(count, enough, one, none)
+        w0 = w * where_greater(count, enough, ones, hit)
+        w1 = w * where_greater(count, enough, ones, sees * hit)
+        w2 = w * where_greater(count, enough, ones, zeros)
         s0, s1, s2 = s0 + w0, s1 + w1, s2 + w2
         m0, m1, m2 = m0 + w0 * M[0], m1 + w1 * M[3], m2 + w2 * M[5]
     for i, sum_of in enumerate((s0, s1, s2, m0, m1, m2)):
-        found[i] += lanes.total(sum_of)
+        sums[i] += lanes.total(sum_of)
 
 
 @part
-def note_waiting(waiting, held, columns, world, found):
+def note_waiting(waiting, waiting_count, columns, world, sums):
     """The same of those that have not started: where a plot came it is the estimate, of what it holds."""
     last = 6 + 3 * columns
-    for b in range(held):
+    for b in range(waiting_count):
         if waiting[b, last + 2] == 1.0:
             w, count = waiting[b, last], waiting[b, last + 1]
             for m in range(world.observes):
-                found[FIRST + m] += w
-                found[2 + m] += w * world.of_plot[m, 0]
-                found[5 + m] += w * world.of_plot[m, 1]
-                found[8 + m] += w * world.R[m]
+                sums[FIRST + m] += w
+                sums[2 + m] += w * world.of_plot[m, 0]
+                sums[5 + m] += w * world.of_plot[m, 1]
+                sums[8 + m] += w * world.R[m]
                 for g in range(len(world.others)):
                     if m < world.others[g, 0] or count >= world.others[g, 1]:
                         first = OWN + g * BESIDE + m
-                        found[first] += w
-                        found[first + 3] += w * world.of_plot[m, 1]
+                        sums[first] += w
+                        sums[first + 3] += w * world.of_plot[m, 1]
 
 
 @part
-def follow(room, rows, n, k, world, found):
-    """All patterns that n started ones become after scan k, to the last scan, their sums added to found as below. A
+def follow(room, rows, n, k, world, sums):
+    """All patterns that n started ones become after scan k, to the last scan, their sums added as below. A
     piece of at most PIECE patterns goes on until it is larger; then its later half waits, above it, until it is
     done."""
     columns, scans = world.defect.shape[2], len(world.defect)
     high = height(columns)
     length, room_of_piece = WIDTH * high, 2 * PIECE * high
     for first in range(0, n, PIECE):
-        top = 0
+        level = 0
         room.size[0], room.scan[0] = min(PIECE, n - first), k
         begin_at = first // WIDTH * length
         for i in range(blocks_of(room.size[0]) * length):
             room.pieces[i] = rows[begin_at + i]
-        while top >= 0:
-            piece, m, scan = row(address(room.pieces), top * room_of_piece // WIDTH), room.size[top], room.scan[top] + 1
+        while level >= 0:
+            piece, m, scan = (
+                row(address(room.pieces), level * room_of_piece // WIDTH),
+                room.size[level],
+                room.scan[level] + 1,
+            )
             predict(piece, m, columns, world.dt, world.Q, world.defect[scan])
             m = branch(piece, m, columns, world)
             if scan + 1 >= world.from_k:
-                note_started(piece, m, columns, world, found[scan])
-            room.size[top], room.scan[top] = m, scan
+                note_started(piece, m, columns, world, sums[scan])
+            room.size[level], room.scan[level] = m, scan
             if scan == scans - 1:
-                top -= 1
+                level -= 1
             elif m > PIECE:
-                kept = blocks_of(m) // 2
-                for i in range(kept * length, blocks_of(m) * length):
-                    room.pieces[(top + 1) * room_of_piece + i - kept * length] = room.pieces[top * room_of_piece + i]
-                room.size[top], room.size[top + 1], room.scan[top + 1] = kept * WIDTH, m - kept * WIDTH, scan
-                top += 1
+                kept_blocks = blocks_of(m) // 2
+                for i in range(kept_blocks * length, blocks_of(m) * length):
+                    room.pieces[(level + 1) * room_of_piece + i - kept_blocks * length] = room.pieces[
+                        level * room_of_piece + i
+                    ]
+                room.size[level], room.size[level + 1], room.scan[level + 1] = (
+                    kept_blocks * WIDTH,
+                    m - kept_blocks * WIDTH,
+                    scan,
+                )
+                level += 1
 
 
 @kernel
-def add_means(room, world, found):
-    """`patterns.mixture`: the sums of each scan into found (K, OWN + G BESIDE), in a `room`."""
+def add_means(room, world, sums):
+    """`patterns.mixture`: the sums of each scan (K, OWN + G BESIDE), in a `room`."""
     rows, spare, columns = address(room.rows), address(room.spare), world.defect.shape[2]
-    n, held, alike = 0, 1, ALIKE
+    n, waiting_count, fraction = 0, 1, ALIKE
     room.waiting[0, :] = 0.0
     room.waiting[0, 6 + 3 * columns] = 1.0
     for k in range(len(world.defect)):
         predict(rows, n, columns, world.dt, world.Q, world.defect[k])
         n = branch(rows, n, columns, world)
-        n, held = wait(room, rows, n, held, world, world.defect[k])
+        n, waiting_count = wait(room, rows, n, waiting_count, world, world.defect[k])
         if k + 1 >= world.from_k:
-            note_started(rows, n, columns, world, found[k])
-            note_waiting(room.waiting, held, columns, world, found[k])
+            note_started(rows, n, columns, world, sums[k])
+            note_waiting(room.waiting, waiting_count, columns, world, sums[k])
         if n > world.most and world.whole:
             if k < len(world.defect) - 1:
-                follow(room, rows, n, k, world, found)
+                follow(room, rows, n, k, world, sums)
             n = 0
         elif n > world.most:
-            n, alike = merge(room, rows, spare, n, columns, world.most, alike)
+            n, fraction = merge(room, rows, spare, n, columns, world.most, fraction)
             rows, spare = spare, rows
