@@ -1,25 +1,23 @@
-"""The config's numbers from recorded plots, by the likelihood of a filter's innovations.
+"""Fit the numbers of a config to recorded plots by maximum likelihood, and advise on them.
 
 The filter's predictions give each plot a density; their product is the likelihood of the filter's parameters (Schweppe
 1965). Estimates maximise it; an interval holds the values of a key at which the largest likelihood over all other keys
-is within half the 95 % point of chi-square of the maximum (profile likelihood). Beside the keys the plots may have
-outliers, a bias, or errors correlated from plot to plot. Where outliers or correlation are plain, they are fitted too.
+is within half the 95 % point of chi-square of the maximum (profile likelihood). Besides the keys, outliers, a bias, or
+errors correlated from plot to plot may explain the plots. Clear outliers and clear correlation are fitted too.
 
-Whether recorded velocities are folded: from the ranges of the same plots, whatever a config states of their errors. A
-velocity ambiguous by a span D lies within half of it, and differs from the rate of the range by a whole number of
-spans. So if no velocity exceeds A / 2 in size, the span is A at least, and a range that changes faster than A / 2
-proves folding. The span follows from the differences, as far as they determine it. A common error of all velocities
-does not look like that: it shows in the velocities themselves.
+The ranges of the same plots show whether velocities are folded, whatever errors the config gives them. A velocity that
+is ambiguous by a span D lies between -D / 2 and D / 2, and differs from the rate of the range by a whole number of
+spans. So if no velocity exceeds A / 2 in size, the span is at least A, and a range that changes faster than A / 2
+proves folding. The differences determine the span, if there are enough of them. A common error of all velocities looks
+different: it shows in the velocities themselves.
 
-Errors in the config's numbers, if any, by the likelihood along each of them.
+The likelihood also finds errors in the config's numbers. Each explanation (a σ, the manoeuvre variance, a bias of the
+velocity, outliers, errors correlated from plot to plot) is fitted alone. The one that raises the likelihood most is
+reported, if it raises it by more than chance does in one recording of twenty, over all explanations; the search then
+continues with it included. For a recording with correct numbers nothing is reported.
 
-Each explanation alone (a σ, the manoeuvre variance, a bias of the velocity, outliers, errors correlated from plot to
-plot) is fitted to the plots. The one that raises the likelihood most is named, if it raises it by more than chance does
-in one recording of twenty, over all explanations; then the search continues with it included. A recording with correct
-numbers yields: nothing wrong.
-
-The filter used is the one that takes most columns of a plot. One that takes fewer says nothing about the rest, and may
-predict the ranges best just because the velocities are bad."""
+The advice is about the filter that takes most columns of a plot. A filter that takes fewer says nothing about the
+others, and may predict the ranges best just because the velocities are bad."""
 
 import itertools
 import math
@@ -53,11 +51,10 @@ MAX_BIAS_SIGMAS = 50.0  # in σ of the velocity
 SHARES = {OUTLIERS: (1e-3, 0.4, 3.0), CORRELATION: (1e-3, 0.99, 0.0)}  # least, most, logit at the start of the search
 FAR_FROM_ZERO = 1e4  # times the value of a key that counts as zero
 IMPOSSIBLE_LOG_LIKELIHOOD = -1e300  # stands for the logarithm of zero likelihood: a search needs a number
-MAXIMUM_EVALUATIONS, END_EVALUATIONS, EXPLANATION_EVALUATIONS = (
-    130,
-    15,
-    60,
-)  # likelihood evaluations of a key to the maximum and to an end; of an explanation
+# likelihood evaluations of a key to the maximum and to an end; of an explanation
+MAXIMUM_EVALUATIONS = 130
+END_EVALUATIONS = 15
+EXPLANATION_EVALUATIONS = 60
 SECOND_FIT_COST = 1.5  # evaluations of a fit that allows for more, in those of the plain one
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 SEARCH_STARTS = (-2.0, 0.0, 2.0)  # of a search
@@ -65,12 +62,13 @@ Progress = Callable[[int, int | None], None]  # likelihoods computed, and their 
 
 
 def no_progress(evaluations: int, expected: int | None = None) -> None:
-    """Progress that is not shown."""
+    """Ignore progress."""
 
 
 class FitStages:
-    """Progress of one fit after the other; further: whether a second one, which takes FURTHER times as many
-    likelihoods, is known to follow."""
+    """Progress over several fits.
+
+    has_second_fit: whether a second fit, which takes SECOND_FIT_COST times as many likelihoods, will follow."""
 
     def __init__(self, progress: Progress, has_second_fit: bool):
         self.progress, self.has_second_fit, self.evaluations_before, self.done = progress, has_second_fit, 0, 0
@@ -81,19 +79,19 @@ class FitStages:
         self.progress(self.done, total)
 
     def next(self) -> Progress:
-        """The progress of a further fit."""
+        """Start the next fit, and return its progress."""
         self.evaluations_before, self.has_second_fit = self.done, False
         return self.report
 
 
 def starting_values(likelihood: Likelihood) -> np.ndarray:
-    """Starting values of the keys: as stated; one stated as zero starts far above what counts as zero."""
+    """Starting values of the keys: the configured ones; a key that is zero starts far above what counts as zero."""
     is_zero = np.asarray(likelihood.stated) <= likelihood.least
     return np.where(is_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
 
 
 class CountedLikelihood:
-    """A likelihood that counts its evaluations."""
+    """A likelihood that counts its evaluations and reports progress."""
 
     def __init__(self, likelihood: Likelihood, progress: Progress, count: int = 0, expected: int | None = None):
         self.likelihood, self.progress, self.count, self.expected = likelihood, progress, count, expected
@@ -106,7 +104,7 @@ class CountedLikelihood:
 
 
 def log_likelihood(likelihood: CountedLikelihood, changes: Mapping[str, float]) -> float:
-    """The likelihood with some of the explanations applied."""
+    """The log-likelihood with some keys changed and some explanations applied."""
     configured = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changes.get(key, value) for key, value in configured])
     result = likelihood(values, {name: changes[name] for name in EXPLANATIONS if name in changes})
@@ -114,7 +112,7 @@ def log_likelihood(likelihood: CountedLikelihood, changes: Mapping[str, float]) 
 
 
 class LikelihoodSlice:
-    """A likelihood along some explanations, each on its search scale; others held at a value."""
+    """A likelihood as a function of some keys and explanations on their search scales; others are fixed."""
 
     def __init__(self, likelihood: CountedLikelihood, names: Sequence[str], fixed: Mapping[str, float] = NO_VALUES):
         starting = dict(zip(likelihood.keys, starting_values(likelihood.likelihood).tolist(), strict=True))
@@ -147,7 +145,7 @@ def maximise(
 
 
 def climb(slice_: LikelihoodSlice, start: Mapping[str, float]) -> tuple[dict[str, float], float]:
-    """The maximum reached from a start, and the log-likelihood there, roughly."""
+    """The maximum reached from a start with rough accuracy, and its log-likelihood."""
     from scipy.optimize import minimize
 
     def cost(start_point: np.ndarray) -> float:
@@ -161,7 +159,9 @@ def climb(slice_: LikelihoodSlice, start: Mapping[str, float]) -> tuple[dict[str
 
 
 def _search_scale(name: str, starting: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:
-    """From the search scale to the value of an explanation, and back; unit: of each key."""
+    """Functions from the search scale to the value of a key or an explanation, and back.
+
+    starting: the starting value of each key."""
     if name == BIAS:
         return lambda x: float(np.clip(x, -MAX_BIAS_SIGMAS, MAX_BIAS_SIGMAS)), lambda value: value
     if name in SHARES:
@@ -183,10 +183,9 @@ MAX_EXAMINED_PLOTS = 1000  # examined at most
 MAX_WINDOW_LENGTH = 2.0  # times its usual length that a window of plots may last
 CLEAR_SIGMAS = 4.0  # standard deviations by which a range changes faster than a velocity can be
 MIN_FOLDED_PLOTS, MIN_FOLDED_SHARE = 3, 0.1  # of the plots examined that must do so
-KNOWN_SPAN_SCORE, ANY_SPAN_SCORE = (
-    1.0,
-    3.0,
-)  # standard deviations that distinguish whole spans from chance: for a known span, for any
+# standard deviations that distinguish whole spans from chance: for a known span, for any
+KNOWN_SPAN_SCORE = 1.0
+ANY_SPAN_SCORE = 3.0
 VELOCITY_COLUMN = "velocity_mps"
 SPAN_SEARCH_STEPS = 200  # of a search for the span, in which the phase of the largest velocity turns once
 
@@ -214,9 +213,7 @@ def detect_folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float |
     rates, velocities, sigma = fits
     differences = rates - velocities
     folded_count = int((np.abs(differences) > fastest + CLEAR_SIGMAS * sigma).sum())
-    opposite_sign_difference = np.median(
-        np.abs(rates + velocities)
-    )  # with the other sign they are off by twice their size
+    opposite_sign_difference = np.median(np.abs(rates + velocities))  # with the other sign, twice their size
     if folded_count < max(
         MIN_FOLDED_PLOTS, MIN_FOLDED_SHARE * differences.size
     ) or opposite_sign_difference < 0.5 * np.median(np.abs(differences)):
@@ -231,7 +228,7 @@ def detect_folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float |
 
 
 def detect_case_folding(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> Folding | None:
-    """Whether velocities of tracks, columns (n,) each, are folded although a case's study takes them as measured."""
+    """Detect folded velocities of tracks, columns (n,) each, that a case's study takes as measured."""
     interface = recording_interface(case)
     if VELOCITY_COLUMN not in tracks[0] or interface.unfolds():
         return None
@@ -239,7 +236,7 @@ def detect_case_folding(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) 
 
 
 def folding_message(folding: Folding, case: Case | None = None) -> str:
-    """The message that velocities are folded, with the settings that unfold them; case: of the radar, if known."""
+    """The message that velocities are folded, with the settings that unfold them if the radar's case is known."""
     speeds = {
         "velocity": significant_digits(folding.velocity_mps, "#.3g"),
         "rate": significant_digits(folding.rate_mps, "#.3g"),
@@ -269,8 +266,9 @@ def folding_message(folding: Folding, case: Case | None = None) -> str:
 
 def _range_rates(tracks: Sequence[np.ndarray], min_span: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """The rate of the range at plots, the velocities there, and the standard deviations of the rates, (m,) each: from
-    parabolas through the smallest number of ranges around each that gives an accuracy of FINE for most of them; None
-    where no number does."""
+    parabolas through the smallest number of ranges around each that gives RATE_ACCURACY for most plots.
+
+    None if no number does."""
     half, total = 2, sum(track.shape[1] for track in tracks)
     stride = max(total // MAX_EXAMINED_PLOTS, 1)
     while min_span > 0:
@@ -319,7 +317,7 @@ def _whole_span_score(differences: np.ndarray, spans: np.ndarray) -> np.ndarray:
 
 
 def _fit_span(differences: np.ndarray, min_span: float) -> float | None:
-    """The span, from the least one on, that fits the plots best; None where none does."""
+    """The span, from min_span on, that fits the differences best; None if none does clearly."""
     largest = float(np.abs(differences).max())
     lowest, highest = 1 / (2 * largest), 1 / min_span
     spans = 1 / np.linspace(lowest, highest, 2 + int(SPAN_SEARCH_STEPS * largest * (highest - lowest)))
@@ -330,20 +328,18 @@ def _fit_span(differences: np.ndarray, min_span: float) -> float | None:
 # ---- fit -------------------------------------------------------------------------------------------------------------
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
 MIN_TRACK_ROWS = 10  # of a track; shorter ones carry almost no information
-FIRST_STEP, ROUGH_TOLERANCE = (
-    0.3,
-    1e-4,
-)  # step of a search at its start, and its end before a restart, in the same logarithms
+# step of a search at its start, and its end before a restart, in the same logarithms
+FIRST_STEP = 0.3
+ROUGH_TOLERANCE = 1e-4
 INTERVAL_REACH = 1e4  # ratio to the estimate up to which an end of an interval is searched
 # Accuracy of a maximum and of an interval's end, in the logarithm of a key; of the likelihood a tenth of that. Far
 # finer than printed digits, since the path of a search depends on last digits, and these differ between processors.
 TOLERANCE = 1e-6
 SLOPE_STEP = 1e-3  # difference for a slope, in the logarithm of a key
 CURVATURE_STEP = 1e-2  # the same during the search, where curvature is needed too
-MIN_CURVATURE, MAX_NEWTON_STEP = (
-    1e-3,
-    1.5,
-)  # curvature that counts as none, and the longest Newton step, in that logarithm
+# curvature that counts as none, and the longest Newton step, in that logarithm
+MIN_CURVATURE = 1e-3
+MAX_NEWTON_STEP = 1.5
 MAX_CORRELATION = 0.999  # of the correlation of two keys
 MAX_NEWTON_STEPS = 40
 SIMPLEX_EVALUATIONS = (50, 100, 200)  # evaluations of a simplex before Newton steps are tried again
@@ -352,17 +348,16 @@ TRIAL_RISES = np.arange(1.0, 16.0)  # above what counts as zero: where a key at 
 NEAR_ZERO_LOG = 7.0  # above the value that counts as zero, in that logarithm: zero is tried
 SMALL_GAIN_FACTOR = 300.0  # times the accuracy: a Newton step that gains no more ends the search
 MIN_OUTLIER_SHARE, MAX_OUTLIER_SHARE = 1e-6, 0.5  # of outliers; fewer are none
-MAX_PLAUSIBLE_OUTLIERS = 0.3  # of plots that may have ten times their σ; beyond, their errors follow another law
+MAX_PLAUSIBLE_OUTLIERS = 0.3  # of plots that may have ten times their σ; with more, the errors follow another law
 CORRELATION_TIME = "correlation_time_s"
 ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
-PLAIN_GAIN = 5.4138  # gain of the log-likelihood by chance in one of 1000: half that point of chi-square
-ROUGH_ROWS = 600  # on which the maximum is looked for before all are asked
-MAX_STRETCH_ROWS, MIN_STRETCH_ROWS = 100, 25  # rows of a stretch of a track, where not all are asked
-NEAR_MAXIMUM_EVALUATIONS = 30  # as TOP, from near the maximum
-ZERO_REFINEMENT, LIKELIHOOD_LEAP = (
-    1e-3,
-    0.01,
-)  # factor on the value that counts as zero where the likelihood jumps by more there
+PLAIN_GAIN = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
+ROUGH_ROWS = 600  # on which the maximum is searched before all rows are used
+MAX_STRETCH_ROWS, MIN_STRETCH_ROWS = 100, 25  # rows of a stretch of a track, if not all are used
+NEAR_MAXIMUM_EVALUATIONS = 30  # as MAXIMUM_EVALUATIONS, from near the maximum
+# factor on the value that counts as zero where the likelihood jumps by more there
+ZERO_REFINEMENT = 1e-3
+LIKELIHOOD_LEAP = 0.01
 
 
 @dataclass(frozen=True)
@@ -397,7 +392,7 @@ class Fit:
 
 
 class FurtherExplanation(NamedTuple):
-    """An explanation beside the keys, of EXPLANATIONS, its value, and the increase of the log-likelihood by it."""
+    """An explanation besides the keys, one of EXPLANATIONS: its value, and the increase of the log-likelihood by it."""
 
     name: str
     value: float
@@ -409,13 +404,11 @@ class CorrelatedLikelihood:
     left after a time t (first-order Gauss-Markov process)."""
 
     def __init__(self, likelihood: Likelihood):
-        self.likelihood, self.filter, self.tracks, self.rows, self.usual_s = (
-            likelihood,
-            likelihood.filter,
-            likelihood.tracks,
-            likelihood.rows,
-            likelihood.usual_s,
-        )
+        self.likelihood = likelihood
+        self.filter = likelihood.filter
+        self.tracks = likelihood.tracks
+        self.rows = likelihood.rows
+        self.usual_s = likelihood.usual_s
         self.keys, self.stated = (*likelihood.keys, CORRELATION_TIME), np.append(likelihood.stated, 0.0)
         self.least = np.append(likelihood.least, ZERO_CORRELATION_TIME * likelihood.usual_s)
         self.explains = tuple(name for name in likelihood.explains if name != CORRELATION)
@@ -493,7 +486,7 @@ def file_likelihoods(
 
 
 def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters: Sequence[str]) -> str:
-    """The fault that no likelihood exists; others: the filters for which the study has one."""
+    """The fault that no likelihood exists; fittable_filters: those for which the study has one."""
     if filter_name is not None and fittable_filters:
         allowed = ", ".join(fittable_filters)
         return f"filter: {filter_name} does not say how likely plots are, which fit needs; must be one of {allowed}"
@@ -539,30 +532,31 @@ def fit_likelihood(
     allowing: Sequence[str] | None = None,
     progress: Progress = no_progress,
 ) -> Fit:
-    """The fit of a likelihood, with the plain fit beside it. allowing: for which errors; None: for outliers and
-    correlation that raise the likelihood by more than chance does in one recording of 1000."""
+    """Fit a likelihood, plainly and with the errors it allows for.
+
+    allowing: which of OUTLIERS and CORRELATION; None: those that the plots show plainly."""
     allowed = tuple(allowing or ())
     check_explanations(likelihood, allowed)
     stages = FitStages(progress, bool(allowed))
-    plain = fit_ = fit_keys(likelihood, (), stages.report, rough)
+    plain = result = fit_keys(likelihood, (), stages.report, rough)
     if allowed:
-        fit_ = fit_keys(likelihood, allowed, stages.next(), rough)
-    while (
-        allowing is None
-        and (further := fit_.beside)
-        and further.name in (OUTLIERS, CORRELATION)
-        and further.gain > PLAIN_GAIN
-    ):
-        allowed = (*allowed, further.name)
+        result = fit_keys(likelihood, allowed, stages.next(), rough)
+    while allowing is None and (explanation := result.beside) and _is_plain_error(explanation):
+        allowed = (*allowed, explanation.name)
         try:
-            fit_ = fit_keys(likelihood, allowed, stages.next(), rough)
-        except ConfigError:  # so many outliers that they are another law: the plain fit says so beside
+            result = fit_keys(likelihood, allowed, stages.next(), rough)
+        except ConfigError:  # so many outliers that the errors follow another law: the plain fit reports it
             break
-    return fit_ if fit_ is plain else replace(fit_, plain=plain)
+    return result if result is plain else replace(result, plain=plain)
+
+
+def _is_plain_error(explanation: FurtherExplanation) -> bool:
+    """Whether outliers or correlation raise the likelihood by more than chance does in one recording of 1000."""
+    return explanation.name in (OUTLIERS, CORRELATION) and explanation.gain > PLAIN_GAIN
 
 
 def check_explanations(likelihood: Likelihood, allowing: Sequence[str]) -> None:
-    """ConfigError unless a likelihood can allow for these."""
+    """Raise ConfigError unless a likelihood can allow for these explanations."""
     for name in allowing:
         if name not in likelihood.explains:
             description = {OUTLIERS: "outliers", CORRELATION: "errors that last"}[name]
@@ -607,8 +601,9 @@ def fit_keys(
 
 
 def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood) -> FurtherExplanation | None:
-    """The explanation that raises the maximum most beside the fitted keys, if by more than chance does in one recording
-    of twenty."""
+    """The explanation that raises the maximum most in addition to the fitted keys.
+
+    None if it raises it by less than chance does in one recording of twenty."""
     from scipy.stats import chi2
 
     fitted_values = search.to_values(search.best).tolist()
@@ -618,7 +613,7 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
     counted_likelihood = CountedLikelihood(likelihood, search.progress, search.evaluations, expected)
     maxima = [maximise(counted_likelihood, [name], {}, fixed) for name in names]
     if OUTLIERS in names and likelihood.rows <= ROUGH_ROWS:
-        # They have raised σ, which hides a few of them: so the keys, but those at zero, are fitted again beside them.
+        # Outliers have raised σ, which hides a few of them: so the keys that are not zero are fitted again with them.
         i, free_keys = names.index(OUTLIERS), [key for key in likelihood.keys if fixed[key] > 0]
         slice_ = LikelihoodSlice(
             counted_likelihood,
@@ -639,8 +634,10 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
 
 
 def polish_maximum(log_likelihood_at: Callable[[np.ndarray], float], point: np.ndarray) -> np.ndarray:
-    """The maximum of a likelihood near one from a search, by two Newton steps. A search by comparison stalls at the
-    root of the last digits. A difference over STEP is 10⁻⁷ wrong by them, and so is the maximum."""
+    """The maximum of a likelihood near the result of a search, by two Newton steps.
+
+    A search by comparison stalls at the root of the last digits. They make a difference over SLOPE_STEP wrong by 10⁻⁷,
+    and the maximum as well."""
     curvature, start = Curvature(log_likelihood_at), point
     start_value = log_likelihood_at(point)
     if not math.isfinite(curvature.step(point, start_value, np.arange(point.size))[1]):
@@ -693,7 +690,7 @@ class Curvature:
         return step, float(step[free] @ slope)
 
     def newton_step(self, slope: np.ndarray) -> np.ndarray:
-        """The Newton step up a slope (n,), at most LONGEST_STEP along any axis of the curvature."""
+        """The Newton step up a slope (n,), at most MAX_NEWTON_STEP along any axis of the curvature."""
         sizes, axes = np.linalg.eigh(self.H)
         coordinates = axes.T @ slope / np.maximum(np.abs(sizes), MIN_CURVATURE)
         return axes @ np.clip(coordinates, -MAX_NEWTON_STEP, MAX_NEWTON_STEP)
@@ -739,7 +736,7 @@ class LikelihoodSearch:
         self.raise_zero_keys()
 
     def _polish(self, start: np.ndarray) -> bool:
-        """Take the top near a point as the best, if it is higher; whether it is."""
+        """Take the maximum near a point as the best if it is higher, and return whether it is."""
         point = polish_maximum(self._log_likelihood, self._climb(start, None, TOLERANCE)[0])
         value = self._log_likelihood(point)
         if is_higher := value > self.top:
@@ -747,7 +744,7 @@ class LikelihoodSearch:
         return is_higher
 
     def raise_zero_keys(self) -> None:
-        """Raise keys that are zero where that makes the plots likelier, then look about the top."""
+        """Raise keys from zero where that makes the plots likelier, then compute the curvature at the maximum."""
         while (start := self._raised_point()) is not None and self._polish(start):
             pass
         self.curvature_model = Curvature(self._log_likelihood)
@@ -757,7 +754,7 @@ class LikelihoodSearch:
         self.ends_started_at = self.evaluations
 
     def _raised_point(self) -> np.ndarray | None:
-        """The likeliest point above the top with a single key raised from zero; None if there is none."""
+        """The likeliest point above the maximum with a single key raised from zero; None if there is none."""
         unit_moves = np.eye(self.best.size)
         zero_keys = np.flatnonzero((self.best <= self.lowest)[: len(self.likelihood.keys)])
         trials = [
@@ -770,8 +767,8 @@ class LikelihoodSearch:
         return point if value > self.top + TOLERANCE else None
 
     def to_values(self, point: np.ndarray) -> np.ndarray:
-        """The keys, with the share of outliers at the end where allowed for: at most MOST_SHARE, since all plots as
-        outliers of a tenth of the σ are as likely as none."""
+        """The keys, and the share of outliers at the end if allowed for: at most MAX_OUTLIER_SHARE, since all plots
+        as outliers of a tenth of the σ are as likely as none."""
         count = len(self.likelihood.stated)
         keys = np.exp(np.clip(point[:count], -200, 200))
         keys = np.where(keys <= self.likelihood.least, 0.0, keys)
@@ -898,7 +895,7 @@ class LikelihoodSearch:
         return value, point
 
     def refine_zero(self) -> bool:
-        """Whether a key has to be smaller to count as zero, as the likelihood leaps there; then it does."""
+        """Lower the values that count as zero where the likelihood leaps there; return whether any was lowered."""
         least_before = self.likelihood.least
         while leaping_keys := [i for i in range(len(self.likelihood.keys)) if self._has_leap_at_zero(i)]:
             is_zero = self.best <= self.lowest
@@ -922,14 +919,14 @@ class LikelihoodSearch:
         return self._value_along(i, self.lowest[i] + TOLERANCE) > self.top - HALF_CHI2_95
 
     def _raised_log(self, i: int) -> float:
-        """The logarithm of such a key from which a search has a slope: where the likelihood falls above the maximum."""
+        """The logarithm of such a key at which a search has a slope: the likelihood has fallen from the maximum."""
         log = max(float(self.best[i]), float(self.lowest[i]))
         while self._value_along(i, log) > self.top - HALF_CHI2_95 and log < self.highest[i]:
             log += 1.0
         return log
 
     def _value_along(self, i: int, log: float) -> float:
-        """The likelihood with one key changed and all others at the maximum."""
+        """The log-likelihood with one key changed and all others at the maximum."""
         point = self.best.copy()
         point[i] = log
         return self._log_likelihood(point)
@@ -945,15 +942,12 @@ class LikelihoodSearch:
         return Fitted(self.likelihood.keys[i], stated, value, *bounds, bounds[0] > 0 and math.isfinite(bounds[1]))
 
     def _interval_end(self, i: int, direction: int, limit: float) -> float | None:
-        """The logarithm of key i at which the profile falls to a limit; None where it does not within REACH."""
-        lowest, home, step = (
-            float(self.lowest[i]),
-            max(float(self.best[i]), float(self.lowest[i])),
-            self._end_distance(i),
-        )
-        if (
-            direction > 0 and i in self.raised_keys
-        ):  # from zero the end may be farther than REACH: up to there it is not
+        """The logarithm of key i at which the profile falls to a limit; None if not within INTERVAL_REACH."""
+        lowest = float(self.lowest[i])
+        home = max(float(self.best[i]), float(self.lowest[i]))
+        step = self._end_distance(i)
+        # from zero the end may be farther than INTERVAL_REACH: up to there it is not
+        if direction > 0 and i in self.raised_keys:
             home, step = max(home, self.raised_keys[i] - 1.0), 0.1
         inside = _ProfilePoint(home, self._value_along(i, home), self.best)
         while abs(inside.log_key - home) < math.log(INTERVAL_REACH):
@@ -995,7 +989,7 @@ class LikelihoodSearch:
             replaced = side
 
     def _end_distance(self, i: int) -> float:
-        """A little more than the distance of an end from the maximum if the likelihood were a parabola."""
+        """A little more than the distance of an end from the maximum, if the likelihood were a parabola."""
         H = -self.curvature
         try:
             spread = float(np.linalg.inv(H)[i, i])
@@ -1005,12 +999,12 @@ class LikelihoodSearch:
 
 
 def settings(fit_: Fit) -> dict[str, float]:
-    """Settings for the config, by key, to four digits; keys that the plots do not determine stay as they are."""
+    """Settings for the config by key, to four digits; keys that the plots do not determine are left out."""
     return {row.key: float(f"{row.value:.4g}") for row in fit_.keys if row.identifiable and row.key != CORRELATION_TIME}
 
 
 def as_rows(fit_: Fit) -> list[dict[str, Any]]:
-    """The keys as rows of a table, with the plain answer beside the one that allows for outliers or correlation."""
+    """The keys as rows of a table; columns plain…: those of the fit without outliers and correlation."""
     plain_cells = {row.key: (row.value, row.lo, row.hi) for row in (fit_.plain or fit_).keys}
     names = ("plain", "plain_lo", "plain_hi")
     return [asdict(row) | dict(zip(names, plain_cells.get(row.key, (None,) * 3), strict=True)) for row in fit_.keys]
@@ -1048,7 +1042,7 @@ class FilterComparison:
 
 @dataclass(frozen=True)
 class UsedRows:
-    """The rows used: so many altogether, of so many stretches of rows, spread over all tracks and the whole time."""
+    """The rows used for advice: their number, in how many stretches, spread over all tracks and the whole time."""
 
     rows: int
     stretches: int
@@ -1067,33 +1061,32 @@ class Advice:
 
 
 def advised(followed: Followed, progress: Progress = no_progress) -> Advice | None:
-    """Advice from rows of all tracks over the whole time; none where the study has no likelihood of recorded plots.
+    """Advise on a config from a sample of the rows of all tracks; None if its study has no likelihood of plots.
+
     progress is called with the number of likelihoods computed."""
     case, interface = followed.case, recording_interface(followed.case)
     results = list(followed.tracks.values()) or [followed]
     stretches = [
-        stretch for one in results for stretch in one.sample.stretches() if len(stretch["t_s"]) >= MIN_TRACK_ROWS
+        stretch for result in results for stretch in result.sample.stretches() if len(stretch["t_s"]) >= MIN_TRACK_ROWS
     ]
     if not stretches or unknown_inherited_keys(case, "likelihood"):
         return None
     sample = sample_rows(stretches, interface.rows_asked)
-    likelihoods = {
-        one.filter: one for member in case.spec.members if (one := interface.likelihood(case, member.name, sample))
-    }
+    candidates = [interface.likelihood(case, member.name, sample) for member in case.spec.members]
+    likelihoods = {likelihood.filter: likelihood for likelihood in candidates if likelihood}
     if not likelihoods:
         return None
     comparison = compare_filters(list(likelihoods.values()))
     used_rows = UsedRows(sum(len(stretch["t_s"]) for stretch in sample), len(sample))
     if (folding := detect_case_folding(case, stretches)) is not None:
         return Advice(comparison, [], used_rows, folding)
-    one = likelihoods[comparison.most_columns]
-    return Advice(
-        comparison, [_with_turn_error(case, one, finding) for finding in find_errors(one, progress)], used_rows
-    )
+    likelihood = likelihoods[comparison.most_columns]
+    findings = [_with_turn_error(case, likelihood, finding) for finding in find_errors(likelihood, progress)]
+    return Advice(comparison, findings, used_rows)
 
 
 def _with_turn_error(case: Case, likelihood: Likelihood, finding: Finding) -> Finding:
-    """A finding with the cost of a smaller manoeuvre variance."""
+    """Add to a finding the largest error in a turn, if it lowers a key."""
     stated = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
     if finding.value >= stated.get(finding.name, -np.inf):
         return finding
@@ -1102,7 +1095,7 @@ def _with_turn_error(case: Case, likelihood: Likelihood, finding: Finding) -> Fi
 
 
 def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> list[Finding]:
-    """Errors in the stated numbers, the weightiest first; empty where nothing is wrong."""
+    """Errors in the configured numbers, the one with most weight first; empty if nothing is wrong."""
     from scipy.stats import chi2
 
     counted, names = CountedLikelihood(likelihood, progress), [*likelihood.keys, *likelihood.explains]
@@ -1111,14 +1104,14 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
     start: dict[str, float] = {}
     value_so_far, results = log_likelihood(counted, {}), []
     while len(chosen_names) < min(MAX_FINDINGS, len(names)):
-        trials = {what: maximise(counted, [*chosen_names, what], start) for what in names if what not in chosen_names}
-        what = max(trials, key=lambda name: trials[name][1])
-        values, top = trials[what]
+        trials = {name: maximise(counted, [*chosen_names, name], start) for name in names if name not in chosen_names}
+        best_name = max(trials, key=lambda name: trials[name][1])
+        values, top = trials[best_name]
         if top - value_so_far < needed:
             break
         values, top = _polish_values(counted, values)
-        results.append(Finding(what, values[what], top - value_so_far))
-        chosen_names, start, value_so_far = [*chosen_names, what], values, top
+        results.append(Finding(best_name, values[best_name], top - value_so_far))
+        chosen_names, start, value_so_far = [*chosen_names, best_name], values, top
     return [
         replace(
             finding,
@@ -1148,7 +1141,7 @@ def _is_distinguished_from_zero(
 
 
 def compare_filters(likelihoods: Sequence[Likelihood]) -> FilterComparison:
-    """Which filter predicts the plots best, with the stated numbers."""
+    """Compare how well filters predict the plots with the configured numbers."""
     sums = {likelihood.filter: likelihood.by_number(np.asarray(likelihood.stated)) for likelihood in likelihoods}
     common = set.intersection(*(set(sums) for sums in sums.values()))
     totals = {name: sum(sums[number] for number in common) for name, sums in sums.items()}
@@ -1163,7 +1156,7 @@ def compare_filters(likelihoods: Sequence[Likelihood]) -> FilterComparison:
 
 
 def _polish_values(likelihood: CountedLikelihood, start: dict[str, float]) -> tuple[dict[str, float], float]:
-    """The maximum near roughly found values: printed numbers must not depend on a processor's last digits."""
+    """Refine roughly searched values: printed numbers must not depend on the last digits of a processor."""
     slice_ = LikelihoodSlice(likelihood, list(start))
     point = polish_maximum(slice_, slice_.to_search(start))
     return slice_.to_values(point), slice_(point)

@@ -1,13 +1,13 @@
-"""The filters of an experiment over recorded plots, and a simulated realisation's plots to try them on.
+"""Run the filters of an experiment over recorded plots, and simulate plots to try them on.
 
-Whether estimates after a long gap are more than rounding: the same plots are filtered again with times stretched by
-10⁻¹⁰. A covariance extrapolated over a gap can be so much larger than a plot's that the estimate's, their difference,
-has no digit left: σ comes out wrong, zero or not at all. Stretched times change correct values in the tenth digit, and
-rounding altogether. Only the rows after a gap are compared: a multiple-model filter that has lost its target magnifies
-any difference by itself.
+To detect estimates after a long gap that are only rounding errors, the same plots are filtered again with times
+stretched by 10⁻¹⁰. A covariance extrapolated over a gap can be so much larger than that of a plot that the covariance
+of the estimate, their difference, has no digit left: σ is wrong, zero or missing. Stretched times change correct values
+in the tenth digit, and rounding errors completely. Only the rows after a gap are compared, since a multiple-model
+filter that has lost its target magnifies any difference by itself.
 
-The plots of many realisations in a file: arrays of NumPy (.npz), or one row a plot as Parquet or CSV. Memory does not
-grow with their number."""
+The plots of many realisations are written as arrays of NumPy (.npz), or with one row for each plot as Parquet or CSV.
+Memory does not grow with their number."""
 
 import json
 import os
@@ -39,18 +39,17 @@ from radarsim.threads import mapping
 
 # ---- rounding --------------------------------------------------------------------------------------------------------
 TIME_STRETCH = 1 + 2.0**-33
-MAX_SIGMA_CHANGE, MAX_ESTIMATE_CHANGE, MAX_PROBABILITY_CHANGE = (
-    1e-5,
-    1e-3,
-    1e-3,
-)  # permitted changes by stretched times: of σ, in σ, in probability
+# permitted changes by stretched times: of σ, in σ, in probability
+MAX_SIGMA_CHANGE = 1e-5
+MAX_ESTIMATE_CHANGE = 1e-3
+MAX_PROBABILITY_CHANGE = 1e-3
 LOSS_GAP_INTERVALS, LOSS_GAP_PERIODS = 30.0, 1000.0  # a gap in median intervals so far, or in the config's scan periods
 ROWS_AFTER_GAP = 100  # rows compared after a gap
 LENGTH_UNITS = ("m", "rad")  # units of measured numbers, which are never known exactly
 
 
 class RoundingGuard:
-    """A second tracker beside the first, and the longest interval before the first loss."""
+    """A second tracker with stretched times, which shows when the first has lost its digits in a gap."""
 
     def __init__(self, tracker: Tracker, period_s: float):
         self.tracker, self.period_s, self.takes_whole_track = tracker, period_s, tracker.most_rows is not None
@@ -60,8 +59,9 @@ class RoundingGuard:
         self.rows, self.pending_rows, self.gap_s, self.gap_row = 0, 0, 0.0, 0
 
     def has_lost_digits(self, columns: dict[str, np.ndarray], track: Track) -> bool:
-        """Whether the track (of the first tracker) over the next rows has lost its digits. Then `gap_s` is the longest
-        interval so far and `gap_row` the row, from 0, that ends it."""
+        """Whether the first tracker's track over the next rows has lost its digits.
+
+        Then `gap_s` is the longest interval so far, and `gap_row` the row, from 0, that ends it."""
         t, *measured = columns.values()
         if self.origin is None:
             self.origin, self.last_times = float(t[0]), [float(t[0])] * len(measured)
@@ -85,20 +85,18 @@ class RoundingGuard:
         return bool(is_lost.any())
 
     def _intervals(self, t: np.ndarray, measured: list[np.ndarray]) -> np.ndarray:
-        """The time (n,) since the last row with the numbers that a row has: the longest over these, zero where none."""
+        """Times (n,) since the last row with the same numbers: the longest over them, zero if a row has none."""
         intervals = np.zeros(len(t))
         for j, column in enumerate(measured):
             is_present = np.isfinite(column)
             last_seen = np.maximum.accumulate(np.where(is_present, t, self.last_times[j]))
             previous = np.concatenate([[self.last_times[j]], last_seen[:-1]])
-            intervals, self.last_times[j] = (
-                np.maximum(intervals, np.where(is_present, t - previous, 0.0)),
-                float(last_seen[-1]),
-            )
+            intervals = np.maximum(intervals, np.where(is_present, t - previous, 0.0))
+            self.last_times[j] = float(last_seen[-1])
         return intervals
 
     def _is_after_gap(self, is_gap: np.ndarray) -> np.ndarray:
-        """Which rows (n,) are among those after a gap."""
+        """Whether rows (n,) are among the ROWS_AFTER_GAP rows after a gap."""
         n = len(is_gap)
         end_rows = np.maximum.accumulate(np.where(is_gap, np.arange(n) + ROWS_AFTER_GAP, self.pending_rows))
         self.pending_rows = int(end_rows[-1]) - n
@@ -106,7 +104,7 @@ class RoundingGuard:
 
 
 def differing_rows(track: Track, stretched_track: Track) -> np.ndarray:
-    """Which rows (n,) of two tracks differ by more than permitted, or hold an impossible σ."""
+    """Whether rows (n,) of two tracks differ by more than permitted, or hold an impossible σ."""
     if track.estimate.shape != stretched_track.estimate.shape:
         return np.ones(len(track.t_s), dtype=bool)
     has_estimate, sigma = np.isfinite(track.estimate), track.sigma
@@ -132,9 +130,9 @@ def differing_rows(track: Track, stretched_track: Track) -> np.ndarray:
 
 # ---- follow ----------------------------------------------------------------------------------------------------------
 GAP_INTERVALS = 3.0  # in median intervals
-MAX_NAMED_CHOICES = 12  # configs or values listed where one must be chosen
-START_ESTIMATES = 10  # first estimates of a filter, which are not compared with the truth
-SAMPLE_ROWS, BLOCK_ROWS = 5000, 100  # rows of a track kept for the advice, in blocks that follow each other
+MAX_NAMED_CHOICES = 12  # configs or values in a list of choices
+START_ESTIMATES = 10  # of a filter, which are not compared with the truth
+SAMPLE_ROWS, BLOCK_ROWS = 5000, 100  # rows of a track kept for the advice, and rows of a block of them
 ROW_ARRAYS = ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma")  # arrays (F, n, …)
 
 
@@ -149,10 +147,12 @@ InterfacePart = Literal["tracker", "simulated", "drawing", "likelihood"]
 
 
 def unknown_inherited_keys(case: Case, part: InterfacePart) -> list[str]:
-    """The keys of a case, dotted, that an inherited part of its study does not know: its keys extend another's."""
+    """The keys of a case, dotted, that an inherited part of its study's interface does not know.
+
+    That happens where the keys of a study extend those of the study from which it inherits."""
     interface = recording_interface(case)
     module = getattr(interface, part).__module__
-    if module == RecordedPlots.__module__ or interface.of_any_keys:  # of no study: it does nothing
+    if module == RecordedPlots.__module__ or interface.of_any_keys:  # the default of no study
         return []
     if f"{module}.".startswith(f"{home_of(case.study)}."):  # of the study itself
         return []
@@ -161,7 +161,7 @@ def unknown_inherited_keys(case: Case, part: InterfacePart) -> list[str]:
 
 
 def refuse_inherited_part(case: Case, part: InterfacePart) -> None:
-    """Raise ConfigError where an inherited part of a study would ignore keys that it does not know."""
+    """Raise ConfigError if an inherited part of a study's interface would ignore keys that it does not know."""
     if keys := unknown_inherited_keys(case, part):
         module = getattr(recording_interface(case), part).__module__
         raise ConfigError(
@@ -171,9 +171,9 @@ def refuse_inherited_part(case: Case, part: InterfacePart) -> None:
 
 
 def single_case(experiment: Experiment, purpose: str, command: str) -> Case:
-    """The one case of an experiment, of a study with plots; raises ConfigError.
+    """The only case of an experiment, of a study with plots; raises ConfigError.
 
-    what (the purpose) and command are for the fault, which lists the choices; {} in the command is the config."""
+    purpose and command are for the message, which lists the choices; {} in the command is the config."""
     config_name = experiment.path or experiment.stem
     if len(experiment.cases) > 1:
         count = len(experiment.cases)
@@ -187,7 +187,7 @@ def single_case(experiment: Experiment, purpose: str, command: str) -> Case:
 
 
 def choice(experiment: Experiment, command: str) -> str:
-    """The cases to choose from, and the command for the first: configs put together, or swept values."""
+    """The cases to choose from, and the command for the first: included configs, or swept values."""
     stems = list(dict.fromkeys(case.stem for case in experiment.cases))
     if len(stems) > 1 and experiment.changes_included:
         return f"choose one of {list_names(stems)}: {_command(command, experiment.path or '', f'include=[{stems[0]}]')}"
@@ -213,7 +213,7 @@ def choice(experiment: Experiment, command: str) -> str:
 
 
 def _command(command: str, path: str, *settings: str) -> str:
-    """A command on a config with settings, or the Python arguments; the config by its stem where that finds it."""
+    """A command on a config with settings, or the Python arguments; the config's stem if that finds it."""
     file = Path(path)
     shipped_file = document.config_file(file.stem)
     name = path if file.is_file() and not (shipped_file and shipped_file.samefile(file)) else file.stem
@@ -223,13 +223,13 @@ def _command(command: str, path: str, *settings: str) -> str:
 
 
 def list_names(names: list[str]) -> str:
-    """A list of names; if it is very long, its beginning."""
+    """A list of names, shortened if it is very long."""
     return ", ".join([*names[:MAX_NAMED_CHOICES], *(["…"] if len(names) > MAX_NAMED_CHOICES else [])])
 
 
 def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
     """The plots of one realisation of an experiment's one case, exactly those of a run, and the truth as true_….
-    Columns of equal length, NaN where a plot is missed. Raises ConfigError for a realisation outside every run."""
+    Columns have equal length, with NaN where a plot is missed. Raises ConfigError for a realisation that no run has."""
     if not 0 <= realisation < LARGEST_REALISATIONS:
         raise ConfigError(f"realisation: must be from 0 to {LARGEST_REALISATIONS - 1}, got {realisation}")
     case = case_with_plots(experiment)
@@ -237,7 +237,7 @@ def simulated(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndar
 
 
 def case_with_plots(experiment: Experiment) -> Case:
-    """An experiment's one case, of a study that draws plots; raises ConfigError."""
+    """The only case of an experiment, of a study that draws plots; raises ConfigError."""
     case = single_case(experiment, "simulate", "radarsim simulate {} -o PLOTS.csv")
     refuse_inherited_part(case, "simulated")
     refuse_inherited_part(case, "drawing")
@@ -264,7 +264,7 @@ def batches(experiment: Experiment, n: int, first: int = 0, chunk: int | None = 
 
 
 def _whole_number(name: str, value: Any, minimum: int) -> int:
-    """A whole number, which may be a float; raises ConfigError."""
+    """A value as a whole number, which may be given as a float; raises ConfigError."""
     is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     if not is_number or not float(value).is_integer() or value < minimum:
         raise ConfigError(f"{name}: must be a whole number >= {minimum}, got {value!r}")
@@ -273,7 +273,7 @@ def _whole_number(name: str, value: Any, minimum: int) -> int:
 
 @dataclass
 class InnovationTally:
-    """Number of tests of a filter's innovations, and the sum of their normalised squares."""
+    """The number of tests of a filter's innovations, and the sum of their normalised squares."""
 
     filter: str
     name: str
@@ -283,14 +283,14 @@ class InnovationTally:
 
     @property
     def mean(self) -> float:
-        """For each degree of freedom: 1 for a consistent filter."""
+        """The mean for each degree of freedom: 1 for a consistent filter."""
         return self.total / (self.count * self.freedom) if self.count else np.nan
 
 
 @dataclass
 class ErrorSums:
     """A filter's errors against the truth in one component: number, sum of squares, and sum of squares over the
-    filter's variances. The first BEFORE estimates, those of its start, are left out."""
+    filter's variances. The first START_ESTIMATES estimates are left out."""
 
     filter: str
     component: str
@@ -322,7 +322,7 @@ class ErrorSums:
 
 @dataclass
 class Followed:
-    """The filters over a file of plots: rows, time, gaps, missing values, tests; data for figures and checks."""
+    """The result of filters over a file of plots: rows, time, gaps, missing values, tests, data for figures."""
 
     case: Case
     rows: int = 0
@@ -340,10 +340,10 @@ class Followed:
     median_s: float = np.nan
     tracks: dict[str, "Followed"] = field(default_factory=dict)  # by name, where the file has several
     trackless_rows: int = 0  # rows of no track
-    reused_numbers: int = 0  # numbers of tracks that were used again, for another track
+    reused_numbers: int = 0  # track numbers used again for another track
     doubles: int = 0  # further plots of a track in a scan, left out
     errors: dict[tuple[str, str], ErrorSums] = field(default_factory=dict)  # by filter and component, with truth
-    positions: PlotPositions = field(default_factory=PlotPositions)  # places of the plots, for the plan view
+    positions: PlotPositions = field(default_factory=PlotPositions)  # of the plots, for the plan view
 
     def add(self, columns: Mapping[str, np.ndarray], track: Track) -> None:
         """Count one more piece of the file."""
@@ -389,13 +389,13 @@ class Followed:
 
     @property
     def filters_without_test(self) -> list[str]:
-        """The filters with estimates that have no innovation to test: they give no covariance of it."""
+        """The filters with estimates whose innovations cannot be tested, since they give no covariance of them."""
         tested = {name for (name, _), tally in self.tallies.items() if tally.count}
         return [member.name for member in self.case.spec.members if member.name in self.filters_with_estimate - tested]
 
     @property
     def filters_without_plots(self) -> dict[str, list[str]]:
-        """The filters that took no plot, as the file has none of their columns, with these."""
+        """The filters that took no plot, with the columns that they need and the file has not."""
         interface, spec = recording_interface(self.case), self.case.spec
         needed = {member.name: list(interface.columns_of(spec, member)) for member in spec.members}
         return {name: names for name, names in needed.items() if names and self.sample.columns.keys().isdisjoint(names)}
@@ -414,7 +414,7 @@ class Followed:
 
 
 def select_rows(track: Track, rows: np.ndarray) -> Track:
-    """Some rows of a track, copied."""
+    """Select rows of a track, as copies."""
     arrays: dict[str, Any] = {
         name: getattr(track, name)[:, rows] for name in ROW_ARRAYS if getattr(track, name) is not None
     }
@@ -422,7 +422,7 @@ def select_rows(track: Track, rows: np.ndarray) -> Track:
 
 
 def join_tracks(tracks: list[Track]) -> Track:
-    """Tracks one after the other."""
+    """Join the pieces of a track."""
     first = tracks[0]
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(track, name) for track in tracks], axis=1)
@@ -447,7 +447,7 @@ class RowSample(ThinnedRows):
         self.columns = {name: np.concatenate([previous[name], column])[retained] for name, column in columns.items()}
 
     def stretches(self) -> list[dict[str, np.ndarray]]:
-        """The rows that follow each other, stretch by stretch: the whole track where no block was dropped."""
+        """The sampled rows in stretches without gaps: the whole track if no block was dropped."""
         ends = np.flatnonzero(np.diff(self.row_numbers) > 1) + 1
         parts = {name: np.split(column, ends) for name, column in self.columns.items()}
         return [{name: parts[name][i] for name in parts} for i in range(len(ends) + 1)]
@@ -553,7 +553,7 @@ class TrackRows(NamedTuple):
 
     @property
     def rows(self) -> int:
-        """How many there are."""
+        """The number of rows."""
         return len(self.columns["t_s"])
 
 
@@ -569,7 +569,7 @@ def split_by_track(piece: plots.Piece) -> list[TrackRows]:
 
 
 def combine_tracks(case: Case, results: Mapping[str | None, Followed], passed_over: int) -> Followed:
-    """Sums over several tracks, and the drawings and checks of the longest of them."""
+    """Combine the results of several tracks: sums over all, figures and checks of the longest."""
     longest = max(results.values(), key=lambda result: result.rows)
     combined = replace(longest, tallies={}, missing={}, filters_with_estimate=set(), rows=0, gaps=0, errors={})
     combined.trackless_rows = passed_over
@@ -594,8 +594,8 @@ def combine_tracks(case: Case, results: Mapping[str | None, Followed], passed_ov
 
 
 # ---- bulk ------------------------------------------------------------------------------------------------------------
-NUMBERS_PER_DRAW = 200_000  # drawn at a time: what a processor keeps near
-PlotSource = Callable[[], Iterator[Drawn]]  # the plots, drawn anew at each call
+NUMBERS_PER_DRAW = 200_000  # drawn at a time: what fits into the caches of a processor
+PlotSource = Callable[[], Iterator[Drawn]]  # draws the plots again at each call
 
 
 def write_many(
@@ -623,10 +623,8 @@ def write_npz(file: Writer, first_plots: Drawn, parts: PlotSource, n: int) -> No
     """`seed`, `t_s` (K,), `realisation` (n,), and each array (n, K) or (n, K, M); (1, K) where all have the same. One
     array after the other, so that the plots are drawn as often as there are arrays."""
     widest = max(array.shape[2] for part in parts() for array in part.columns.values()) if first_plots.several else 0
-    arrays, single_arrays = (
-        {"realisation": np.arange(first_plots.n), **first_plots.arrays()},
-        {"t_s": first_plots.t_s, "seed": np.array(first_plots.seed)},
-    )
+    arrays = {"realisation": np.arange(first_plots.n), **first_plots.arrays()}
+    single_arrays = {"t_s": first_plots.t_s, "seed": np.array(first_plots.seed)}
     single_arrays |= {name: array[:1] for name, array in arrays.items() if array.strides[0] == 0}
     with zipfile.ZipFile(file.binary, "w") as archive:
         for name, array in (arrays | single_arrays).items():

@@ -1,12 +1,13 @@
-"""Whose plot it is: of the aircraft that has the same address, callsign or Mode 3/A code at that time, or of none.
+"""Match plots with aircraft, and name the tracks of a sensor's records, by address, callsign, code and time.
 
-An address belongs to one aircraft. Callsigns and codes are used again, so just one aircraft that has it must be near
-the plot. Codes that end in 00 are given to many at once (ICAO Doc 4444, 8.5.2.2) and identify none.
+A plot belongs to the aircraft that has the same address, callsign or Mode 3/A code at that time, or to none.
 
-Which track a record of a sensor belongs to: by its track number, its address or its Mode 3/A code.
+An address belongs to one aircraft. Callsigns and codes are used again, so exactly one aircraft that has it must be
+close to the plot. Codes that end in 00 are given to many at once (ICAO Doc 4444, 8.5.2.2) and identify none.
 
-A track number is a sensor's own, and is given again when its aircraft has gone. A code is given to several aircraft at
-a time. So both name a track only together with time, and a code with place too."""
+A record belongs to a track by its track number, its address or its Mode 3/A code. A sensor assigns its track numbers,
+and uses a number again when its aircraft has left. Several aircraft may have the same code at a time. So both name a
+track only together with the time, and a code only together with the position as well."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,9 +24,8 @@ KINDS = ("address", "callsign", "mode_3a")  # of identity, the strongest first
 SHARED_CODE_ENDING = "00"  # the end of codes that are given to many
 MAX_GAP_S = 60.0  # over which positions are not interpolated
 MAX_RANGE_OFFSET_M = 5000.0  # of a plot from its aircraft in range: 20 s of an airliner
-MAX_BEARING_OFFSET_RAD = math.radians(
-    2.0
-)  # in bearing, besides what FARTHEST_M makes: of a radar badly aligned with north
+# In bearing, in addition to what MAX_RANGE_OFFSET_M makes: of a radar badly aligned with north.
+MAX_BEARING_OFFSET_RAD = math.radians(2.0)
 
 StateFunction = Callable[[np.ndarray], np.ndarray]  # position and speed (n, 6), m and m/s, at times (n,)
 
@@ -45,10 +45,10 @@ class AircraftPath:
     def __init__(self) -> None:
         self.fixes: list[np.ndarray] = []
         self.identity_times: dict[tuple[str, str], tuple[float, float]] = {}
-        self.state_function: StateFunction | None = None  # made when it is first needed
+        self.state_function: StateFunction | None = None  # computed when it is first needed
 
     def contradicts(self, values: Sequence[str]) -> bool:
-        """Whether it has an identity other than these, in the order of KINDS; '' is unknown."""
+        """Whether the aircraft has other identities than these, in the order of KINDS; '' is unknown."""
         kinds = {kind for kind, _ in self.identity_times}
         pairs = zip(KINDS, values, strict=False)
         return any(value and kind in kinds and (kind, value) not in self.identity_times for kind, value in pairs)
@@ -64,12 +64,11 @@ class AircraftPaths:
         self.numbers_by_identity: dict[tuple[str, str], list[int]] = {}
         self.addresses_by_track: dict[str, str] = {}  # by track
         self.unidentified = 0  # fixes that nothing identifies
-        self.searched_identities: set[tuple[str, ...]] = (
-            set()
-        )  # identities by KINDS of the plots that `find` was asked for
+        # identities by KINDS of the plots that `find` was asked for
+        self.searched_identities: set[tuple[str, ...]] = set()
 
     def names(self) -> list[str]:
-        """What identifies each aircraft best."""
+        """The strongest identity of each aircraft."""
         return [min(path.identity_times, key=lambda identity: KINDS.index(identity[0]))[1] for path in self.paths]
 
     def add(self, fixes: np.ndarray, track: Sequence[str], identity: Mapping[str, Sequence[str]]) -> None:
@@ -98,17 +97,15 @@ class AircraftPaths:
                         )
 
     def _key(self, track: str, values: list[str]) -> str:
-        """What the path of a fix is kept by: the address that it has, or that its track had before."""
+        """The key of a fix's path: its address, or the address that its track had before."""
         address, *codes = values
         if address:
             self.addresses_by_track[track] = address
             return address
         if not any(codes):
             return ""
-        address_before, number = (
-            self.addresses_by_track.get(track),
-            self.numbers_by_key.get(self.addresses_by_track.get(track, "")),
-        )
+        address_before = self.addresses_by_track.get(track)
+        number = self.numbers_by_key.get(self.addresses_by_track.get(track, ""))
         if track and address_before and (number is None or not self.paths[number].contradicts(values)):
             return address_before
         return f"track {track or codes}"
@@ -121,7 +118,7 @@ class AircraftPaths:
         identity: Mapping[str, Sequence[str]],
         rotate: Callable[[np.ndarray], np.ndarray] = lambda states: states,
     ) -> AircraftMatch:
-        """The aircraft of plots (n,) with identities by KINDS; turned: states in the axes of their radar."""
+        """Match plots (n,) with aircraft, by identities and KINDS; rotate: states into the axes of their radar."""
         match = AircraftMatch(np.full((len(t), 6), np.nan), np.full(len(t), -1), np.full(len(t), -1))
         for values, rows in rows_by_name(list(zip(*clean_identities(identity, len(t)), strict=True))).items():
             self.searched_identities.add(values)
@@ -142,7 +139,7 @@ class AircraftPaths:
                     is_possible &= are_compatible(
                         range_bearing_offsets(states, range_m[open_rows], bearing_rad[open_rows]), range_m[open_rows]
                     )
-                is_unique = is_possible.sum(axis=0) == 1  # just one of them may be its own
+                is_unique = is_possible.sum(axis=0) == 1  # exactly one candidate is possible
                 candidate_index = is_possible.argmax(axis=0)[is_unique]
                 match.states[open_rows[is_unique]] = states[candidate_index, np.flatnonzero(is_unique)]
                 match.path_numbers[open_rows[is_unique]] = np.array(candidates)[candidate_index]
@@ -164,7 +161,7 @@ class AircraftPaths:
         return path.state_function(self._clock_times(t))
 
     def deviations_m(self, number: int, t: np.ndarray) -> np.ndarray:
-        """How far (n,) an aircraft's interpolated position is from the straight line between its fixes, m."""
+        """Distances (n,) of an aircraft's interpolated positions from straight lines between its fixes, m."""
         fixes = self.fixes(number)
         fixes = fixes[np.unique(fixes[:, 0], return_index=True)[1]]
         straight = [np.interp(self._clock_times(t), fixes[:, 0], column) for column in fixes.T[1:]]
@@ -180,7 +177,7 @@ class AircraftPaths:
 
 
 def clean_identities(identity: Mapping[str, Sequence[str]], n: int) -> list[list[str]]:
-    """The identities (n,) by KINDS as they are compared; codes of many are no identity."""
+    """The identities (n,) by KINDS in the form that is compared, without codes given to many aircraft."""
     address, callsign, code = (identity.get(kind) or [""] * n for kind in KINDS)
     codes = [text.strip().zfill(4) if text.strip() else "" for text in code]
     return [
@@ -193,8 +190,10 @@ def clean_identities(identity: Mapping[str, Sequence[str]], n: int) -> list[list
 def assign_owner(
     owner: str, track: Sequence[str], identity: Mapping[str, Sequence[str]]
 ) -> Mapping[str, Sequence[str]]:
-    """The identities (n,) by KINDS of plots; where all that is known is whose track, address, callsign or code the one
-    path has, that of the plots with it."""
+    """The identities (n,) by KINDS of plots.
+
+    owner: the track, address, callsign or code of the plots to which the only path belongs; it becomes
+    their address."""
     if not owner:
         return identity
     names_by_row = (map(str.lower, names_by_row) for names_by_row in zip(track, *identity.values(), strict=True))
@@ -202,34 +201,34 @@ def assign_owner(
 
 
 def range_bearing_offsets(states: np.ndarray, range_m: np.ndarray, bearing_rad: np.ndarray) -> np.ndarray:
-    """How far plots (n,) lie from aircraft there, (…, n, 6), in range and bearing: (…, n, 2)."""
+    """Offsets (…, n, 2) in range and bearing of plots (n,) from aircraft with states (…, n, 6)."""
     r, b = np.linalg.norm(states[..., :3], axis=-1), np.arctan2(states[..., 2], states[..., 0])
     return np.stack([range_m - r, wrap_angle(bearing_rad - b)], axis=-1)
 
 
 def are_compatible(offsets: np.ndarray, range_m: np.ndarray) -> np.ndarray:
-    """Whether plots at these ranges (n,) that miss an aircraft by (…, n, 2) may be its own; an unknown bearing may be
-    any."""
+    """Whether plots at these ranges (n,), with offsets (…, n, 2) from an aircraft, may be its plots.
+
+    An unknown bearing is compatible."""
     with np.errstate(divide="ignore"):
         is_turned = np.abs(offsets[..., 1]) > MAX_BEARING_OFFSET_RAD + MAX_RANGE_OFFSET_M / range_m
     return (np.abs(offsets[..., 0]) <= MAX_RANGE_OFFSET_M) & ~is_turned
 
 
 def are_far(offsets: np.ndarray, range_m: np.ndarray) -> bool:
-    """Whether most of the plots (n,) that miss an aircraft by (n, 2) cannot be its own."""
+    """Whether most plots (n,), with offsets (n, 2) from an aircraft, cannot be its plots."""
     return bool(are_compatible(offsets, range_m).sum() * 2 < len(range_m))
 
 
 def median_offsets(offsets: np.ndarray) -> tuple[float, float]:
-    """The median distance of plots that miss their aircraft by (n, 2) in range and in bearing, m and degrees, NaN where
-    there are no bearings."""
+    """Medians of the sizes of offsets (n, 2) in range, m, and in bearing, degrees; NaN without bearings."""
     bearing_offsets = offsets[np.isfinite(offsets[:, 1]), 1]
     bearing_deg = math.degrees(np.median(np.abs(bearing_offsets))) if len(bearing_offsets) else math.nan
     return float(np.median(np.abs(offsets[:, 0]))), bearing_deg
 
 
 def distance(range_m: float, bearing_deg: float) -> str:
-    """A distance in range and, where it is known, in bearing."""
+    """The text of a distance in range and, if it is known, in bearing."""
     bearing_text = [] if math.isnan(bearing_deg) else [f"{number(bearing_deg, 2)}°"]
     return listed([f"{number(range_m, 3)} {tr('m')}", *bearing_text])
 
@@ -240,8 +239,9 @@ def wrap_angle(angle: np.ndarray) -> np.ndarray:
 
 
 def interpolate_states(fixes: np.ndarray) -> StateFunction:
-    """Positions and speeds (m, 6) at times (m,), from fixes (n, 4) of time and position: piecewise cubic with slopes
-    from the neighbouring fixes; NaN outside, and in gaps over LONGEST_GAP_S."""
+    """Interpolate fixes (n, 4) of time and position: a function from times (m,) to positions and speeds (m, 6).
+
+    Piecewise cubic with slopes from the neighbouring fixes; NaN outside, and in gaps over MAX_GAP_S."""
     from scipy.interpolate import CubicHermiteSpline
 
     times, first_rows = np.unique(fixes[:, 0], return_index=True)
@@ -260,17 +260,16 @@ def interpolate_states(fixes: np.ndarray) -> StateFunction:
 
 
 # ---- numbering -------------------------------------------------------------------------------------------------------
-MAX_SILENCE_S = 60.0  # after which a number or a code is that of another aircraft
-MAX_SPEED_MPS, POSITION_MARGIN_M = (
-    700.0,
-    1500.0,
-)  # between plots of one aircraft: Mach 2, and errors in azimuth far away
+MAX_SILENCE_S = 60.0  # after such a silence, a number or a code belongs to another aircraft
+# between plots of one aircraft: Mach 2, and errors in azimuth far away
+MAX_SPEED_MPS = 700.0
+POSITION_MARGIN_M = 1500.0
 MIN_TURN_S = 1.0  # within which a radar does not see an aircraft twice
 
 
 @dataclass(slots=True)
 class LastReport:
-    """A track: its name, and time, address, place (m) and velocity (m/s) of its aircraft's last record."""
+    """The last record of a track: its name, and time, address, position (m) and velocity (m/s) of its aircraft."""
 
     name: str
     t: float
@@ -282,19 +281,21 @@ class LastReport:
 
 
 class TrackNames:
-    """Names of tracks: the number, the address, or A and the code; of another sensor than the first with its name and a
-    colon before them; -2, -3, … after those of the second aircraft and further ones."""
+    """Names of tracks: the number, the address, or A and the code.
+
+    The name of a sensor other than the first stands before them, with a colon; -2, -3, … stand after the names of the
+    second aircraft and further ones."""
 
     def __init__(self) -> None:
         self.first_sensor: str | None = None
         self.reports_by_number: dict[tuple[str, str], LastReport] = {}
         self.reports_by_code: dict[tuple[str, str], list[LastReport]] = {}
         self.counts: dict[str, int] = {}
-        self.reused_numbers = 0  # numbers given again
+        self.reused_numbers = 0  # numbers used again for another aircraft
         self.shared_codes: set[str] = set()  # names of codes of several aircraft
 
     def name_by_number(self, sensor: str, number: str, address: str, t: float) -> str:
-        """The track of a record with a track number; its address is '' where it has none."""
+        """The track of a record with a track number; its address is '' if it has none."""
         report = self.reports_by_number.get((sensor, number))
         if report is not None:
             have_addresses = address and report.address
@@ -308,7 +309,7 @@ class TrackNames:
         return report.name
 
     def name_by_code(self, sensor: str, code: str, t: float, north: float, east: float) -> str:
-        """The track of a record with a code, at a place in m: of the aircraft that flies nearest to it."""
+        """The track of a record with a code, at a position in m: that of the aircraft which flies nearest to it."""
         reports = [report for report in self.reports_by_code.get((sensor, code), ()) if t - report.t <= MAX_SILENCE_S]
         smallest_miss, match = math.inf, None
         for report in reports:
@@ -333,7 +334,7 @@ class TrackNames:
         return match.name
 
     def with_sensor(self, sensor: str, name: str) -> str:
-        """A name that is the sensor's own."""
+        """A name, preceded by its sensor unless that is the first."""
         if self.first_sensor is None:
             self.first_sensor = sensor
         return name if sensor == self.first_sensor else f"{sensor}:{name}"

@@ -387,7 +387,9 @@ def _verdict_with_folds(case: Case, test: Judged, all_tests: Sequence[Judged]) -
     unfolding_filters = {member.name for member in case.spec.members if interface.unfolds(member)}
     if test.verdict != TOO_SMALL or test.filter not in unfolding_filters:
         return test.verdict
-    fits_elsewhere = any(other.name == test.name and other.verdict in (FITS, TOO_LARGE) for other in all_tests)
+    fits_elsewhere = any(
+        test_of_filter.name == test.name and test_of_filter.verdict in (FITS, TOO_LARGE) for test_of_filter in all_tests
+    )
     return FOLD_LOST if fits_elsewhere else MAYBE_TOO_SMALL
 
 
@@ -564,18 +566,18 @@ def _best_filter_text(comparison: FilterComparison) -> str:
     """The best filters, and how many times less likely the plots are under the others."""
     gaps = comparison.log_ratios
     best = [name for name, gap in gaps.items() if gap < EQUAL_FILTERS_GAIN or name == comparison.best]
-    others = sorted(((name, gap) for name, gap in gaps.items() if name not in best), key=itemgetter(1))
-    if not others:
+    less_likely = sorted(((name, gap) for name, gap in gaps.items() if name not in best), key=itemgetter(1))
+    if not less_likely:
         return few(best, len(best))
     names_by_ratio: dict[str, list[str]] = {}
-    for name, gap in others:
+    for name, gap in less_likely:
         names_by_ratio.setdefault(times(gap), []).append(name)
     ratios = ", ".join(
         tr("{times} times under {name}", times=ratio, name=few(names, len(names)))
         for ratio, names in names_by_ratio.items()
     )
     best_names = few(best, len(best))
-    if others[0][1] <= CLEAR_GAIN:
+    if less_likely[0][1] <= CLEAR_GAIN:
         best_names = tr("{name} (not clearly)", name=best_names)
     return tr("{best}; the plots are less likely under the others: {others}", best=best_names, others=ratios)
 

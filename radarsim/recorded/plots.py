@@ -1,10 +1,10 @@
-"""Recorded plots: one track from a CSV file, and the estimates over it back to one.
+"""Read recorded plots from a CSV file, name their tracks, and write tracks and columns as CSV.
 
-A plots file has a header, before which lines beginning with `#` may stand; `t_s` must rise from row to row (or, for
-studies that take several plots at a time, not fall), an empty cell means missing, other columns are ignored.
+A plots file has a header, before which lines beginning with `#` may stand. `t_s` must rise from row to row; for studies
+that take several plots at a time it must not fall. An empty cell is a missing value; other columns are ignored.
 
-Places of plots in the plane, for the plan view, as far as the file has them: north and east from the radar, or whatever
-stands at the origin."""
+Positions of plots in the plane, for the plan view, count north and east from the radar, or from whatever stands at the
+origin."""
 
 import csv
 import itertools
@@ -30,13 +30,14 @@ Name = TypeVar("Name", bound=Hashable)
 
 
 # ---- places ----------------------------------------------------------------------------------------------------------
-MAX_FIGURE_ROWS = 2000  # rows of a track that are kept for figures
+MAX_FIGURE_ROWS = 2000  # rows of a track that are retained for figures
 
 
 def plane_positions(columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """North, east and range (n, 3), m, from columns (n,) of a file; None where it has none that say where plots are.
+    """North, east and range (n, 3) of plots, m, from columns (n,) of a file; None without positions and ranges.
+
     From x_m (north) and z_m (east) as `radarsim import` writes them; else from range and bearing, with the slant range
-    in place of the ground range; else the range alone."""
+    instead of the ground range; else the range alone."""
     if {"x_m", "y_m", "z_m"} <= set(columns):
         x, y, z = (columns[name] for name in ("x_m", "y_m", "z_m"))
         r = columns.get("range_m", np.sqrt(x**2 + y**2 + z**2))
@@ -50,8 +51,9 @@ def plane_positions(columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
 
 @dataclass(kw_only=True)
 class ThinnedRows:
-    """Rows of a track, spread over its whole time: when there are more than most, every second block of them is
-    dropped. number (n,): of each row that is held."""
+    """Rows of a track, spread over its whole time: of more than max_rows, every second block is dropped.
+
+    row_numbers (n,): the number in the track of each retained row."""
 
     max_rows: int = MAX_FIGURE_ROWS
     block_rows: int = 1
@@ -60,7 +62,7 @@ class ThinnedRows:
     stride: int = 1
 
     def select(self, new_rows: int) -> np.ndarray:
-        """Which of the rows held (n,), and of so many more, are held from now on: (n + more,)."""
+        """Whether the retained rows (n,) and new_rows more are retained: (n + new_rows,)."""
         row_numbers = np.concatenate([self.row_numbers, self.rows_so_far + np.arange(new_rows)])
         while (retained := row_numbers // self.block_rows % self.stride == 0).sum() > self.max_rows:
             self.stride *= 2
@@ -70,13 +72,13 @@ class ThinnedRows:
 
 @dataclass
 class PlotPositions(ThinnedRows):
-    """Times (n,) and places (n, 3) of a track's plots, north, east and range in m."""
+    """Times (n,) and positions (n, 3) of a track's plots: north, east and range in m."""
 
     t_s: np.ndarray = field(default_factory=lambda: np.zeros(0))
     positions: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def add(self, t_s: np.ndarray, columns: Mapping[str, np.ndarray]) -> None:
-        """Add plots; those without any place are left out."""
+        """Add plots; those without any position are left out."""
         positions = plane_positions(columns)
         if positions is None:
             return
@@ -87,22 +89,22 @@ class PlotPositions(ThinnedRows):
 
 
 # ---- numbers of tracks -----------------------------------------------------------------------------------------------
-REUSE_GAP_INTERVALS, MIN_REUSE_GAP_S = (
-    30.0,
-    60.0,
-)  # usual intervals and time after which a number is that of another track
+# Usual intervals, and time, after which a number belongs to another track.
+REUSE_GAP_INTERVALS = 30.0
+MIN_REUSE_GAP_S = 60.0
 SAME_SCAN_SHARE = 0.5  # of the usual interval: plots of one track that are nearer than that are of one scan
-MIN_REGULAR_SHARE, SCAN_TOLERANCE = (
-    0.75,
-    0.1,
-)  # share of intervals that are whole scans, but for this part of one, of a turning antenna
-MIN_INTERVALS, MAX_INTERVALS = 5, 100  # between the last plots of a track, which tell its usual interval
+# Share of intervals that are whole scans of a turning antenna, within this part of a scan.
+MIN_REGULAR_SHARE = 0.75
+SCAN_TOLERANCE = 0.1
+MIN_INTERVALS, MAX_INTERVALS = 5, 100  # between the last plots of a track, from which its usual interval follows
 
 
 @dataclass
 class _TrackHistory:
-    """A track so far: under which name, how often its number began one, its last two plots (time and place), the last
-    intervals, the usual one, and the time within which a further plot is of the same scan."""
+    """The history of a track number.
+
+    Its name, how many tracks it has named, the last two plots (time and position) of the current track, the last
+    intervals, their median, and the time within which another plot is of the same scan."""
 
     name: str
     uses: int = 1
@@ -112,12 +114,11 @@ class _TrackHistory:
     same_scan_s: float = 0.0
 
     def select_plots(self, t: np.ndarray, positions: np.ndarray, retained: np.ndarray, names: np.ndarray) -> None:
-        """Which of the next plots, at times (n,) and places (n, 3), are kept, and their names: changed in place."""
+        """Select the next plots, at times (n,) and positions (n, 3): retained and names are changed in place."""
         intervals = np.diff(t, prepend=self.last_plots[-1][0] if self.last_plots else t[0])
         self._update_intervals(intervals if self.last_plots else intervals[1:])
-        gap = max(
-            REUSE_GAP_INTERVALS * self.usual_interval_s, MIN_REUSE_GAP_S
-        )  # without a usual interval: not-a-number, and no gap
+        # without a usual interval it is NaN, and there is no gap
+        gap = max(REUSE_GAP_INTERVALS * self.usual_interval_s, MIN_REUSE_GAP_S)
         is_same_scan = (intervals <= 0) | (intervals < self.same_scan_s)
         is_same_scan[:1] &= bool(self.last_plots)
         if self.uses == 1 and not (intervals > gap).any() and not is_same_scan.any():
@@ -130,7 +131,7 @@ class _TrackHistory:
                 self.uses, self.last_plots = self.uses + 1, []
             end = i + 1
             if self.last_plots and (t[i] <= last_time or t[i] - last_time < self.same_scan_s):
-                retained[i] = False  # the rest of a scan that the rows before have begun
+                retained[i] = False  # the rest of a scan that began in the previous rows
             else:
                 while end < len(t) and (t[end] == t[i] or t[end] - t[i] < self.same_scan_s):
                     end += 1
@@ -141,7 +142,7 @@ class _TrackHistory:
             i = end
 
     def _update_intervals(self, intervals: np.ndarray) -> None:
-        """The usual interval of a track, and whether it is that of a turning antenna."""
+        """Update the usual interval of a track, and whether it is that of a turning antenna."""
         self.intervals = intervals = np.concatenate([self.intervals, intervals[intervals > 0]])[-MAX_INTERVALS:]
         if intervals.size < MIN_INTERVALS:
             return
@@ -151,7 +152,7 @@ class _TrackHistory:
         self.same_scan_s = SAME_SCAN_SHARE * self.usual_interval_s if is_whole.mean() >= MIN_REGULAR_SHARE else 0.0
 
     def _nearest(self, t: np.ndarray, positions: np.ndarray) -> int:
-        """Which of the plots of one scan is nearest to where the last two lead; the first where that is not known."""
+        """The index of the plot of one scan that is nearest to the extrapolated track; the first if that is unknown."""
         if len(t) == 1 or not self.last_plots:
             return 0
         expected = np.tile(self.last_plots[-1][1], (len(t), 1))
@@ -168,10 +169,12 @@ class _TrackHistory:
 
 
 class TrackNumbers:
-    """The numbers of tracks over time. One that is used again after a gap is that of another track, with a name of its
-    own: every tracker has dropped the first by then. Of several plots of a track in a scan (equal times; with a turning
-    antenna, times that are no scan apart) the one nearest to where the track leads is kept: the others are reflections,
-    or the same plot once more."""
+    """The numbers of tracks over time.
+
+    A number that is used again after a gap belongs to another track, which gets a name of its own: every tracker has
+    dropped the first track by then. Of several plots of a track in a scan (equal times; with a turning antenna, times
+    less than a scan apart) the one nearest to the extrapolated track is retained: the others are reflections, or the
+    same plot repeated."""
 
     def __init__(self) -> None:
         self._tracks: dict[str, _TrackHistory] = {}
@@ -179,16 +182,14 @@ class TrackNumbers:
 
     @property
     def reused(self) -> int:
-        """How many numbers were used again."""
+        """How often a number was used again for another track."""
         return sum(track.uses - 1 for track in self._tracks.values())
 
     def select(self, t: np.ndarray, names: list[str], places: Mapping[str, np.ndarray]) -> tuple[np.ndarray, list[str]]:
-        """Which of the next rows (n,) are kept, and their tracks; places: columns (n,)."""
-        retained, track_names, all_positions = (
-            np.ones(len(t), dtype=bool),
-            np.array(names, dtype=object),
-            plane_positions(places),
-        )
+        """Select the next rows (n,), and name their tracks; places: columns (n,)."""
+        retained = np.ones(len(t), dtype=bool)
+        track_names = np.array(names, dtype=object)
+        all_positions = plane_positions(places)
         positions = np.full((len(t), 3), np.nan) if all_positions is None else all_positions
         for name, rows in rows_by_name(names).items():
             if name:
@@ -227,22 +228,23 @@ class Faults:
         self.kinds.setdefault(where + must, (first, cure and f"; {cure}", []))[2].append(line)
 
     def lines(self) -> Iterator[str]:
-        for first, cure, (_, *further) in self.kinds.values():
-            if not further:
+        for first, cure, (_, *further_lines) in self.kinds.values():
+            if not further_lines:
                 yield first
                 continue
-            line_numbers = ", ".join(map(str, further[:MAX_NAMED_LINES])) + (
-                ", …" if len(further) > MAX_NAMED_LINES else ""
+            line_numbers = ", ".join(map(str, further_lines[:MAX_NAMED_LINES])) + (
+                ", …" if len(further_lines) > MAX_NAMED_LINES else ""
             )
-            noun = "lines" if len(further) > 1 else "line"
-            yield f"{first} (and {len(further)} more, in {noun} {line_numbers}){cure}"
+            noun = "lines" if len(further_lines) > 1 else "line"
+            yield f"{first} (and {len(further_lines)} more, in {noun} {line_numbers}){cure}"
 
 
 class Piece(NamedTuple):
-    """Some rows of a file of plots: the measured columns (n,); the track of each row, none where the file has no
-    tracks; the columns (n,) of the truth, `true_…`; those of the plots' places, of PLACES; texts, of those asked for
-    that the file has; so far, how many numbers of tracks were used again, and how many further plots of a scan were
-    left out."""
+    """Some rows of a file of plots.
+
+    The measured columns (n,); the track of each row, None if the file has no tracks; the columns (n,) of the truth,
+    `true_…`; the POSITION_COLUMNS that the file has; the requested texts that it has; the counts so far of track
+    numbers used again, and of further plots of a scan that were left out."""
 
     columns: dict[str, np.ndarray]
     tracks: list[str] | None
@@ -264,9 +266,9 @@ def pieces(
     """The columns of a file, of the first of `choices` that it has, `size` rows at a time, so that memory does not grow
     with the file: `t_s` first; NaN where a cell is empty.
 
-    Times rise, within each track; several: rows may have the time of the row before. Else the rows of tracks with
-    names are those that `Numbers` keeps, with its names. any_origin: ranges may be negative. texts: further columns;
-    times may then have any order, and all rows are kept.
+    Times rise, within each track; equal_times: rows may have the time of the previous row. Else the rows of tracks
+    with names are those that `TrackNumbers` selects, with its names. any_origin: ranges may be negative. texts: further
+    columns; times may then have any order, and all rows are kept.
 
     After the first fault no more rows come: the rest is checked for faults, and ConfigError raised at the end with all
     of them, each `file:row's line:column: name: what is wrong`."""
@@ -281,7 +283,7 @@ def pieces(
 
 
 def place_of(path: str | os.PathLike, row: int) -> str:
-    """Where a row of numbers, counted from 0, ends: `file:line`; in a stream, which is read once, `file: row`."""
+    """The location of a row of numbers, counted from 0: `file:line`; in a stream, which is read once, `file: row`."""
     if os.path.isfile(path):
         with open(path, encoding="utf-8-sig", newline="") as file:
             rows = csv.reader(file, strict=True)
@@ -292,7 +294,7 @@ def place_of(path: str | os.PathLike, row: int) -> str:
 
 
 class _Reader:
-    """Header, then numbers, then the order of the times; faults are collected."""
+    """Reads the header, then numbers, and checks values and the order of times; faults are collected."""
 
     def __init__(
         self,
@@ -323,7 +325,7 @@ class _Reader:
         self.track_numbers = TrackNumbers()
 
     def chunks(self, size: int) -> Iterator[Piece]:
-        """The wanted columns, the rows' tracks and their truth, `size` rows at a time."""
+        """The columns, tracks, truth and positions of the rows, `size` rows at a time."""
         any_row = False
         while True:
             lines, values, tracks, texts = self._read_rows(size)
@@ -384,7 +386,7 @@ class _Reader:
         return lines, values, tracks, texts
 
     def _check_values(self, array: np.ndarray, lines: list[int]) -> None:
-        """Note values that no sensor can have measured."""
+        """Collect values that no sensor can have measured as faults."""
         self.has_measurement |= bool(np.isfinite(array[:, 1:]).any())
         for i, j in np.argwhere(impossible_values(array, self.names, self.any_origin)):
             name = self.names[j]
@@ -394,7 +396,7 @@ class _Reader:
             self.faults.add(lines[i], self._column_label(j), must, f"{array[i, j]:g}", cure)
 
     def _check_times(self, t: np.ndarray, lines: list[int], tracks: list[str]) -> None:
-        """Note times that do not rise from row to row of a track; rows of no track may have any."""
+        """Collect times that do not rise from row to row of a track as faults; rows of no track may have any time."""
         for name, rows in rows_by_name(tracks).items():
             if self.track_index is not None and not name:
                 continue
@@ -408,7 +410,7 @@ class _Reader:
             self.last_times[name] = times[-1]
 
     def _row_numbers(self, row: list[str], line: int) -> list[float]:
-        """The wanted numbers of a row; faults are noted and become NaN."""
+        """The numbers of a row; faulty ones become NaN."""
         if len(row) != self.width:
             self.faults.add(line, "", f"must have {self.width} cells as the header", len(row))
             return [math.nan] * (len(self.names) + len(self.extra_indices))
@@ -440,7 +442,7 @@ def import_command(path: str) -> str:
 
 
 def _number_or_nan(text: str) -> float:
-    """A number of a column that is only compared with; NaN where it is none."""
+    """A number of a column that filters do not take; NaN for any other text."""
     try:
         value = float(text)
     except ValueError:
@@ -449,7 +451,7 @@ def _number_or_nan(text: str) -> float:
 
 
 def rows_by_name(names: "Sequence[Name]") -> "dict[Name, np.ndarray]":
-    """The rows of each name, in the order in which the names first appear."""
+    """The indices of the rows of each name, in the order in which the names first appear."""
     if len(set(names)) == 1:
         return {names[0]: np.arange(len(names))}
     rows: dict[Name, list[int]] = {}
@@ -459,13 +461,15 @@ def rows_by_name(names: "Sequence[Name]") -> "dict[Name, np.ndarray]":
 
 
 def _is_comment(row: list[str]) -> bool:
-    """Whether a row before the header is a comment on the file."""
+    """Whether a row before the header is a comment."""
     return bool(row) and row[0].startswith("#")
 
 
 def impossible_values(array: np.ndarray, names: list[str], any_origin: bool = False) -> np.ndarray:
-    """Which values (n, columns) no sensor can have measured: ranges not positive, unless they count from any origin,
-    spans not positive, and angles beyond a turn (degrees?)."""
+    """Whether values (n, columns) are such that no sensor can have measured them.
+
+    Ranges that are not positive, unless they count from any origin; spans that are not positive; angles beyond a full
+    turn, which may be degrees."""
     wrong = np.zeros(array.shape, dtype=bool)
     for j, name in enumerate(names):
         if name == "span_mps" or (name == "range_m" and not any_origin):
@@ -476,7 +480,7 @@ def impossible_values(array: np.ndarray, names: list[str], any_origin: bool = Fa
 
 
 def _choose_columns(path: str, header: list[str], choices: Sequence[Sequence[str]]) -> list[str]:
-    """The first choice of columns that the header holds, each once."""
+    """The first choice of columns that the header has; raises ConfigError if it has one of them twice."""
     for choice in choices:
         if set(choice) <= set(header):
             repeated = [name for name in choice if header.count(name) > 1]
@@ -492,7 +496,7 @@ def _choose_columns(path: str, header: list[str], choices: Sequence[Sequence[str
 
 
 def header_of(track: Track, has_track_name: bool = False) -> tuple[str, ...]:
-    """The columns of a track; named: preceded by the name of the recorded track."""
+    """The columns of a track; has_track_name: preceded by the name of the recorded track."""
     models = 0 if track.probability is None else track.probability.shape[2]
     columns = ("t_s", "filter", "component", "unit", "estimate", "sigma")
     score_columns = () if track.numbers is None else ("track", "score")
@@ -532,7 +536,7 @@ def number_text(value: float) -> str:
 
 
 def column_texts(column: np.ndarray) -> Iterator[str]:
-    """Numbers (n,) as text, nothing for not-a-number."""
+    """Numbers (n,) as texts, '' for NaN."""
     if column.dtype.kind != "f":
         return map(str, column.tolist())
     missing = np.isnan(column)

@@ -1,6 +1,6 @@
-r"""`radarsim register`: what a radar is off by in range, bearing and time, against positions of the same aircraft.
+r"""Find a radar's biases in range, bearing and time against positions of the same aircraft.
 
-A plot of time t is that of an aircraft which is at range R and bearing B by the positions:
+If an aircraft has range R and bearing B by the positions, its plot of time t has:
 
     range = (1 + range_scale) R(t - time_s) + range_m,   bearing = B(t - time_s) + bearing_rad
 
@@ -11,16 +11,16 @@ applications). The squares are Tukey's biweight after Huber's function, each in 
 
 Intervals are by clusters, so that errors may be correlated within an aircraft: variance and degrees of freedom of Bell
 and McCaffrey (2002, Survey Methodology 28, 169), for the linear model that has the pseudo-residuals of the robust
-estimate as its errors (Huber, sec. 7.6). A bias that moves the plots as others do is taken as 0 and called unknown.
+estimate as its errors (Huber, sec. 7.6). A bias that moves the plots as other biases do is taken as 0 and reported as
+unknown.
 """
 
 import itertools
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +31,7 @@ from radarsim.recorded import plots as files
 from radarsim.recorded.formats.sites import BIASES, DAY_S, Site
 from radarsim.recorded.identity import (
     KINDS,
+    AircraftMatch,
     AircraftPaths,
     are_far,
     assign_owner,
@@ -41,9 +42,9 @@ from radarsim.recorded.identity import (
 from radarsim.recorded.plots import rows_by_name
 from radarsim.report.wording import interval, significant_digits
 
-OPTIONAL_BIASES = ("range_scale", "time_s")  # taken as 0 where they cannot be told from the others
+OPTIONAL_BIASES = ("range_scale", "time_s")  # taken as 0 if they cannot be distinguished from the others
 MIN_PLOTS = 20
-MAX_VARIANCE_INFLATION = 100.0  # factor in the variance of a bias, by the others, from which they cannot be told apart
+MAX_VARIANCE_INFLATION = 100.0  # of the variance of a bias by the others, from which they cannot be distinguished
 MIN_MOVEMENT_SIGMAS = 10.0  # σ of a plot that an aircraft must move for its lag to show
 MAX_DEVIATION_M = 100.0  # of an interpolated position from the straight line
 MIN_AIRCRAFT, MIN_CLUSTERS = 4, 20  # fewer aircraft are cut into about so many pieces
@@ -51,7 +52,7 @@ HUBER_LIMIT, BIWEIGHT_LIMIT = 1.345, 4.685  # of 95 % efficiency for normal erro
 MAD_TO_SIGMA = 1.4826  # σ of normal errors over their median absolute value
 MIN_RELATIVE_SIGMA = 1e-13  # of a range, relative, and of a bearing
 MAX_ROUNDS, CONVERGENCE_STEP = 60, 1e-6
-OUTLIER_LAG_SIGMAS = 5.0  # standard deviations from the others, from which an aircraft's lag is its own
+OUTLIER_LAG_SIGMAS = 5.0  # standard deviations from the other aircraft, from which a lag counts as different
 
 
 class MatchedPlots(NamedTuple):
@@ -66,7 +67,7 @@ class MatchedPlots(NamedTuple):
 
 @dataclass(frozen=True)
 class Bias:
-    """A bias with its 95 % interval, NaN where it is unknown, as `why` says."""
+    """A bias with its 95 % interval; NaN if it is unknown, for the reason in `why`."""
 
     key: str
     value: float
@@ -76,13 +77,13 @@ class Bias:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the plots tell it."""
+        """Whether the plots determine it."""
         return not self.why
 
 
 @dataclass(frozen=True)
 class AircraftResiduals:
-    """What the biases leave of an aircraft's plots: medians of range and bearing, its own lag and the error of that."""
+    """Residuals of an aircraft's plots: medians of range and bearing, its lag beyond time_s and the σ of that lag."""
 
     name: str
     plots: int
@@ -107,8 +108,10 @@ class Adjustment:
 
 @dataclass(frozen=True)
 class Registration:
-    """What `register` finds: biases and errors of plots; the matched ones, out of how many and how; their median
-    distance in range and bearing before; the items left out; the distance of 95 % of interpolated positions from
+    """The result of `register`.
+
+    The biases and errors of plots; the number of plots, and of matched ones by kind of identity; their median offsets
+    in range and bearing before the fit; the plots left out; the distance of 95 % of interpolated positions from
     straight lines."""
 
     adjusted: Adjustment
@@ -123,7 +126,7 @@ class Registration:
 
 # ---- words -----------------------------------------------------------------------------------------------------------
 def lines(registration: Registration) -> list[str]:
-    """The biases in sentences, and what to do about them."""
+    """Sentences on the biases, and the options that correct them."""
     adjustment, sentences, options, has_nonzero_bias = registration.adjusted, [], [], False
     for bias in adjustment.biases:
         key, factor = ("bearing_deg", math.degrees(1)) if bias.key == "bearing_rad" else (bias.key, 1.0)
@@ -161,7 +164,7 @@ def lines(registration: Registration) -> list[str]:
 
 
 def deviating_aircraft(registration: Registration) -> list[AircraftResiduals]:
-    """Aircraft whose lag is not that of the others."""
+    """The aircraft whose lag differs clearly from the lags of the others."""
     lags = np.array([aircraft.time_s for aircraft in registration.aircraft])
     is_known = np.isfinite(lags)
     if is_known.sum() < MIN_AIRCRAFT + 1:
@@ -213,40 +216,83 @@ class Recording:
     zero: tuple[float, str]
 
 
-def register(radar: str, positions_file: str) -> Registration:
-    """The biases of a radar's plots against positions of the same aircraft, both as `radarsim import` writes them.
+class _Matching(NamedTuple):
+    """Plots (n,) matched with aircraft: which are used, their offsets (n, 2), the distances (n,) of interpolated
+    positions from straight lines, the names of the aircraft, and why the other plots are not used."""
 
-    other: `[ID=]FILE`, with the track, address, callsign or code of the plots whose positions are all in the file, of a
-    receiver that knows nothing of these. Raises ConfigError where too few plots have a position, or these lie too far
-    apart."""
+    match: AircraftMatch
+    is_used: np.ndarray
+    offsets: np.ndarray
+    deviations: np.ndarray
+    names: list[str]
+    unmatched_count: int
+    distant_aircraft: list[tuple[str, tuple[float, float]]]
+    bent_count: int
+
+
+def register(radar: str, positions_file: str) -> Registration:
+    """Find the biases of a radar's plots against positions of the same aircraft, both as `radarsim import` writes them.
+
+    positions_file: `[ID=]FILE`, with the track, address, callsign or code of the plots to which all positions in the
+    file belong, for a receiver that does not know them. Raises ConfigError if too few plots have a position, or if the
+    plots lie too far from the positions."""
     from radarsim.recorded.formats.importing import truth_of
 
     path, owner = truth_of(positions_file)
-    plots, positions = (
-        read_recording(radar, PLOT_CHOICES),
-        read_recording(positions_file := str(path), POSITION_CHOICES),
-    )
+    plots, positions = read_recording(radar, PLOT_CHOICES), read_recording(str(path), POSITION_CHOICES)
     if owner:
         positions.identity["address"] = [owner] * len(positions.tracks)
-    fixes, t = np.stack([positions.columns[name] for name in POSITION_CHOICES[0]], axis=1), plots.columns["t_s"]
+    paths, t = AircraftPaths(), plots.columns["t_s"]
+    if plots.zero != positions.zero:
+        t = t + _clock_difference(plots.zero, positions.zero, radar, str(path))
+        paths.period_s = math.inf if plots.zero[1] == positions.zero[1] else DAY_S
+    paths.add(_fixes_in_axes(plots, positions), positions.tracks, positions.identity)
+    r = plots.columns["range_m"]
+    b = plots.columns.get("bearing_rad", np.full(len(r), np.nan))
+    matching = _match_plots(paths, t, r, b, assign_owner(owner, plots.tracks, plots.identity))
+    is_used, path_numbers = matching.is_used, matching.match.path_numbers[matching.is_used]
+    if is_used.sum() < MIN_PLOTS:
+        raise _too_few_plots(radar, str(path), matching)
+    adjustment = fit_biases(MatchedPlots(t[is_used], r[is_used], b[is_used], path_numbers, paths.states))
+    counts_by_kind = Counter(KINDS[k] for k in matching.match.kind_numbers[is_used].tolist())
+    return Registration(
+        adjusted=adjustment,
+        aircraft=_aircraft_residuals(adjustment, path_numbers, matching.names),
+        plots=len(t),
+        matched=int(is_used.sum()),
+        by=dict(counts_by_kind),
+        apart=median_offsets(matching.offsets[is_used]),
+        left=tuple(_excluded_plots(matching, str(path))),
+        bent_m=float(np.quantile(matching.deviations[is_used], 0.95)),
+    )
+
+
+def _clock_difference(zero: tuple[float, str], other_zero: tuple[float, str], radar: str, other_file: str) -> float:
+    """The difference of the zeros of two clocks, s; raises ConfigError if it is unknown."""
+    (zero_s, since), (other_zero_s, other_since) = zero, other_zero
+    if since != other_since and UNKNOWN_ZERO in (since, other_since):
+        fault = f"t_s counts from {since}, in {other_file} from {other_since}"
+        raise ConfigError(f"{radar}: {fault}: both must be dated, as times of day or from 1970, by radarsim import")
+    return zero_s - other_zero_s
+
+
+def _fixes_in_axes(plots: Recording, positions: Recording) -> np.ndarray:
+    """Times and positions (n, 4) of a recording in the local axes of the plots' radar."""
+    fixes = np.stack([positions.columns[name] for name in POSITION_CHOICES[0]], axis=1)
     if plots.site and positions.site and plots.site != positions.site:
         states = np.pad(fixes[:, 1:], ((0, 0), (0, 3)))
         fixes[:, 1:] = Site(*plots.site).rotate_states(Site(*positions.site), states)[:, :3]
-    paths = AircraftPaths()
-    if plots.zero != positions.zero:
-        (zero, since), (other_zero, other_since) = plots.zero, positions.zero
-        if since != other_since and UNKNOWN_ZERO in (since, other_since):
-            fault = f"t_s counts from {since}, in {positions_file} from {other_since}"
-            raise ConfigError(f"{radar}: {fault}: both must be dated, as times of day or from 1970, by radarsim import")
-        t = t + (zero - other_zero)
-        paths.period_s = math.inf if since == other_since else DAY_S
-    paths.add(fixes, positions.tracks, positions.identity)
-    r = plots.columns["range_m"]
-    b = plots.columns.get("bearing_rad", np.full(len(r), np.nan))
-    match = paths.find(t, r, b, assign_owner(owner, plots.tracks, plots.identity))
-    offsets, is_used, names = range_bearing_offsets(match.states, r, b), match.path_numbers >= 0, paths.names()
-    unmatched_count, distant_aircraft = int((~is_used).sum()), []
-    deviations = np.zeros(len(t))
+    return fixes
+
+
+def _match_plots(
+    paths: AircraftPaths, t: np.ndarray, r: np.ndarray, b: np.ndarray, identity: Mapping[str, Sequence[str]]
+) -> _Matching:
+    """Match plots (n,) with aircraft, without distant aircraft and without turns that positions do not resolve."""
+    match, names = paths.find(t, r, b, identity), paths.names()
+    offsets, is_used = range_bearing_offsets(match.states, r, b), match.path_numbers >= 0
+    unmatched_count = int((~is_used).sum())
+    distant_aircraft, deviations = [], np.zeros(len(t))
     for number, rows in rows_by_name(match.path_numbers.tolist()).items():
         if number < 0:
             continue
@@ -256,46 +302,42 @@ def register(radar: str, positions_file: str) -> Registration:
         deviations[rows] = paths.deviations_m(number, t[rows])
     bent_count = int((is_used & (deviations > MAX_DEVIATION_M)).sum())
     is_used &= deviations <= MAX_DEVIATION_M
-    excluded_plots = partial(_excluded_plots, unmatched_count, positions_file, distant_aircraft, bent_count)
-    if is_used.sum() < MIN_PLOTS:
-        with speaking("en"):  # as all faults
-            reasons = "".join(f"; left out: {reason}" for reason in excluded_plots())
-        raise ConfigError(f"{radar}: {is_used.sum()} of {len(t)} plots have a position of their aircraft in "
-                          f"{positions_file}, by address, callsign or Mode 3/A code and time; needs {MIN_PLOTS}"
-                          f"{reasons}")  # fmt: skip
-    adjustment = fit_biases(MatchedPlots(t[is_used], r[is_used], b[is_used], match.path_numbers[is_used], paths.states))
+    return _Matching(match, is_used, offsets, deviations, names, unmatched_count, distant_aircraft, bent_count)
+
+
+def _aircraft_residuals(
+    adjustment: Adjustment, path_numbers: np.ndarray, names: Sequence[str]
+) -> tuple[AircraftResiduals, ...]:
+    """The residuals of the plots of each aircraft, whose path numbers (n,) are given."""
     aircraft = []
-    for number, rows in rows_by_name(match.path_numbers[is_used].tolist()).items():
-        range_median, bearing_median = (_finite_median(adjustment.residuals[rows, k]) for k in range(2))
-        aircraft.append(
-            AircraftResiduals(names[number], len(rows), range_median, bearing_median, *adjustment.lags[number])
-        )
-    counts_by_kind = Counter(KINDS[k] for k in match.kind_numbers[is_used].tolist())
-    return Registration(
-        *(adjustment, tuple(aircraft), len(t), int(is_used.sum()), dict(counts_by_kind)),
-        *(median_offsets(offsets[is_used]), tuple(excluded_plots()), float(np.quantile(deviations[is_used], 0.95))),
-    )
+    for number, rows in rows_by_name(path_numbers.tolist()).items():
+        range_m, bearing_rad = (_finite_median(adjustment.residuals[rows, k]) for k in range(2))
+        lag = adjustment.lags[number]
+        aircraft.append(AircraftResiduals(names[number], len(rows), range_m, bearing_rad, *lag))
+    return tuple(aircraft)
 
 
-def _excluded_plots(
-    unmatched_count: int,
-    positions_file: str,
-    distant_aircraft: Sequence[tuple[str, tuple[float, float]]],
-    bent_count: int,
-) -> list[str]:
-    """The plots that are not used, and why: of no aircraft in the file, of others than named, in turns."""
+def _too_few_plots(radar: str, positions_file: str, matching: _Matching) -> ConfigError:
+    with speaking("en"):  # as all faults
+        reasons = "".join(f"; left out: {reason}" for reason in _excluded_plots(matching, positions_file))
+    counts = f"{matching.is_used.sum()} of {len(matching.is_used)} plots"
+    return ConfigError(f"{radar}: {counts} have a position of their aircraft in {positions_file}, by address, callsign "
+                       f"or Mode 3/A code and time; needs {MIN_PLOTS}{reasons}")  # fmt: skip
+
+
+def _excluded_plots(matching: _Matching, positions_file: str) -> list[str]:
+    """The plots that are not used, and why: of no aircraft in the file, of another aircraft, or in turns."""
     reasons = [
-        tr("the plots of {name}, which lie {away} away: it is another", name=name, away=distance(*distance_))
-        for name, distance_ in distant_aircraft
+        tr("the plots of {name}, which lie {away} away: it is another", name=name, away=distance(*median))
+        for name, median in matching.distant_aircraft
     ]
-    if unmatched_count:
-        plot_count = plural("{count} plot", "{count} plots", unmatched_count)
+    if matching.unmatched_count:
+        plot_count = plural("{count} plot", "{count} plots", matching.unmatched_count)
         reasons.insert(0, tr("{of} that no aircraft in {file} has at that time", of=plot_count, file=positions_file))
-    if bent_count:
-        plot_count = plural("{count} plot", "{count} plots", bent_count)
-        reasons.append(
-            tr("{of} in turns, where positions are too far apart to {most:g} m", of=plot_count, most=MAX_DEVIATION_M)
-        )
+    if matching.bent_count:
+        plot_count = plural("{count} plot", "{count} plots", matching.bent_count)
+        text = tr("{of} in turns, where positions are too far apart to {most:g} m", of=plot_count, most=MAX_DEVIATION_M)
+        reasons.append(text)
     return reasons
 
 
@@ -367,7 +409,7 @@ def fit_biases(pairs: MatchedPlots) -> Adjustment:
         if length < CONVERGENCE_STEP:
             break
     errors, slopes = _linearise(pairs, values)
-    # How far biases of 1 move a plot, in the last digits of its numbers: what moves none by one of these is none.
+    # How far biases of 1 move a plot, in the last digits of its numbers: a bias that moves no plot by one is zero.
     movement_per_bias = np.abs(slopes / _smallest_sigmas(pairs)[:, None]).max(axis=(0, 1))
     u, slopes, clusters = errors / sigma, slopes / sigma[:, None], _cluster_numbers(pairs)
     weights = _biweight_weights(u)
@@ -457,7 +499,7 @@ def _bias_step(
 
 
 def _unobservable_biases(pairs: MatchedPlots) -> dict[str, str]:
-    """The biases that the plots cannot tell, and why: by where the targets are, not by what was measured."""
+    """The biases that the plots cannot determine, and why: from where the targets are, not from what was measured."""
     errors, slopes = _linearise(pairs, np.zeros(len(BIASES)))
     sigma = _plot_sigmas(pairs, errors)
     reasons: dict[str, str] = {}
@@ -472,11 +514,10 @@ def _unobservable_biases(pairs: MatchedPlots) -> dict[str, str]:
         columns = design[:, used] / np.linalg.norm(design[:, used], axis=0)
         likeness = {}
         for column_index in (used.index(k) for k in used if BIASES[k] in OPTIONAL_BIASES):
-            others = np.delete(columns, column_index, axis=1)
-            shares = np.linalg.lstsq(others, columns[:, column_index], rcond=1e-12)[0]
-            unexplained = float(
-                ((columns[:, column_index] - others @ shares) ** 2).sum()
-            )  # 1 over the variance inflation
+            remaining_columns = np.delete(columns, column_index, axis=1)
+            shares = np.linalg.lstsq(remaining_columns, columns[:, column_index], rcond=1e-12)[0]
+            # 1 over the variance inflation
+            unexplained = float(((columns[:, column_index] - remaining_columns @ shares) ** 2).sum())
             partner = int(np.delete(used, column_index)[np.abs(shares).argmax()])
             likeness[used[column_index]] = (unexplained, partner)
         k = min(likeness, key=likeness.__getitem__, default=-1)
@@ -486,8 +527,9 @@ def _unobservable_biases(pairs: MatchedPlots) -> dict[str, str]:
 
 
 def _plot_sigmas(pairs: MatchedPlots, errors: np.ndarray) -> np.ndarray:
-    """σ of range and bearing (2,) by the differences of successive plots of an aircraft, on which biases have little
-    part; infinite where there is none."""
+    """σ of range and bearing (2,) from differences of successive plots of an aircraft, which biases hardly change.
+
+    Infinite if there are no differences."""
     order = np.lexsort((pairs.t_s, pairs.path_numbers))
     steps = np.diff(errors[order], axis=0)[np.diff(pairs.path_numbers[order]) == 0]
     smallest = _smallest_sigmas(pairs)
@@ -499,7 +541,7 @@ def _smallest_sigmas(pairs: MatchedPlots) -> np.ndarray:
 
 
 def _largest_movements(pairs: MatchedPlots, sigma: np.ndarray) -> tuple[float, float]:
-    """The farthest way of an aircraft along range or bearing, in σ of a plot; the farthest between two plots, m."""
+    """The largest movement of an aircraft in range or bearing, in σ of a plot, and its largest distance moved, m."""
     largest, farthest = 0.0, 0.0
     for number, rows in rows_by_name(pairs.path_numbers.tolist()).items():
         position = pairs.states(number, pairs.t_s[rows])[:, :3]
@@ -511,7 +553,7 @@ def _largest_movements(pairs: MatchedPlots, sigma: np.ndarray) -> tuple[float, f
 
 
 def _likeness_message(key: str, partner: str, slopes: np.ndarray) -> str:
-    """Why a bias cannot be told from another."""
+    """Why a bias cannot be distinguished from another."""
     speed, r = -slopes[:, 0, 3], slopes[:, 0, 1]
     subject, values, unit = {
         "range_scale, range_m": (tr("ranges"), r / 1e3, "km"),
@@ -540,7 +582,7 @@ def _aircraft_lag(u: np.ndarray, slope: np.ndarray) -> tuple[float, float]:
 
 
 def _cluster_numbers(pairs: MatchedPlots) -> np.ndarray:
-    """The number of the cluster of each plot (n,): its aircraft, or a piece of its flight where there are few."""
+    """The cluster number of each plot (n,): its aircraft, or a piece of its flight if there are few aircraft."""
     rows_by_aircraft = rows_by_name(pairs.path_numbers.tolist()).values()
     pieces = 1 if len(rows_by_aircraft) >= MIN_AIRCRAFT else math.ceil(MIN_CLUSTERS / len(rows_by_aircraft))
     clusters = np.zeros(len(pairs.t_s), dtype=int)

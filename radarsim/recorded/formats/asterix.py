@@ -1,7 +1,7 @@
-"""ASTERIX: plots of a radar (category 048, 001), tracks of a surveillance centre (062) and ADS-B positions (021).
+"""Read ASTERIX: plots of a radar (category 048, 001), tracks of a surveillance centre (062) and ADS-B positions (021).
 
-Category 034 says where a radar stands and how fast it turns; category 002 this too, and the time of day that category
-001 cuts off."""
+Category 034 states the position of a radar and the time of its turn; category 002 also does, and has the full time of
+day, of which category 001 keeps only the last part."""
 
 import os
 import string
@@ -46,11 +46,11 @@ class RecordFields:
     places: Columns
 
     def number(self, item: str, *path: str) -> np.ndarray:
-        """A field (n,); NaN where the record has it not."""
+        """A field (n,) as numbers; NaN if a record does not have it."""
         return layout.locate_field(self.spec, item, *path).values(self.data, self.places[item])
 
     def text(self, name_of: Callable[[int], str], item: str, *path: str) -> list[str]:
-        """What the number in a field is called; '' where the record has it not."""
+        """A field (n,) as texts, named by its number; '' if a record does not have it."""
         return name_values(
             layout.locate_field(self.spec, item, *path).integers(self.data, self.places[item]),
             self.places[item] >= 0,
@@ -58,16 +58,16 @@ class RecordFields:
         )
 
     def flag(self, item: str, name: str) -> np.ndarray:
-        """Bits (n,) in an item that may go on; 0 where the record has them not."""
+        """Bits (n,) in an item of several bytes; 0 if a record does not have them."""
         return layout.locate_flag(self.spec, item, name).values(self.data, self.places[item])
 
     def tests(self, item: str) -> np.ndarray:
-        """Which reports (n,) are of no aircraft."""
+        """Marks (n,) of reports that are of no aircraft."""
         flags = (("test target", "TST"), ("simulated", "SIM"), ("field monitor", "RAB"))
         return np.bitwise_or.reduce([mark_bits(mark, self.flag(item, name)) for mark, name in flags])
 
     def code(self, item: str) -> tuple[list[str], np.ndarray]:
-        """Mode 3/A codes that are valid and not garbled, and marks (n,) of those that are."""
+        """Valid Mode 3/A codes that are not garbled, and marks (n,) of garbled ones."""
         garbled = self.number(item, "G") == 1
         is_valid = (self.number(item, "V") == 0) & ~garbled
         codes = layout.locate_field(self.spec, item, "MODE3A").integers(self.data, self.places[item])
@@ -83,7 +83,7 @@ OCTAL, HEXADECIMAL = "{:04o}".format, "{:06x}".format
 
 
 def name_values(values: np.ndarray, is_present: np.ndarray, name_of: Callable[[int], str]) -> list[str]:
-    """What integers (n,) are called; '' where there is none."""
+    """The names of integers (n,); '' where there is none."""
     names = {value: name_of(value) for value in set(values[is_present].tolist())}
     return [
         names[value] if present else "" for value, present in zip(values.tolist(), is_present.tolist(), strict=True)
@@ -109,7 +109,7 @@ RecordContents = tuple[Columns, Texts, np.ndarray]  # columns (n,) of numbers an
 
 
 def radar_plots(fields: RecordFields, level: str, report: str) -> RecordContents:
-    """What plots of categories 048 and 001 have in common; level, report: what these fields are called."""
+    """The common contents of plots of categories 048 and 001; level, report: the names of these fields."""
     codes, marks = fields.code("070")
     garbled = fields.number("090", "G") == 1
     height = np.where((fields.number("090", "V") == 0) & ~garbled, fields.number("090", level) * FLIGHT_LEVEL_M, np.nan)
@@ -132,9 +132,8 @@ def plots_048(fields: RecordFields) -> RecordContents:
         "address": fields.text(HEXADECIMAL, "220"),
         "callsign": fields.text(callsign_text, "240"),
     }
-    is_forecast = (fields.places["020"] >= 0) & (
-        fields.flag("020", "TYP") == 0
-    )  # no detection: the radar's own forecast
+    # no detection: the radar's own forecast
+    is_forecast = (fields.places["020"] >= 0) & (fields.flag("020", "TYP") == 0)
     return columns, texts, marks | mark_bits("coasted", is_forecast)
 
 
@@ -157,7 +156,7 @@ def doppler_048(fields: RecordFields) -> tuple[np.ndarray, np.ndarray]:
 
 
 def plots_001(fields: RecordFields) -> RecordContents:
-    """The same of the older category."""
+    """Plots and tracks of a radar in the older category."""
     columns, texts, marks = radar_plots(fields, "HGT", "SSRPSR")
     columns["velocity_mps"] = fields.number("120") * NAUTICAL_MILE_M
     return columns, texts | {"track": fields.text(str, "161")}, marks
@@ -184,7 +183,7 @@ def tracks_062(fields: RecordFields) -> RecordContents:
 
 
 def address_062(fields: RecordFields) -> list[str]:
-    """The address, which is the first part of an item of many, after up to four bytes that name these."""
+    """The addresses: the first subitem of item 380, after up to four bytes that say which subitems are present."""
     data, place = fields.data, fields.places["380"]
     has_address = (place >= 0) & (data[place] & 0x80 > 0)
     for _ in range(3):
@@ -478,7 +477,7 @@ class Survey:
 
 
 def survey_radars(path: str) -> Survey:
-    """The radars of a file, by its first SURVEYED blocks; of a stream, which is read once, none."""
+    """The radars of a file, by its first SURVEY_BLOCKS blocks; none of a stream, which is read once."""
     survey, turns_by_radar = Survey(), dict[str, list[float]]()
     if not os.path.isfile(path):
         return survey

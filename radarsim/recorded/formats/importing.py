@@ -1,7 +1,7 @@
-"""`radarsim import`: a recording into a CSV of plots in our columns, with several tracks in one file.
+"""Import a recording as a CSV file of plots in our columns, with several tracks in one file.
 
-Records are read, placed and written in batches, so that memory does not grow with the file; only the truth is held, for
-lookup by time. The file is written completely or not at all."""
+Records are read, placed and written in batches, so that memory does not grow with the file; only the truth is kept in
+memory, to be looked up by time. The file is written completely or not at all."""
 
 import codecs
 import datetime
@@ -117,13 +117,13 @@ class Options:
 
     @property
     def only_site(self) -> Site | None:
-        """The place of the radar, if it is one."""
+        """The site of the radar, if there is only one."""
         return next(iter(self.sites.values())) if len(self.sites) == 1 else self.site
 
 
 @dataclass
 class ImportResult:
-    """Result of an import: format, records read, rows written, rows by track, counts of skipped records."""
+    """Result of an import: format, records read, rows written, rows by track, skipped records, notes."""
 
     format: Format
     records: int = 0
@@ -142,7 +142,7 @@ ENCODING_NAMES = {  # as spreadsheets write them
 
 
 def detect_encoding(path: str | os.PathLike, fallback: str) -> str:
-    """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8, or the one named where it is not UTF-8."""
+    """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8; if it is not UTF-8, the fallback."""
     if not os.path.isfile(path):  # a stream is read once
         return fallback or "utf-8-sig"
     with open_unzipped(path) as file:
@@ -164,7 +164,7 @@ def detect_encoding(path: str | os.PathLike, fallback: str) -> str:
 
 @contextmanager
 def open_unzipped(path: str | os.PathLike) -> Iterator["io.BufferedReader[Any]"]:
-    """The bytes of a file, of a gzipped one those inside."""
+    """Open a file of bytes; a gzipped one is unzipped."""
     with open(path, "rb") as file:
         if file.peek(2)[:2] != GZIP_MAGIC:
             yield file
@@ -175,7 +175,7 @@ def open_unzipped(path: str | os.PathLike) -> Iterator["io.BufferedReader[Any]"]
 
 @contextmanager
 def open_recording(path: str, options: Options, truth: bool = False) -> Iterator[tuple[Format, Reader]]:
-    """The reader of a recording, by the given format or the one that its first bytes show; raises ConfigError.
+    """Open a recording with the reader of the given format, or of the detected one; raises ConfigError.
 
     truth: only the positions of an ASTERIX file are needed."""
     encoding = "utf-8-sig"
@@ -204,7 +204,7 @@ def open_recording(path: str, options: Options, truth: bool = False) -> Iterator
 
 
 def detect_format(path: str, head: bytes) -> Format:
-    """The format that the first bytes of a file show; raises ConfigError."""
+    """Detect the format of a file from its first bytes; raises ConfigError."""
     if not head:
         raise ConfigError(f"{path}: is empty")
     if head[:2] in UTF16_MARKS:
@@ -268,7 +268,7 @@ def import_recording(
 
 
 def add_stated_sites(options: Options, reader: Reader) -> tuple[Options, list[str]]:
-    """The options with the places of radars that the recording states, and where --at contradicts it."""
+    """Add the sites of radars that the recording states to the options; also notes where --at contradicts it."""
     stated_places = reader.survey.places if isinstance(reader, Asterix) else {}
     sites, notes = {name: Site(*place) for name, place in stated_places.items()}, []
     given_sites = {next(iter(sites)): options.site} if options.site and len(sites) == 1 else options.sites
@@ -336,7 +336,7 @@ class _Import:
         return batch
 
     def _select_rows(self, batch: Batch) -> Batch:
-        """The records of a batch that are wanted and later than their track's last."""
+        """Select the records of a batch that are requested, and later than the last of their track."""
         requested, rows = set(self.options.tracks), []
         times = batch.columns["t_s"].tolist()
         for i, (track, radar, t) in enumerate(zip(batch.track, batch.radar, times, strict=True)):
@@ -556,7 +556,7 @@ class AircraftTruth:
             self.paths.add(table, batch.track, {"address": [self.owner] * len(table)} if self.owner else batch.identity)
 
     def columns(self, batch: Batch, plots: Mapping[str, np.ndarray], reader: Reader) -> dict[str, np.ndarray]:
-        """The truth at the times of plots (n,) seen there: range, bearing, velocity, place, speeds (n,)."""
+        """The truth at the times of plots (n,): range, bearing, velocity, position and speeds (n,)."""
         if not self.paths.paths:
             return {}
         if reader.of_day != self.of_day:
@@ -605,7 +605,7 @@ class AircraftTruth:
         return faults
 
     def notes(self) -> list[str]:
-        """How many of the plots have a truth, and how far they are from it."""
+        """Notes on how many plots have a truth, and how far they are from it."""
         if not self.offsets_by_path:
             return [tr("truth: of no plot")] if self.paths.paths else []
         offsets = np.concatenate([part for parts in self.offsets_by_path.values() for part in parts])
@@ -618,14 +618,14 @@ class AircraftTruth:
 
 
 class DopplerCheck:
-    """The first rows of tracks, on which sign and folding of their Doppler speeds are tested."""
+    """Check the sign and the folding of Doppler speeds on the first rows of tracks."""
 
     def __init__(self) -> None:
         self.rows: dict[str, list[np.ndarray]] = {}
         self.count = 0
 
     def add(self, batch: Batch) -> None:
-        """Keep a batch, while there are fewer than DOPPLER_TESTS rows."""
+        """Keep a batch, while there are fewer than DOPPLER_ROWS rows."""
         if self.count >= DOPPLER_ROWS:
             return
         table = np.stack([batch.columns[name] for name in (*DOPPLER_COLUMNS, "span_mps")], axis=1)
@@ -636,7 +636,7 @@ class DopplerCheck:
                 self.rows.setdefault(name, []).append(table[rows][usable[rows]])
 
     def notes(self, towards: bool) -> list[str]:
-        """Notes for the user if the other sign fits the rate of the range clearly better, and of folded speeds."""
+        """Notes if the opposite sign fits the rate of the range clearly better, and if speeds are folded."""
         tracks, notes = [np.concatenate(parts) for parts in self.rows.values()], []
         offsets = np.abs(np.concatenate([np.empty((2, 0)), *map(_doppler_offsets, tracks)], axis=1))
         if offsets.shape[1] >= MIN_DOPPLER_ROWS:
@@ -654,8 +654,8 @@ class DopplerCheck:
 
 
 def _doppler_offsets(track: np.ndarray) -> np.ndarray:
-    """By how much the speeds of a track (n, 4) and the opposite ones miss the rates of its range (2, m), m/s, but for
-    whole spans."""
+    """Differences (2, m) of a track's speeds, and of the opposite ones, from the rates of its range, m/s, without whole
+    spans."""
     (dt, dr, *_), (v, span) = np.diff(track, axis=0).T, track[1:, 2:].T
     is_close = (dt > 0) & (dt < MAX_GAP_S)
     offsets = np.stack([v, -v])[:, is_close] - dr[is_close] / dt[is_close]
@@ -690,7 +690,7 @@ def encoding_named(name: str) -> str:
 
 
 def biases_of(texts: Sequence[str]) -> dict[str, float]:
-    """Biases that the user states, `KEY=VALUE` each, by BIASES."""
+    """Biases given by the user as `KEY=VALUE`, by BIASES."""
     biases, faults = {}, []
     for text in texts:
         key, _, number = text.partition("=")
@@ -711,7 +711,7 @@ def biases_of(texts: Sequence[str]) -> dict[str, float]:
 
 
 def columns_of(texts: Sequence[str]) -> dict[str, str]:
-    """Columns assigned by the user, `OURS=THEIRS` each."""
+    """Columns assigned by the user as `OURS=THEIRS`."""
     faults = [text for text in texts if "=" not in text]
     if faults:
         raise ConfigError(*(f"column: must be OURS=THEIRS, got {text!r}" for text in faults))

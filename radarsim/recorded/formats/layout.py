@@ -1,18 +1,17 @@
-"""Where the items of an ASTERIX record lie: their lengths, and the places and units of their fields.
+"""Find the fields of ASTERIX records, and the data blocks of a file.
 
-The specification is that of the library libasterix. Decoding a record into its objects takes 0.3 ms, so only the
-lengths of items are followed here; the fields needed are cut out of many records at a time.
+The library libasterix has the specification. It decodes a record into objects in 0.3 ms, so this module only follows
+the lengths of items; the fields needed are read from many records at a time.
 
 A data block is its category (1 byte), its length (2 bytes, these three included) and records; a record is a field
 specification (7 bits a byte, the eighth says that another byte follows) and the items that it names.
 
-Data blocks of ASTERIX out of files: one after the other, in frames of a recorder, or in the datagrams of a network
-capture.
+Data blocks follow each other in a file, or lie in frames of a recorder, or in the datagrams of a network capture.
 
-A capture is a pcap or a pcapng file. Of its packets those of UDP over IPv4 or IPv6 are read; all others, fragments and
-packets of which the capture kept only the beginning, are counted. A datagram holds blocks, perhaps with a few bytes of
-the network's after them, or frames of a recorder. Sources: the Internet drafts draft-ietf-opsawg-pcap and -pcapng, RFC
-791, 8200 and 768; the frames as CroatiaControlLtd/asterix describes them."""
+A capture is a pcap or a pcapng file. Its UDP packets over IPv4 or IPv6 are read. Others are counted, and so are
+fragments, and packets of which the capture has only the beginning. A datagram holds blocks, perhaps followed by a few
+bytes of the network, or frames of a recorder. Sources: the Internet drafts draft-ietf-opsawg-pcap and -pcapng, RFC 791,
+8200 and 768; the frames as CroatiaControlLtd/asterix describes them."""
 
 import struct
 from collections import Counter
@@ -36,7 +35,7 @@ ItemEnd = Callable[[bytes, int], int]  # data and start of an item: its end
 
 
 class DamagedRecord(ValueError):
-    """Bytes that the specification does not allow: where they are, and what is wrong."""
+    """Bytes that the specification does not allow: their place, and the fault."""
 
     def __init__(self, place: int, fault: str):
         super().__init__(fault)
@@ -54,7 +53,7 @@ class Field(NamedTuple):
     step: float
 
     def integers(self, data: np.ndarray, starts: np.ndarray) -> np.ndarray:
-        """The bits as integers (n,) in the items that begin at `at` (n,); of no meaning where there is no item."""
+        """The bits as integers (n,) in the items that begin at `starts` (n,); meaningless where there is no item."""
         bits = np.zeros(len(starts), dtype=np.int64)
         for i in range(self.size):
             bits = bits << 8 | data[starts + (self.first + i)]
@@ -62,7 +61,7 @@ class Field(NamedTuple):
         return bits - (bits >> (self.bits - 1) << self.bits) if self.signed else bits
 
     def values(self, data: np.ndarray, starts: np.ndarray) -> np.ndarray:
-        """The values (n,) in the items that begin at `at` (n,); NaN where that is negative, as there is no item."""
+        """The values (n,) in the items that begin at `starts` (n,); NaN where that is negative, as there is no item."""
         return np.where(starts < 0, np.nan, self.integers(data, starts) * self.step)
 
 
@@ -93,7 +92,7 @@ def newest_edition(category: int) -> Any:
 
 
 def edition_number(category: int) -> str:
-    """The number of the edition that is read."""
+    """The number of the newest edition, by which records are read."""
     return ".".join(map(str, newest_edition(category).cv_edition))
 
 
@@ -110,7 +109,7 @@ def locate_field(spec: Any, item: str, *path: str) -> Field:
 
 
 def locate_field_in(variation: Any, *path: str) -> Field:
-    """The same in a given element or group."""
+    """The place of a field in an element or group."""
     offset = 0
     for name in path:
         for part, size in variation.cv_items_list:
@@ -128,7 +127,7 @@ def locate_field_in(variation: Any, *path: str) -> Field:
 
 
 def locate_flag(spec: Any, item: str, name: str) -> Flag:
-    """The place of a flag in an item of parts of one byte."""
+    """The place of a flag in an item whose parts have one byte each."""
     for byte, parts in enumerate(spec.cv_items_dict[item].cv_rule.cv_variation.cv_items_list):
         shift = 8
         for part, bits in (entry for entry in parts if entry):
@@ -139,7 +138,7 @@ def locate_flag(spec: Any, item: str, name: str) -> Flag:
 
 
 def variation_of(rule: Any) -> Any:
-    """The variation behind a rule of libasterix; of one that depends on another item the default."""
+    """The variation of a rule of libasterix; the default if it depends on another item."""
     return getattr(rule, "cv_variation", None) or rule.cv_default_variation
 
 
@@ -234,8 +233,9 @@ def specification_end(data: bytes, place: int) -> int:
 
 
 class FixedItems(NamedTuple):
-    """A stretch of items of fixed length: the wanted ones and where in it they begin; its length; then an item of any
-    length, which may be wanted too (-1: no)."""
+    """Items of fixed length that follow each other: the requested ones with their offsets, and the total length.
+
+    Then an item of variable length: its index if it is requested, else -1."""
 
     items: list[tuple[int, int]]
     size: int
@@ -244,7 +244,7 @@ class FixedItems(NamedTuple):
 
 
 class Profile:
-    """Places of the wanted items of a category's records; the plan of each field specification is made once."""
+    """Places of the requested items of a category's records; each field specification is planned once."""
 
     def __init__(self, category: int, names: Sequence[str], variant: str | None = None):
         self.names = names
@@ -258,7 +258,7 @@ class Profile:
         self.plans: dict[bytes, list[FixedItems]] = {}
 
     def places(self, data: bytes, place: int) -> tuple[list[int], int]:
-        """The start of each wanted item, -1 where it is absent, and the end of the record."""
+        """The start of each requested item, -1 if it is absent, and the end of the record."""
         begin, place = place, specification_end(data, place)
         plan = self.plans.get(data[begin:place])
         if plan is None:
@@ -332,22 +332,14 @@ FINAL, ORADIS = FrameFormat(8, b"\xa5\xa5\xa5\xa5"), FrameFormat(6, b"")
 
 # Capture files
 PCAP_ORDERS = {
-    magic: order for order in "<>" for magic in (struct.pack(order + "I", one) for one in (0xA1B2C3D4, 0xA1B23C4D))
+    magic: order
+    for order in "<>"
+    for magic in (struct.pack(order + "I", number) for number in (0xA1B2C3D4, 0xA1B23C4D))
 }
 PCAPNG_MAGIC, PCAPNG_ORDERS = b"\x0a\x0d\x0d\x0a", {struct.pack(order + "I", 0x1A2B3C4D): order for order in "<>"}
 INTERFACE, OLD_PACKET, SIMPLE_PACKET, PACKET = 1, 2, 3, 6  # of pcapng
-LINK_HEADER_BYTES = {
-    1: 14,
-    113: 16,
-    276: 20,
-    12: 0,
-    14: 0,
-    101: 0,
-    228: 0,
-    229: 0,
-    0: 4,
-    108: 4,
-}  # bytes before a packet of IP
+# bytes before a packet of IP
+LINK_HEADER_BYTES = {1: 14, 113: 16, 276: 20, 12: 0, 14: 0, 101: 0, 228: 0, 229: 0, 0: 4, 108: 4}
 VLAN_TYPES, UDP = (b"\x81\x00", b"\x88\xa8", b"\x91\x00"), 17  # the type before a tag
 FRAGMENT_REASON = term("fragments of datagrams, which are not put together")
 CUT_OFF_REASON = term("packets cut off by the end of the file")
@@ -355,7 +347,7 @@ IPV6_EXTENSIONS, IPV6_FRAGMENT = (0, 43, 60), 44  # headers of IPv6 before the d
 
 
 def blocks(path: str, file: BinaryIO, skipped: Counter[str]) -> Iterator[Block]:
-    """The data blocks of a file; what a capture has besides is counted in `left`. ConfigError for a damaged file."""
+    """The data blocks of a file; other contents are counted in `skipped`. Raises ConfigError if damaged."""
     head = file.peek(CHUNK_BYTES)  # type: ignore[attr-defined]
     if is_capture(head):
         yield from _capture_blocks(path, file, skipped)
@@ -410,7 +402,7 @@ def _frame_blocks(path: str, file: BinaryIO) -> Iterator[Block]:
 
 
 def _blocks_of_frame(data: bytes, kind: FrameFormat) -> list[Block] | None:
-    """The blocks of one frame; none where it is not of this kind."""
+    """The blocks of one frame; None if it is not of this kind."""
     count = int.from_bytes(data[:2], "big")
     if count != len(data) or count < kind.header_bytes + 4 or not data.endswith(kind.trailer):
         return None
@@ -535,7 +527,7 @@ def _pcapng_packet(
 
 
 def _udp_payload(data: bytes, link: int, skipped: Counter[str]) -> tuple[int, int] | None:
-    """Where the content of a packet's datagram of UDP begins and ends; none where it has none, which is counted."""
+    """Begin and end of the payload of a UDP packet; None for other packets, which are counted."""
     start = LINK_HEADER_BYTES.get(link)
     if start is None:
         skipped[term("packets of the kind of link #, which is not read").replace(ANY, str(link))] += 1
@@ -551,7 +543,7 @@ def _udp_payload(data: bytes, link: int, skipped: Counter[str]) -> tuple[int, in
 
 
 def _ipv4_udp(data: bytes, start: int) -> tuple[int, int] | str | None:
-    """Begin and end of a datagram of UDP in a packet of IPv4; what it is instead."""
+    """Begin and end of a UDP datagram in an IPv4 packet; else the reason why it is skipped, or None."""
     if len(data) < start + 20 or data[start + 9] != UDP:
         return None
     if int.from_bytes(data[start + 6 : start + 8], "big") & 0x3FFF:  # more to come, or not the first
@@ -560,7 +552,7 @@ def _ipv4_udp(data: bytes, start: int) -> tuple[int, int] | str | None:
 
 
 def _ipv6_udp(data: bytes, start: int) -> tuple[int, int] | str | None:
-    """The same for IPv6, over the headers that may stand between."""
+    """Begin and end of a UDP datagram in an IPv6 packet, after its extension headers; else as `_ipv4_udp`."""
     if len(data) < start + 40:
         return None
     end = start + 40 + int.from_bytes(data[start + 4 : start + 6], "big")

@@ -1,5 +1,6 @@
-"""Formats that are tables in other clothes: JSON, Parquet, GPX, and the sentences of a satellite receiver. Each becomes
-a `Sheet` whose header states the units, so that `Table` reads it like any CSV."""
+"""Read JSON, Parquet, GPX and the sentences of a satellite receiver as tables.
+
+Each becomes a `Sheet` whose header states the units, so that `Table` reads it like any CSV."""
 
 import contextlib
 import datetime
@@ -108,7 +109,7 @@ def _trace_rows(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
 
 
 def _aircraft_rows(document: dict[str, Any], sheet: Sheet) -> Iterator[list[str]]:
-    """A moment of readsb: what it knows of each aircraft, and how old that is."""
+    """A moment of readsb: the state of each aircraft, and its age."""
     sheet.header = [*READSB_HEADER, "callsign", "squawk"]
     time_now = finite_number(document.get("now"))
     for aircraft in document["aircraft"]:
@@ -149,7 +150,7 @@ def finite_number(value: Any) -> float:
 
 
 def cell_text(value: Any) -> str:
-    """A value as a cell: numbers to the last digit, moments in ISO 8601, nothing for what is none of these."""
+    """A value as a cell: numbers to the last digit, moments in ISO 8601, '' for any other value."""
     if isinstance(value, str):
         return value
     if isinstance(value, datetime.datetime | datetime.date):
@@ -242,7 +243,7 @@ def read_nmea(path: str, file: BinaryIO) -> Sheet:
     sheet = Sheet(path, ["time", *NMEA_COLUMNS.values()], iter(()))
 
     def rows() -> Iterator[tuple[int, list[str]]]:
-        fix: dict[str, float] = {}  # what the sentences of one time have said
+        fix: dict[str, float] = {}  # the numbers of all sentences of one time
         number, midnight, previous_clock = 0, math.nan, math.nan
         for number, line in enumerate(file, start=1):
             sentence = _parse_fix(line, sheet) if line.strip() else {}
@@ -264,7 +265,7 @@ def read_nmea(path: str, file: BinaryIO) -> Sheet:
 
 
 def _fix_cells(fix: dict[str, float]) -> list[str]:
-    """The cells of FIX; a time without a date as one of day."""
+    """The cells of NMEA_COLUMNS; a time without a date becomes a time of day."""
     minutes, seconds = divmod(fix["clock"], 60)
     clock = f"{minutes // 60:02.0f}:{minutes % 60:02.0f}:{seconds:09.6f}"
     cells = [fix.get(name, math.nan) for name in NMEA_COLUMNS]
@@ -272,7 +273,7 @@ def _fix_cells(fix: dict[str, float]) -> list[str]:
 
 
 def _parse_fix(line: bytes, sheet: Sheet) -> dict[str, float]:
-    """The numbers of a sentence by the names of FIX, `clock` in s of the day; nothing where it has no fix."""
+    """The numbers of a sentence by the names of NMEA_COLUMNS, `clock` in s of the day; empty without a fix."""
     match = SENTENCE_PATTERN.search(line)
     if not match or (b"*" in match[0] and not sites.has_valid_checksum(match[0])):
         sheet.skipped[term("damaged sentences") if match else term("other lines")] += 1
@@ -296,7 +297,7 @@ def _parse_fix(line: bytes, sheet: Sheet) -> dict[str, float]:
 
 
 def _angle_deg(text: str, side: str) -> float:
-    """Degrees of degrees and minutes, as 5236.5, and N, S, E or W."""
+    """An angle in degrees from degrees and minutes, as 5236.5, and N, S, E or W."""
     degrees, minutes = divmod(_parse_number(text), 100)
     return (degrees + minutes / 60) * {"N": 1, "E": 1, "S": -1, "W": -1}.get(side, math.nan)
 

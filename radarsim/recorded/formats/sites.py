@@ -1,12 +1,12 @@
-r"""Common to all readers of recordings: batches of records, as columns.
+r"""Batches of records, the site of a radar, and AIS: the common parts of all readers of recordings.
 
-A radar on the earth (WGS 84): its measurements of positions, and the places of its plots. By pymap3d. Local axes: x
-north, y up, z east, with the origin at the radar. Bearings are counted from north to east. Elevations are above the
-plane that is level at the radar; an aircraft far away and low lies below it.
+A radar on the earth (WGS 84) measures positions, and its plots have positions (by pymap3d). Local axes: x north, y up,
+z east, with the origin at the radar. Bearings are counted from north to east. Elevations are above the plane that is
+level at the radar; an aircraft far away and low lies below it.
 
-Ships by AIS: NMEA sentences `!AIVDM…`, by pyais. A message gives only the second of its minute. The time is that of the
-tag block (`\c:1577836800*..\!AIVDM…`), of a line `$PGHP,1,…`, of a number or ISO time before the sentence, or of a
-number after it; without these, the seconds are unwrapped from minute to minute."""
+Ships send AIS: NMEA sentences `!AIVDM…`, read by pyais. A message gives only the second of its minute. The time is that
+of the tag block (`\c:1577836800*..\!AIVDM…`), of a line `$PGHP,1,…`, of a number or ISO time before the sentence, or of
+a number after it; without these, the seconds are unwrapped from minute to minute."""
 
 import datetime
 import functools
@@ -54,7 +54,7 @@ class Batch(NamedTuple):
 
     @property
     def identity(self) -> dict[str, list[str]]:
-        """What identifies each record, by kind of identity."""
+        """The identities of each record, by kind."""
         return {"address": self.address, **self.texts}
 
     def rows(self, keep: list[int]) -> "Batch":
@@ -80,7 +80,7 @@ class Reader(Protocol):
         """The records in batches; raises ConfigError with file, place, expected and actual content."""
 
     def notes(self, radars: Iterable[str]) -> list[str]:
-        """What was assumed, and what is known of the radars that have plots, in words."""
+        """Notes on assumptions, and on the radars that have plots."""
 
 
 @dataclass
@@ -140,7 +140,7 @@ class UnrolledClock:
         return t + self.turns * self.period_s
 
     def notes(self) -> list[str]:
-        """How often midnight has passed on a clock of a day."""
+        """A note if midnight has passed on a clock of a day, and how often."""
         return [tr("the times of day pass midnight: t_s runs on ({turns} × 24 h)", turns=self.turns)] * (self.turns > 0)
 
 
@@ -151,12 +151,12 @@ def utc_s(text: str) -> float:
 
 
 def missing_package(module: str, extra: str) -> ConfigError:
-    """The fault of a library that one of our extras installs."""
+    """The fault that a library is missing which one of our extras installs."""
     return ConfigError(f"{module} is not installed, which this needs: pip install 'radarsim[{extra}]'")
 
 
 def skip_counts(skipped: Mapping[str, int]) -> list[str]:
-    """Numbers of skipped records, in words."""
+    """The reasons for skipped records, each with its number of records."""
     return [f"{tr(reason)} ({count})" for reason, count in skipped.items() if count]
 
 
@@ -178,7 +178,7 @@ class Antenna(NamedTuple):
 
 
 class Site:
-    """Place of a radar: latitude and longitude in degrees, height above the ellipsoid in m."""
+    """The site of a radar: latitude and longitude in degrees, height above the ellipsoid in m."""
 
     def __init__(self, latitude_deg: float, longitude_deg: float, height_m: float):
         if pymap3d is None:
@@ -186,7 +186,7 @@ class Site:
         self.place = (latitude_deg, longitude_deg, height_m)
 
     def distance_m(self, other_site: "Site") -> float:
-        """The distance to another place."""
+        """The distance to another site, m."""
         return math.dist(pymap3d.geodetic2ecef(*self.place), pymap3d.geodetic2ecef(*other_site.place))
 
     def _axes(self) -> np.ndarray:
@@ -195,7 +195,7 @@ class Site:
         return np.array([pymap3d.enu2uvw(*unit, *self.place[:2]) for unit in units])
 
     def rotate_states(self, other_site: "Site", states: np.ndarray) -> np.ndarray:
-        """Positions and speeds (…, 6) in this site's local axes, of those in the other's."""
+        """Positions and speeds (…, 6) in this site's local axes, from those in another site's."""
         rotation = other_site._axes() @ self._axes().T
         shift = (
             np.subtract(pymap3d.geodetic2ecef(*other_site.place), pymap3d.geodetic2ecef(*self.place)) @ self._axes().T
@@ -256,7 +256,7 @@ def position_columns(local: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def antenna_angles(local: np.ndarray, antenna: Antenna) -> dict[str, np.ndarray]:
-    """The angles to an antenna's axes of local positions (n, 3), rad; not-a-number behind the antenna."""
+    """Elevation and azimuth of local positions (n, 3) from an antenna's normal, rad; NaN behind the antenna."""
     in_antenna_axes = physics.to_antenna(local, physics.rotation(*antenna), 0.0)
     r = np.linalg.norm(in_antenna_axes, axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -279,7 +279,7 @@ def site_of(text: str) -> Site:
 
 
 def sites_of(texts: Sequence[str]) -> tuple[Site | None, dict[str, Site]]:
-    """The site of the one radar, `LAT,LON,HEIGHT`, or of each of several, `SAC/SIC=LAT,LON,HEIGHT`."""
+    """The site of the only radar, `LAT,LON,HEIGHT`, or of each of several radars, `SAC/SIC=LAT,LON,HEIGHT`."""
     sites_by_name = {
         name.strip(): site_of(place) for name, sign, place in (text.partition("=") for text in texts) if sign
     }
@@ -343,12 +343,12 @@ class Ais:
         self.skipped: Counter[str] = Counter()
         self.open_messages: dict[bytes, list[tuple[bytes, float]]] = {}
         self.minute_clock = UnrolledClock(60.0)
-        self.last_time = math.nan  # the last time that a line stated, or that follows from it
-        self.announced_time = math.nan  # that of a line of time before the next sentence
-        self.untimed_count = 0  # reports whose minute none states
+        self.last_time = math.nan  # the last time that a line stated, or that follows from one
+        self.announced_time = math.nan  # of a line that states the time of the next sentence
+        self.untimed_count = 0  # reports whose minute no line states
 
     def notes(self, radars: Iterable[str] = ()) -> list[str]:
-        """How times were found where the lines do not state them."""
+        """A note on reports without a time, and how they get one."""
         if not self.untimed_count:
             return []
         if math.isnan(self.last_time):
@@ -389,7 +389,7 @@ class Ais:
             yield builder.take_batch()
 
     def _read_other_line(self, line: bytes) -> None:
-        """A line without an AIS sentence: some state the time of the next one."""
+        """Read a line without an AIS sentence, which may state the time of the next one."""
         if match := GATEHOUSE_TIME.search(line):
             try:
                 year, month, day, hour, minute, second, thousandths = map(int, match.groups())
@@ -401,8 +401,9 @@ class Ais:
             self.skipped[term("sentences other than AIS")] += 1
 
     def _decode(self, sentence: bytes, stated_s: float) -> tuple[Any, float]:
-        """The message that a sentence completes, none while further sentences of it are to come; the first time that
-        they state, s from 1970."""
+        """The message that a sentence completes, and the first time that its sentences state, s from 1970.
+
+        None while further sentences of the message are to come."""
         assert pyais is not None  # `__init__` has checked it
         numbers, parts = PART_NUMBERS.match(sentence), [(sentence, stated_s)]
         if numbers and numbers[1] != b"1":
@@ -420,7 +421,7 @@ class Ais:
         return pyais.decode(*(part for part, _ in parts)), times[0] if times else math.nan
 
     def _find_stated_time(self, line: bytes, start: int, number: int) -> float:
-        """The time stated for a sentence, s from 1970; NaN where there is none."""
+        """The time stated for a sentence, s from 1970; NaN if there is none."""
         if not math.isnan(self.announced_time):
             return self.announced_time
         head = line[:start]

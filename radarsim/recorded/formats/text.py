@@ -1,4 +1,4 @@
-"""Tables of positions or of plots: what a `Sheet` holds, row by row, in our quantities and units; CSV as a sheet.
+"""Read tables of positions or of plots, row by row, in our quantities and units; read CSV as a table.
 
 Times are seconds from 1970 (or thousandths and less of them, seen by their size), times of day (unwrapped after
 midnight, or of the day in a column `date`), dates as `20.11.2026 10:00:00,01` or ISO 8601, with or without a zone
@@ -6,8 +6,6 @@ midnight, or of the day in a column `date`), dates as `20.11.2026 10:00:00,01` o
 
 Cells of CSV are separated by commas, semicolons or tabs, whichever is most frequent in the header; with a separator
 other than a comma, numbers may have a decimal comma.
-
-What columns of recordings hold: the quantities, the names that files give them, and their units.
 
 A column is found by its name, whatever the case and the spaces; a unit may stand at the end of it (`range_km`,
 `Altitude [ft]`, `Latitude_degrees`). A name without a unit means SI and degrees; but positions with names from aviation
@@ -161,11 +159,11 @@ class Header:
         self._check()
 
     def _has(self, ours: str) -> bool:
-        """Whether a quantity was named, or has a known name."""
+        """Whether a quantity has been assigned, or has a known name."""
         return ours in self.columns or any(stem in QUANTITIES[ours].names for stem, _ in self.stems)
 
     def _assign_columns(self, assigned: Mapping[str, str]) -> None:
-        """The columns that the user names."""
+        """Assign the columns that the user names."""
         stems = {split_unit(ours)[0]: ours for ours in QUANTITIES}
         for name, theirs in assigned.items() if self.names else ():
             stem, unit = split_unit(name)
@@ -188,16 +186,15 @@ class Header:
         return {stem: i for i, (stem, _) in reversed(list(enumerate(self.stems)))}
 
     def _find_columns(self, has_positions: bool) -> None:
-        """The other columns, by the names that are known; earth: whether there are positions."""
+        """Find the other columns by their known names."""
         indices = self._column_indices()
         left_out = (
             (*PLOT_COLUMNS, "velocity_mps", "span_mps")
             if self.reads_positions
             else ("speed_mps", "course_deg", *EARTH_COLUMNS)
         )
-        excluded = (
-            {("velocity_mps", "velocity")} if has_positions else set()
-        )  # beside a position it is the speed over ground
+        # beside a position it is the speed over ground
+        excluded = {("velocity_mps", "velocity")} if has_positions else set()
         excluded |= {("course_deg", HEADING_NAME)} if self.maritime else set()
         used_indices = {column.position for column in self.columns.values()}
         for ours, quantity in QUANTITIES.items():
@@ -229,7 +226,7 @@ class Header:
         return Column(index, name, quantity.units.get(unit_or_default, 1.0), unit_or_default, is_assumed)
 
     def _check(self) -> None:
-        """Raise ConfigError for what is missing, and for units that must be stated."""
+        """Raise ConfigError for missing columns, and for units that must be stated."""
         required = ("t_s", *EARTH_COLUMNS) if self.reads_positions else ("t_s", "range_m")
         if missing := [name for name in required if name not in self.columns]:
             hints = "; ".join(f"{name}: {', '.join(QUANTITIES[name].names)}" for name in missing)
@@ -251,13 +248,13 @@ class Header:
                               f"{', '.join(cures)} states it")  # fmt: skip
 
     def notes(self) -> list[str]:
-        """What was assumed, and what was not used."""
-        assumed = [one for one in self.columns.values() if one.is_assumed and one.unit]
-        unit_texts = ", ".join(tr("{name} in {unit}", name=one.name, unit=one.unit) for one in assumed)
+        """Notes on assumptions, and on columns that are not used."""
+        assumed = [column for column in self.columns.values() if column.is_assumed and column.unit]
+        unit_texts = ", ".join(tr("{name} in {unit}", name=column.name, unit=column.unit) for column in assumed)
         lines = [tr("assumed because the name has no unit: {units}", units=unit_texts)] if unit_texts else []
         time = self.columns["t_s"].name
         names_by_stem = {stem: name for (stem, _), name in zip(self.stems, self.names, strict=True)}
-        used = {one.name for one in self.columns.values()}
+        used = {column.name for column in self.columns.values()}
         unused = [
             names_by_stem[stem]
             for stem in names_by_stem
@@ -314,7 +311,7 @@ class Sheet:
 
 
 def read_csv(path: str, file: TextIO, encoding: str) -> Sheet:
-    """The sheet of a CSV file: its header, before which lines of comment may stand, tells the separator."""
+    """Read a CSV file as a sheet; lines of comment may stand before the header, which shows the separator."""
     skipped_lines, comment, text = 0, "", ""
     for text in file:
         if text.strip() and not text.startswith("#"):
@@ -347,7 +344,7 @@ def _is_header(line: str, delimiter: str) -> bool:
 
 
 def _trim_rows(rows: Iterator[tuple[int, list[str]]], width: int) -> Iterator[tuple[int, list[str]]]:
-    """The rows without separators after the last cell."""
+    """Remove separators after the last cell of each row."""
     for line, row in rows:
         if len(row) > width and not any(cell.strip() for cell in row[width:]):
             del row[width:]
@@ -355,7 +352,7 @@ def _trim_rows(rows: Iterator[tuple[int, list[str]]], width: int) -> Iterator[tu
 
 
 class Table:
-    """The reader of a sheet, of positions or of plots; --column gives columns by hand."""
+    """The reader of a sheet of positions or of plots; `assigned` holds the columns that --column names."""
 
     def __init__(self, sheet: Sheet, assigned: Mapping[str, str] | None = None):
         self.path, self.sheet, self.skipped = sheet.path, sheet, sheet.skipped
@@ -383,7 +380,7 @@ class Table:
         self.cell_values: dict[int, set[str]] = {i: set() for i in candidates}  # of columns that may name the aircraft
 
     def notes(self, radars: Iterable[str] = ()) -> list[str]:
-        """Assumptions on units and times, and signs against them."""
+        """Notes on assumed units and times, and on signs against them."""
         lines = [*self.clock.notes(), *self.header.notes(), *self.sheet.notes]
         if (encoding := self.sheet.encoding) != "UTF-8":
             lines.append(
@@ -415,13 +412,13 @@ class Table:
         return lines
 
     def _likely_track_columns(self) -> str:
-        """The columns that may name the aircraft, where none is known to: each value in two rows or more on average."""
+        """The columns that may identify the aircraft, if none is known: each value is in two rows on average."""
         likely = [(i, len(cells)) for i, cells in self.cell_values.items() if 1 < len(cells) <= self.records / 2]
         names = self.header.names
         return ", ".join(tr("{name} ({count} different)", name=names[i], count=count) for i, count in likely)
 
     def track_question(self, late_count: int) -> str | None:
-        """The question which column names the aircraft, where none does and so many rows are out of time order."""
+        """The question which column identifies the aircraft, if none does and rows are out of order in time."""
         if not late_count or "track" in self.columns:
             return None
         candidates = self._likely_track_columns() or "none: each has too many different values"
@@ -599,7 +596,7 @@ class Table:
 
 
 def _second_of_day(match: re.Match) -> float:
-    """A time matched by OF_DAY, s after midnight; raises ValueError for an impossible one."""
+    """A time matched by CLOCK_PATTERN, s after midnight; raises ValueError for an impossible one."""
     hours, minutes, seconds, fraction = match.groups(default="0")
     if int(hours) > 23 or int(minutes) > 59 or int(seconds) > 60:
         raise ValueError(match[0])
