@@ -225,7 +225,7 @@ def recordings(tmp_path, biases=SOME, late=None, of_day=False, count=8):
         plots += [(s, f"{c},{name},{x:.3f},{y % 6.28318530:.6f}") for s, c, x, y in zip(t, clock, r, b, strict=True)]
         t = np.arange(-20.0, 260, 4) + rng.uniform(0, 4)
         north, up, east = flight.at(t - (2.0 if number == late else 0.0)).T
-        lat, lon, height = pymap3d.enu2geodetic(east, north, up, *SITE.place)
+        lat, lon, height = pymap3d.enu2geodetic(east, north, up, *SITE.coordinates)
         zero = 1.7e9 - 1.7e9 % 86400 + 36000 if of_day else 1.7e9
         cells = zip(t, lat, lon, height, strict=True)
         positions += [(s, f"{zero + s:.4f},{name},{x:.8f},{y:.8f},{h:.2f}") for s, x, y, h in cells]
@@ -416,7 +416,7 @@ def test_a_radar_that_knows_codes_alone(tmp_path):
         monitor = zip(t.tolist()[::20], rho.tolist()[::20], (theta % 65536).tolist()[::20], strict=True)
         plots += [(s + 1, plot_048(s + 1, x + 200, y, code=code, kind=b"\x22")) for s, x, y in monitor]
         north, up, east = flight.at(t - 36000 - 1.0).T
-        places = zip((t - 1).tolist(), *pymap3d.enu2geodetic(east, north, up, *SITE.place), strict=True)
+        places = zip((t - 1).tolist(), *pymap3d.enu2geodetic(east, north, up, *SITE.coordinates), strict=True)
         more = {"address": 0xA1 + number, "code": code}
         positions += [(s, position_021(s, x, y, height_ft=h / 0.3048, **more)) for s, x, y, h in places]
     files = tmp_path / "radar", tmp_path / "adsb"

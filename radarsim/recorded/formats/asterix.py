@@ -39,27 +39,27 @@ Texts = dict[str, list[str]]
 
 @dataclass(frozen=True)
 class RecordFields:
-    """Items of many records of a category: its specification, all bytes, and the places (n,) of each item in them."""
+    """Items of many records of a category: its specification, all bytes, and the offsets (n,) of each item in them."""
 
     spec: Any
     data: np.ndarray
-    places: Columns
+    offsets: Columns
 
     def number(self, item: str, *path: str) -> np.ndarray:
         """A field (n,) as numbers; NaN if a record does not have it."""
-        return layout.locate_field(self.spec, item, *path).values(self.data, self.places[item])
+        return layout.locate_field(self.spec, item, *path).values(self.data, self.offsets[item])
 
     def text(self, name_of: Callable[[int], str], item: str, *path: str) -> list[str]:
         """A field (n,) as texts, named by its number; '' if a record does not have it."""
         return name_values(
-            layout.locate_field(self.spec, item, *path).integers(self.data, self.places[item]),
-            self.places[item] >= 0,
+            layout.locate_field(self.spec, item, *path).integers(self.data, self.offsets[item]),
+            self.offsets[item] >= 0,
             name_of,
         )
 
     def flag(self, item: str, name: str) -> np.ndarray:
         """Bits (n,) in an item of several bytes; 0 if a record does not have them."""
-        return layout.locate_flag(self.spec, item, name).values(self.data, self.places[item])
+        return layout.locate_flag(self.spec, item, name).values(self.data, self.offsets[item])
 
     def tests(self, item: str) -> np.ndarray:
         """Marks (n,) of reports that are of no aircraft."""
@@ -70,7 +70,7 @@ class RecordFields:
         """Valid Mode 3/A codes that are not garbled, and marks (n,) of garbled ones."""
         garbled = self.number(item, "G") == 1
         is_valid = (self.number(item, "V") == 0) & ~garbled
-        codes = layout.locate_field(self.spec, item, "MODE3A").integers(self.data, self.places[item])
+        codes = layout.locate_field(self.spec, item, "MODE3A").integers(self.data, self.offsets[item])
         return name_values(codes, is_valid, OCTAL), mark_bits("garbled code", garbled)
 
     def height(self, geometric: str, level: str) -> np.ndarray:
@@ -118,7 +118,7 @@ def radar_plots(fields: RecordFields, level: str, report: str) -> RecordContents
         "bearing_rad": np.radians(fields.number("040", "THETA")),
         "altitude_m": height,
     }
-    reports = name_values(fields.flag("020", report), fields.places["020"] >= 0, REPORTS.__getitem__)
+    reports = name_values(fields.flag("020", report), fields.offsets["020"] >= 0, REPORTS.__getitem__)
     texts = {"mode_3a": codes, "report": reports}
     return columns, texts, marks | fields.tests("020") | mark_bits("garbled height", garbled)
 
@@ -133,26 +133,26 @@ def plots_048(fields: RecordFields) -> RecordContents:
         "callsign": fields.text(callsign_text, "240"),
     }
     # no detection: the radar's own forecast
-    is_forecast = (fields.places["020"] >= 0) & (fields.flag("020", "TYP") == 0)
+    is_forecast = (fields.offsets["020"] >= 0) & (fields.flag("020", "TYP") == 0)
     return columns, texts, marks | mark_bits("coasted", is_forecast)
 
 
 def doppler_048(fields: RecordFields) -> tuple[np.ndarray, np.ndarray]:
     """The first raw Doppler speed and its span, both m/s (n,); else the calculated one, which is not folded."""
-    data, place = fields.data, fields.places["120"]
+    data, offset = fields.data, fields.offsets["120"]
     variation = fields.spec.cv_items_dict["120"].cv_rule.cv_variation
     rules = {part.cv_name: part.cv_rule.cv_variation for part in variation.cv_items_list if part}
     calculated, raw = rules["CAL"], rules["RDS"].cv_variation
-    part_bits = np.where(place < 0, 0, data[place])
-    calculated_place = np.where(part_bits & 0x80, place + 1, -1)
-    doubtful = layout.locate_field_in(calculated, "D").values(data, calculated_place) == 1
-    velocity = np.where(doubtful, np.nan, layout.locate_field_in(calculated, "CAL").values(data, calculated_place))
-    count_place = np.where(part_bits & 0x40, np.where(part_bits & 0x80, place + 3, place + 1), -1)
-    raw_place = np.where((count_place >= 0) & (data[count_place] > 0), count_place + 1, -1)
+    part_bits = np.where(offset < 0, 0, data[offset])
+    calculated_offset = np.where(part_bits & 0x80, offset + 1, -1)
+    doubtful = layout.locate_field_in(calculated, "D").values(data, calculated_offset) == 1
+    velocity = np.where(doubtful, np.nan, layout.locate_field_in(calculated, "CAL").values(data, calculated_offset))
+    count_offset = np.where(part_bits & 0x40, np.where(part_bits & 0x80, offset + 3, offset + 1), -1)
+    raw_offset = np.where((count_offset >= 0) & (data[count_offset] > 0), count_offset + 1, -1)
     # The specification names no sign; no target has 32 km/s, so the upper half is taken as negative.
-    folded = layout.locate_field_in(raw, "DOP")._replace(signed=True).values(data, raw_place)
-    span = layout.locate_field_in(raw, "AMB").values(data, raw_place)
-    return np.where(raw_place < 0, velocity, folded), span
+    folded = layout.locate_field_in(raw, "DOP")._replace(signed=True).values(data, raw_offset)
+    span = layout.locate_field_in(raw, "AMB").values(data, raw_offset)
+    return np.where(raw_offset < 0, velocity, folded), span
 
 
 def plots_001(fields: RecordFields) -> RecordContents:
@@ -184,13 +184,13 @@ def tracks_062(fields: RecordFields) -> RecordContents:
 
 def address_062(fields: RecordFields) -> list[str]:
     """The addresses: the first subitem of item 380, after up to four bytes that say which subitems are present."""
-    data, place = fields.data, fields.places["380"]
-    has_address = (place >= 0) & (data[place] & 0x80 > 0)
+    data, offset = fields.data, fields.offsets["380"]
+    has_address = (offset >= 0) & (data[offset] & 0x80 > 0)
     for _ in range(3):
-        place = np.where(data[place] & 1 == 1, place + 1, place)
+        offset = np.where(data[offset] & 1 == 1, offset + 1, offset)
     (address, *_) = fields.spec.cv_items_dict["380"].cv_rule.cv_variation.cv_items_list
     return name_values(
-        layout.locate_field_in(address.cv_rule.cv_variation).integers(data, place + 1), has_address, HEXADECIMAL
+        layout.locate_field_in(address.cv_rule.cv_variation).integers(data, offset + 1), has_address, HEXADECIMAL
     )
 
 
@@ -200,7 +200,7 @@ def reports_021(fields: RecordFields) -> RecordContents:
     course = np.radians(fields.number("160", "TA"))
     climbs = [np.where(fields.number(item, "RE") == 0, fields.number(item, name) * FOOT_M / 60, np.nan)
               for item, name in (("157", "GVR"), ("155", "BVR"))]  # fmt: skip
-    is_coarse = fields.places["131"] < 0
+    is_coarse = fields.offsets["131"] < 0
     columns = {
         "latitude_deg": np.where(is_coarse, fields.number("130", "LAT"), fields.number("131", "LAT")),
         "longitude_deg": np.where(is_coarse, fields.number("130", "LON"), fields.number("131", "LON")),
@@ -220,7 +220,7 @@ def reports_021(fields: RecordFields) -> RecordContents:
 
 
 class Category:
-    """What is read of a category's records: the items of which fields are cut out; the first of times and of places
+    """What is read of a category's records: the items of which fields are cut out; the first of times and of offsets
     that a record has counts."""
 
     time_bytes = 3
@@ -230,21 +230,21 @@ class Category:
         number: int,
         read: Callable[[RecordFields], RecordContents],
         kind: str,
-        times: str,
-        places: str,
+        time_names: str,
+        position_names: str,
         other_items: str,
         variant: str | None = None,
     ):
         self.number, self.read, self.kind = number, read, kind
-        self.items = ("010", *times.split(), *places.split(), *other_items.split())
+        self.items = ("010", *time_names.split(), *position_names.split(), *other_items.split())
         self.profile = Profile(number, self.items, variant)
         self.time_items, self.position_items = (
-            [self.items.index(name) for name in names.split()] for names in (times, places)
+            [self.items.index(name) for name in names.split()] for names in (time_names, position_names)
         )
 
     def find_items(self, data: bytes, start: int) -> tuple[list[int], int]:
-        """The places of the items of a record, -1 of those it has not, and its end."""
-        return self.profile.places(data, start)
+        """The offsets of the items of a record, -1 of those it has not, and its end."""
+        return self.profile.offsets(data, start)
 
     def time_of_day(self, number: int) -> float:
         """Time of day in s of a number in the time's item."""
@@ -264,8 +264,10 @@ class Category001(Category):
 
     def find_items(self, data: bytes, start: int) -> tuple[list[int], int]:
         """The profile depends on the first bit of item 020, the second item of both; item 010 has two bytes."""
-        kind_place = layout.specification_end(data, start) + 2
-        return (self.profile if kind_place < len(data) and data[kind_place] & 0x80 else self.plot).places(data, start)
+        kind_offset = layout.specification_end(data, start) + 2
+        return (self.profile if kind_offset < len(data) and data[kind_offset] & 0x80 else self.plot).offsets(
+            data, start
+        )
 
     def time_of_day(self, number: int) -> float:
         """The time of day next to the last sector's; without sectors the truncated one, unwrapped."""
@@ -285,7 +287,7 @@ class RecordStore:
     def _clear(self) -> None:
         self.blocks: list[bytes] = []
         self.size = 0
-        self.places, self.block_starts, self.times = array("q"), array("q"), array("d")
+        self.offsets, self.block_starts, self.times = array("q"), array("q"), array("d")
 
     def __len__(self) -> int:
         return len(self.times)
@@ -293,11 +295,11 @@ class RecordStore:
     def take_fields(self) -> tuple[np.ndarray, RecordFields]:
         """Times (n,) and items; the collection is emptied."""
         data = np.frombuffer(b"".join([*self.blocks, bytes(16)]), np.uint8)
-        places = np.array(self.places).reshape(len(self), -1)
-        places = np.where(places < 0, -1, places + np.array(self.block_starts)[:, None])
+        offsets = np.array(self.offsets).reshape(len(self), -1)
+        offsets = np.where(offsets < 0, -1, offsets + np.array(self.block_starts)[:, None])
         t = np.array(self.times)
         self._clear()
-        return t, RecordFields(self.category.profile.spec, data, dict(zip(self.category.items, places.T, strict=True)))
+        return t, RecordFields(self.category.profile.spec, data, dict(zip(self.category.items, offsets.T, strict=True)))
 
 
 class Asterix:
@@ -391,22 +393,24 @@ class Asterix:
                 self.skipped[term("data blocks of category #").replace(ANY, f"{category:03d}")] += 1
         except DamagedRecord as fault:
             edition = f"{category:03d} in edition {layout.edition_number(category)}, which is taken for granted"
-            raise ConfigError(f"{self.path}: byte {begin + fault.place}, record {self.records + 1}: not ASTERIX of "
+            raise ConfigError(f"{self.path}: byte {begin + fault.offset}, record {self.records + 1}: not ASTERIX of "
                               f"category {edition}: {fault.fault}") from fault  # fmt: skip
 
     def _read_records(self, data: bytes, records: RecordStore) -> None:
-        category, place, clock = records.category, 3, self.clock
-        while place < len(data):
-            places, place = category.find_items(data, place)
+        category, offset, clock = records.category, 3, self.clock
+        while offset < len(data):
+            offsets, offset = category.find_items(data, offset)
             self.records += 1
-            time_place = next((places[i] for i in category.time_items if places[i] >= 0), -1)
-            if time_place < 0 or all(places[i] < 0 for i in category.position_items):
+            time_offset = next((offsets[i] for i in category.time_items if offsets[i] >= 0), -1)
+            if time_offset < 0 or all(offsets[i] < 0 for i in category.position_items):
                 self.skipped[sites.NO_TIME_OR_POSITION] += 1
                 continue
-            records.places.extend(places)
+            records.offsets.extend(offsets)
             records.block_starts.append(records.size)
             records.times.append(
-                clock(category.time_of_day(int.from_bytes(data[time_place : time_place + category.time_bytes], "big")))
+                clock(
+                    category.time_of_day(int.from_bytes(data[time_offset : time_offset + category.time_bytes], "big"))
+                )
             )
         if records.block_starts and records.block_starts[-1] == records.size:  # there is a record of this block
             records.blocks.append(data)
@@ -416,15 +420,15 @@ class Asterix:
         """The full time of day, which category 001 leaves to the sector messages of its radar."""
         start = 3
         while start < len(data):
-            (place,), start = self.sector_profile.places(data, start)
-            if place >= 0:
-                self.plots_001.full = int.from_bytes(data[place : place + 3], "big") / 128
+            (offset,), start = self.sector_profile.offsets(data, start)
+            if offset >= 0:
+                self.plots_001.full = int.from_bytes(data[offset : offset + 3], "big") / 128
 
     def _take_batch(self, records: RecordStore) -> sites.Batch:
         kind = records.category.kind
         t, fields = records.take_fields()
         columns, texts, marks = records.category.read(fields)
-        source, empty = fields.places["010"], [""] * len(t)
+        source, empty = fields.offsets["010"], [""] * len(t)
         radars = name_values(fields.data[source].astype(int) << 8 | fields.data[source + 1], source >= 0, sensor_name)
         texts = {name: texts.get(name, empty) for name in ("track", *WORDS)} | {
             "marks": [MARK_TEXTS[bits] for bits in marks]
@@ -470,7 +474,7 @@ class Survey:
     """What the beginning of a file says of its radars, by SAC/SIC: degrees, degrees and m (WGS 84), the time of a turn
     in s; the first full time of day, s; and its categories."""
 
-    places: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    positions: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     turns: dict[str, float] = field(default_factory=dict)
     second: float | None = None
     categories: set[int] = field(default_factory=set)
@@ -490,26 +494,28 @@ def survey_radars(path: str) -> Survey:
                 survey.categories.add(category)
                 start = 3
                 while category in services and start < len(data):
-                    (source, turn_place, time_place, *position_place), start = services[category].places(data, start)
+                    (source, turn_offset, time_offset, *position_offset), start = services[category].offsets(
+                        data, start
+                    )
                     radar = f"{data[source]}/{data[source + 1]}" if source >= 0 else ""
-                    if turn_place >= 0:
-                        turns_by_radar.setdefault(radar, []).append(_field_value(turn_field, data, turn_place))
-                    if time_place >= 0 and survey.second is None:
-                        survey.second = _field_value(time_field, data, time_place)
-                    if position_place and position_place[0] >= 0:
+                    if turn_offset >= 0:
+                        turns_by_radar.setdefault(radar, []).append(_field_value(turn_field, data, turn_offset))
+                    if time_offset >= 0 and survey.second is None:
+                        survey.second = _field_value(time_field, data, time_offset)
+                    if position_offset and position_offset[0] >= 0:
                         latitude, longitude, height = (
-                            _field_value(field, data, position_place[0]) for field in position_fields
+                            _field_value(field, data, position_offset[0]) for field in position_fields
                         )
                         if latitude or longitude:  # a radar that does not know sends zeros
-                            survey.places[radar] = latitude, longitude, height
+                            survey.positions[radar] = latitude, longitude, height
     except (ConfigError, DamagedRecord):
         pass  # it is told when the records are read
     survey.turns = {radar: float(np.median(durations)) for radar, durations in turns_by_radar.items()}
     return survey
 
 
-def _field_value(field: layout.Field, data: bytes, place: int) -> float:
-    return float(field.values(np.frombuffer(data, np.uint8), np.array([place]))[0])
+def _field_value(field: layout.Field, data: bytes, offset: int) -> float:
+    return float(field.values(np.frombuffer(data, np.uint8), np.array([offset]))[0])
 
 
 def looks_like(head: bytes) -> bool:

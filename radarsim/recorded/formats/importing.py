@@ -269,7 +269,7 @@ def import_recording(
 
 def add_stated_sites(options: Options, reader: Reader) -> tuple[Options, list[str]]:
     """Add the sites of radars that the recording states to the options; also notes where --at contradicts it."""
-    stated_places = reader.survey.places if isinstance(reader, Asterix) else {}
+    stated_places = reader.survey.positions if isinstance(reader, Asterix) else {}
     sites, notes = {name: Site(*place) for name, place in stated_places.items()}, []
     given_sites = {next(iter(sites)): options.site} if options.site and len(sites) == 1 else options.sites
     for name, site in given_sites.items():
@@ -447,7 +447,7 @@ class _Import:
             "range grows; span_mps: what a folded velocity is ambiguous by",
         ]
         for name, site in sites.items():
-            lat, lon, height = site.place
+            lat, lon, height = site.coordinates
             position = f"{lat:.6f} deg {lon:.6f} deg {height:g} m; x_m north y_m up z_m east of it"
             lines.append(f"# radar{f' {name}' if name else ''} (WGS 84): {position}")
         if sites:

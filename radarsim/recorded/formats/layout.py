@@ -35,11 +35,11 @@ ItemEnd = Callable[[bytes, int], int]  # data and start of an item: its end
 
 
 class DamagedRecord(ValueError):
-    """Bytes that the specification does not allow: their place, and the fault."""
+    """Bytes that the specification does not allow: their offset, and the fault."""
 
-    def __init__(self, place: int, fault: str):
+    def __init__(self, offset: int, fault: str):
         super().__init__(fault)
-        self.place, self.fault = place, fault
+        self.offset, self.fault = offset, fault
 
 
 class Field(NamedTuple):
@@ -104,12 +104,12 @@ def record_profile(category: int, variant: str | None = None) -> Any:
 
 
 def locate_field(spec: Any, item: str, *path: str) -> Field:
-    """The place of a field in an item of a record; path leads through groups, by the names of libasterix."""
+    """The offset of a field in an item of a record; path leads through groups, by the names of libasterix."""
     return locate_field_in(spec.cv_items_dict[item].cv_rule.cv_variation, *path)
 
 
 def locate_field_in(variation: Any, *path: str) -> Field:
-    """The place of a field in an element or group."""
+    """The offset of a field in an element or group."""
     offset = 0
     for name in path:
         for part, size in variation.cv_items_list:
@@ -127,7 +127,7 @@ def locate_field_in(variation: Any, *path: str) -> Field:
 
 
 def locate_flag(spec: Any, item: str, name: str) -> Flag:
-    """The place of a flag in an item whose parts have one byte each."""
+    """The offset of a flag in an item whose parts have one byte each."""
     for byte, parts in enumerate(spec.cv_items_dict[item].cv_rule.cv_variation.cv_items_list):
         shift = 8
         for part, bits in (entry for entry in parts if entry):
@@ -164,12 +164,12 @@ def _extended_item_end(variation: Any) -> ItemEnd:
         (sum(field[1] if field else 1 for field in part) // 8, part[-1] is None) for part in variation.cv_items_list
     ]
 
-    def end(data: bytes, place: int) -> int:
+    def end(data: bytes, offset: int) -> int:
         for size, extends in parts:
-            place += size
-            if not (extends and place <= len(data) and data[place - 1] & 1):
-                return place
-        raise DamagedRecord(place - 1, "an item goes on after its last part")
+            offset += size
+            if not (extends and offset <= len(data) and data[offset - 1] & 1):
+                return offset
+        raise DamagedRecord(offset - 1, "an item goes on after its last part")
 
     return end
 
@@ -199,37 +199,37 @@ def _explicit_item_end(data: bytes, start: int) -> int:
 def _compound_item_end(variation: Any) -> ItemEnd:
     parts = [item and item_end_function(variation_of(item.cv_rule)) for item in variation.cv_items_list]
 
-    def end(data: bytes, place: int) -> int:
-        begin = place
-        numbers, place = _read_specification(data, place)
+    def end(data: bytes, offset: int) -> int:
+        begin = offset
+        numbers, offset = _read_specification(data, offset)
         for number in numbers:
             part = parts[number] if number < len(parts) else None
             if part is None:
                 raise DamagedRecord(begin, f"a part {number + 1} that the item has not")
-            place = part(data, place)
-        return place
+            offset = part(data, offset)
+        return offset
 
     return end
 
 
-def _read_specification(data: bytes, place: int) -> tuple[list[int], int]:
+def _read_specification(data: bytes, offset: int) -> tuple[list[int], int]:
     """The numbers, from 0, in a field specification, and its end."""
-    begin, numbers = place, []
+    begin, numbers = offset, []
     while True:
-        if place >= len(data):
+        if offset >= len(data):
             raise DamagedRecord(begin, "a field specification that does not end")
-        byte = data[place]
-        numbers += [7 * (place - begin) + bit for bit in range(7) if byte >> (7 - bit) & 1]
-        place += 1
+        byte = data[offset]
+        numbers += [7 * (offset - begin) + bit for bit in range(7) if byte >> (7 - bit) & 1]
+        offset += 1
         if not byte & 1:
-            return numbers, place
+            return numbers, offset
 
 
-def specification_end(data: bytes, place: int) -> int:
+def specification_end(data: bytes, offset: int) -> int:
     """The end of a field specification, whatever it names; beyond the data if it does not end."""
-    while place < len(data) and data[place] & 1:
-        place += 1
-    return place + 1
+    while offset < len(data) and data[offset] & 1:
+        offset += 1
+    return offset + 1
 
 
 class FixedItems(NamedTuple):
@@ -257,24 +257,24 @@ class Profile:
         ]
         self.plans: dict[bytes, list[FixedItems]] = {}
 
-    def places(self, data: bytes, place: int) -> tuple[list[int], int]:
+    def offsets(self, data: bytes, offset: int) -> tuple[list[int], int]:
         """The start of each requested item, -1 if it is absent, and the end of the record."""
-        begin, place = place, specification_end(data, place)
-        plan = self.plans.get(data[begin:place])
+        begin, offset = offset, specification_end(data, offset)
+        plan = self.plans.get(data[begin:offset])
         if plan is None:
             plan = self._plan(data, begin)
-        places = [-1] * len(self.names)
+        offsets = [-1] * len(self.names)
         for fixed_items, size, variable_item, end in plan:
-            for index, offset in fixed_items:
-                places[index] = place + offset
-            place += size
+            for index, item_offset in fixed_items:
+                offsets[index] = offset + item_offset
+            offset += size
             if end is not None:
                 if variable_item >= 0:
-                    places[variable_item] = place
-                place = end(data, place)
-            if place > len(data):
+                    offsets[variable_item] = offset
+                offset = end(data, offset)
+            if offset > len(data):
                 raise DamagedRecord(begin, f"item {self._cut_off_item(data, begin)} ends after the data block")
-        return places, place
+        return offsets, offset
 
     def _plan(self, data: bytes, begin: int) -> list[FixedItems]:
         numbers, end = _read_specification(data, begin)
@@ -305,10 +305,10 @@ class Profile:
 
     def _cut_off_item(self, data: bytes, begin: int) -> str:
         """The first item of a record that ends after the data."""
-        numbers, place = _read_specification(data, begin)
+        numbers, offset = _read_specification(data, begin)
         for name, variation in self._numbered_items(numbers, begin):
-            place = item_end_function(variation)(data, place)
-            if place > len(data):
+            offset = item_end_function(variation)(data, offset)
+            if offset > len(data):
                 return name
         raise AssertionError("a record that ends in the data")
 
@@ -318,7 +318,7 @@ CHUNK_BYTES = 1 << 20
 MAX_TRAILING_BYTES = 16  # bytes of a network's own after the blocks of a datagram
 MAX_PACKET_BYTES = 1 << 24  # more is a damaged file
 USED_CATEGORIES = {*range(1, 35), 48, *range(61, 66), 129, 150, 204, 205, *range(238, 242), 247, 252}  # that are in use
-Block = tuple[int, int, bytes]  # category, place in the file, bytes with the header
+Block = tuple[int, int, bytes]  # category, offset in the file, bytes with the header
 
 
 class FrameFormat(NamedTuple):
@@ -371,14 +371,14 @@ def is_final(head: bytes) -> bool:
 def _bare_blocks(path: str, file: BinaryIO) -> Iterator[Block]:
     data, chunk_start = file.read(CHUNK_BYTES), 0
     while data:
-        place, size = 0, len(data)
-        while place + 3 <= size:
-            end = place + (data[place + 1] << 8 | data[place + 2])
-            if not place + 4 <= end <= size:
+        offset, size = 0, len(data)
+        while offset + 3 <= size:
+            end = offset + (data[offset + 1] << 8 | data[offset + 2])
+            if not offset + 4 <= end <= size:
                 break
-            yield data[place], chunk_start + place, data[place:end]
-            place = end
-        chunk_start, tail, next_bytes = chunk_start + place, data[place:], file.read(CHUNK_BYTES)
+            yield data[offset], chunk_start + offset, data[offset:end]
+            offset = end
+        chunk_start, tail, next_bytes = chunk_start + offset, data[offset:], file.read(CHUNK_BYTES)
         data = tail + next_bytes
         length = int.from_bytes(data[1:3], "big")
         if tail and (not next_bytes or length < 4):
@@ -397,7 +397,7 @@ def _frame_blocks(path: str, file: BinaryIO) -> Iterator[Block]:
             got = f"{data[:12].hex(' ')} and {max(len(data) - 12, 0)} bytes"
             raise ConfigError(f"{path}: byte {frame_start}: must be a frame: two bytes that count it, 6 more, data "
                               f"blocks, A5 A5 A5 A5; got {got}")  # fmt: skip
-        yield from ((category, frame_start + place, block) for category, place, block in frame_blocks)
+        yield from ((category, frame_start + offset, block) for category, offset, block in frame_blocks)
         frame_start += len(data)
 
 
@@ -410,20 +410,20 @@ def _blocks_of_frame(data: bytes, kind: FrameFormat) -> list[Block] | None:
     return chain if end == count - len(kind.trailer) else None
 
 
-def _read_chain(data: bytes, place: int, end: int) -> tuple[list[Block], int]:
+def _read_chain(data: bytes, offset: int, end: int) -> tuple[list[Block], int]:
     """The blocks one after the other from a byte on, and the end of the last."""
     chain = []
-    while place + 4 <= end and data[place] in USED_CATEGORIES:
-        length = int.from_bytes(data[place + 1 : place + 3], "big")
-        if length < 4 or place + length > end:
+    while offset + 4 <= end and data[offset] in USED_CATEGORIES:
+        length = int.from_bytes(data[offset + 1 : offset + 3], "big")
+        if length < 4 or offset + length > end:
             break
-        chain.append((data[place], place, data[place : place + length]))
-        place += length
-    return chain, place
+        chain.append((data[offset], offset, data[offset : offset + length]))
+        offset += length
+    return chain, offset
 
 
 def datagram_blocks(data: bytes) -> tuple[list[Block], int]:
-    """The blocks of a datagram, with their places in it, and how many bytes stand after them."""
+    """The blocks of a datagram, with their offsets in it, and how many bytes stand after them."""
     chain, end = _read_chain(data, 0, len(data))
     if chain and len(data) - end <= MAX_TRAILING_BYTES:
         return chain, len(data) - end
@@ -466,7 +466,7 @@ def _capture_packets(path: str, file: BinaryIO, skipped: Counter[str]) -> Iterat
 def _pcap_packets(
     path: str, file: BinaryIO, magic: bytes, skipped: Counter[str]
 ) -> Iterator[tuple[int, int, bytes, bool]]:
-    order, place = PCAP_ORDERS[magic], 24
+    order, offset = PCAP_ORDERS[magic], 24
     header_rest = file.read(20)
     if len(header_rest) < 20:
         raise ConfigError(
@@ -477,26 +477,28 @@ def _pcap_packets(
     while head := file.read(16):
         size, original_size = header.unpack(head) if len(head) == 16 else (0, 0)
         if size > MAX_PACKET_BYTES:
-            raise ConfigError(f"{path}: byte {place}: must be a packet of at most {MAX_PACKET_BYTES} bytes; got {size}")
+            raise ConfigError(
+                f"{path}: byte {offset}: must be a packet of at most {MAX_PACKET_BYTES} bytes; got {size}"
+            )
         data = file.read(size)
         if len(head) < 16 or len(data) < size:
             skipped[CUT_OFF_REASON] += 1
             return
-        yield place + 16, link, data, size >= original_size
-        place += 16 + size
+        yield offset + 16, link, data, size >= original_size
+        offset += 16 + size
 
 
 def _pcapng_packets(
     path: str, file: BinaryIO, magic: bytes, skipped: Counter[str]
 ) -> Iterator[tuple[int, int, bytes, bool]]:
-    place, order, head = 0, "<", magic + file.read(8)
+    offset, order, head = 0, "<", magic + file.read(8)
     links: list[int] = []
     while head:
         if head[:4] == PCAPNG_MAGIC:  # a section, which says its own order of bytes
             order, links = PCAPNG_ORDERS.get(head[8:12], ""), []
         kind, size = struct.unpack(order + "II", head[:8]) if order and len(head) == 12 else (0, 0)
         if len(head) == 12 and not (12 <= size <= MAX_PACKET_BYTES and size % 4 == 0):
-            raise ConfigError(f"{path}: byte {place}: must be a block of a pcapng file; got {head.hex(' ')}")
+            raise ConfigError(f"{path}: byte {offset}: must be a block of a pcapng file; got {head.hex(' ')}")
         body = head[8:] + file.read(size - 12) if size else b""
         if len(head) < 12 or len(body) < size - 8:
             skipped[CUT_OFF_REASON] += 1
@@ -505,13 +507,13 @@ def _pcapng_packets(
         if kind == INTERFACE and len(body) >= 2:
             links.append(struct.unpack_from(order + "H", body)[0])
         elif kind in (PACKET, OLD_PACKET, SIMPLE_PACKET):
-            yield _pcapng_packet(path, order, kind, body, links, place)
-        place += size
+            yield _pcapng_packet(path, order, kind, body, links, offset)
+        offset += size
         head = file.read(12)
 
 
 def _pcapng_packet(
-    path: str, order: str, kind: int, body: bytes, links: list[int], place: int
+    path: str, order: str, kind: int, body: bytes, links: list[int], offset: int
 ) -> tuple[int, int, bytes, bool]:
     """A packet of a pcapng file."""
     layout = {PACKET: "I8xII", OLD_PACKET: "H10xII", SIMPLE_PACKET: "I"}[kind]
@@ -521,9 +523,9 @@ def _pcapng_packet(
         numbers if kind != SIMPLE_PACKET else (0, min(numbers[0], len(body) - start), numbers[0])
     )
     if number >= len(links) or start + size > len(body):
-        raise ConfigError(f"{path}: byte {place}: must be a packet of an interface described before; got interface "
+        raise ConfigError(f"{path}: byte {offset}: must be a packet of an interface described before; got interface "
                           f"{number}, {size} of {len(body)} bytes")  # fmt: skip
-    return place + 8 + start, links[number], body[start : start + size], size >= original_size
+    return offset + 8 + start, links[number], body[start : start + size], size >= original_size
 
 
 def _udp_payload(data: bytes, link: int, skipped: Counter[str]) -> tuple[int, int] | None:

@@ -183,22 +183,23 @@ class Site:
     def __init__(self, latitude_deg: float, longitude_deg: float, height_m: float):
         if pymap3d is None:
             raise missing_package("pymap3d", "recordings")
-        self.place = (latitude_deg, longitude_deg, height_m)
+        self.coordinates = (latitude_deg, longitude_deg, height_m)
 
     def distance_m(self, other_site: "Site") -> float:
         """The distance to another site, m."""
-        return math.dist(pymap3d.geodetic2ecef(*self.place), pymap3d.geodetic2ecef(*other_site.place))
+        return math.dist(pymap3d.geodetic2ecef(*self.coordinates), pymap3d.geodetic2ecef(*other_site.coordinates))
 
     def _axes(self) -> np.ndarray:
         """North, up and east (3, 3) in the axes of the earth."""
         units = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # each east, north, up
-        return np.array([pymap3d.enu2uvw(*unit, *self.place[:2]) for unit in units])
+        return np.array([pymap3d.enu2uvw(*unit, *self.coordinates[:2]) for unit in units])
 
     def rotate_states(self, other_site: "Site", states: np.ndarray) -> np.ndarray:
         """Positions and speeds (…, 6) in this site's local axes, from those in another site's."""
         rotation = other_site._axes() @ self._axes().T
         shift = (
-            np.subtract(pymap3d.geodetic2ecef(*other_site.place), pymap3d.geodetic2ecef(*self.place)) @ self._axes().T
+            np.subtract(pymap3d.geodetic2ecef(*other_site.coordinates), pymap3d.geodetic2ecef(*self.coordinates))
+            @ self._axes().T
         )
         return np.concatenate([states[..., :3] @ rotation + shift, states[..., 3:] @ rotation], axis=-1)
 
@@ -207,7 +208,7 @@ class Site:
         unknown height is taken as 0, sea level."""
         lat, lon = columns["latitude_deg"], columns["longitude_deg"]
         height = np.nan_to_num(columns["altitude_m"], nan=0.0)
-        east, north, up = pymap3d.geodetic2enu(lat, lon, height, *self.place)
+        east, north, up = pymap3d.geodetic2enu(lat, lon, height, *self.coordinates)
         local = np.stack([north, up, east], axis=-1)
         return position_columns(local) | {"velocity_mps": self._radial(columns, lat, lon, height)}
 
@@ -216,7 +217,7 @@ class Site:
         up = np.nan_to_num(columns["up_mps"], nan=0.0)
         velocity = np.stack(pymap3d.enu2uvw(columns["east_mps"], columns["north_mps"], up, lat, lon), axis=-1)
         target = np.stack(pymap3d.geodetic2ecef(lat, lon, h), axis=-1)
-        line_of_sight = target - np.stack(pymap3d.geodetic2ecef(*self.place))
+        line_of_sight = target - np.stack(pymap3d.geodetic2ecef(*self.coordinates))
         return np.einsum("ni,ni->n", velocity, line_of_sight) / np.linalg.norm(line_of_sight, axis=-1)
 
     def local_positions(self, range_m: np.ndarray, bearing_rad: np.ndarray, altitude_m: np.ndarray) -> np.ndarray:
@@ -226,7 +227,7 @@ class Site:
         bearing = np.degrees(bearing_rad)
         with np.errstate(invalid="ignore"):
             for _ in range(MAX_ROUNDS):
-                height = pymap3d.aer2geodetic(bearing, np.degrees(np.arcsin(sine)), range_m, *self.place)[2]
+                height = pymap3d.aer2geodetic(bearing, np.degrees(np.arcsin(sine)), range_m, *self.coordinates)[2]
                 height_error = altitude_m - height
                 # A step of the sine lifts the point by nearly that part of the range.
                 sine = np.clip(sine + height_error / range_m, -1.0, 1.0)

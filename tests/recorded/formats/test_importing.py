@@ -282,12 +282,12 @@ def axes(latitude_deg, longitude_deg):
 
 def local(*place):
     """North, up and east of the radar."""
-    return axes(*SITE.place[:2]) @ (cartesian(*place) - cartesian(*SITE.place))
+    return axes(*SITE.coordinates[:2]) @ (cartesian(*place) - cartesian(*SITE.coordinates))
 
 
 def radial(latitude_deg, longitude_deg, height_m, north_mps):
     """The radial velocity of one that moves north."""
-    line = cartesian(latitude_deg, longitude_deg, height_m) - cartesian(*SITE.place)
+    line = cartesian(latitude_deg, longitude_deg, height_m) - cartesian(*SITE.coordinates)
     return north_mps * axes(latitude_deg, longitude_deg)[0] @ line / np.linalg.norm(line)
 
 
