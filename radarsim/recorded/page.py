@@ -1,9 +1,9 @@
-"""The report of tracks over recorded plots: one self-contained page, and its figures as files: plan view and range,
-estimates, residuals, innovations, probabilities. Its sentences: rows, gaps, errors, stated accuracies, advice.
+"""The report of tracks over recorded plots: figures, tables and sentences on one self-contained page.
 
-Whether the stated accuracies fit is judged by the filters' own innovations. For a consistent filter the squares of the
-innovations, divided by their predicted variance, average 1 for each degree of freedom (NIS). Larger: the plots are
-worse than stated, or the target manoeuvres more than the filter assumes; smaller: they are better."""
+The filters' own innovations decide whether the configured accuracies fit. For a consistent filter the squares of the
+innovations, divided by their predicted variance, average 1 for each degree of freedom (NIS). A larger average means
+that the plots are worse than configured, or that the target manoeuvres more than the filter assumes; a smaller one
+means that the plots are better."""
 
 import math
 import os
@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,265 +21,340 @@ from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.language import few, listed, plural, power_of_ten, term, tr
 from radarsim.recorded import fit
-from radarsim.recorded.fit import Advice, Asked, Finding
-from radarsim.recorded.follow import Followed, Tally, recorded_of
-from radarsim.recorded.plots import Places
+from radarsim.recorded.fit import Advice, FilterComparison, Finding, UsedRows
+from radarsim.recorded.follow import Followed, InnovationTally, recording_interface
+from radarsim.recorded.plots import PlotPositions
 from radarsim.report import panels
 from radarsim.report.drawing import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.statistics import Z95, normalised_bounds
 from radarsim.report.wording import labelled, number, significant_digits
 from radarsim.report.wording import unit as unit_of
-from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS
+from radarsim.studies.interface import BIAS, CORRELATION, OUTLIERS, Turning
 
 # ---- figures ---------------------------------------------------------------------------------------------------------
-PLOT = Style(GREY, None, 0, size_pt=1.6)
-BOUND = Style(GREY, 1, width_pt=0.8)
-RADAR = Style(0, None, 2, size_pt=5.0)
-MOST_FILTERS = 8
-MOST_TRACKS = 8  # with a colour of their own; more are grey
-MOST_RESIDUALS = 9  # panels of residuals
-MOST_DOTS = 300  # of a filter in a panel of residuals
-WINDOW = 15  # innovations in a mean over time
-TALL_MM, USUAL_MM = 74.0, 52.0  # of a panel: of a plan view, of others
-TICKS = (0.01, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1000.0)  # of a mean NIS
-FAR_M = 2e4  # distance from which a plan view uses km
+PLOT_STYLE = Style(GREY, None, 0, size_pt=1.6)
+BOUND_STYLE = Style(GREY, 1, width_pt=0.8)
+RADAR_STYLE = Style(0, None, 2, size_pt=5.0)
+MAX_FILTERS = 8
+MAX_COLOURED_TRACKS = 8  # further tracks are grey
+MAX_RESIDUAL_PANELS = 9
+MAX_DOTS = 300  # of a filter in a panel of residuals
+NIS_WINDOW = 15  # innovations in a mean over time
+PLAN_PANEL_MM, PANEL_MM = 74.0, 52.0  # height of a panel: of a plan view, of others
+NIS_TICKS = (0.01, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0, 1000.0)
+KILOMETRES_FROM_M = 2e4  # a plan view that reaches this far has an axis in km
 
 
-def figures(followed: Followed) -> dict[str, Figure]:
-    """`track`, `plan`, `residuals`, `nis` and `probabilities`, as far as available, described; by name. Of several
-    tracks the plots of all and the estimates of the longest."""
-    ways = {name: one.places for name, one in followed.tracks.items()} or {"": followed.places}
-    order = sorted(ways, key=lambda name: ways[name] is not followed.places)
-    track = followed.drawn
+def track_figures(followed: Followed) -> dict[str, Figure]:
+    """The available figures by name: `track`, `plan`, `residuals`, `nis` and `probabilities`.
+
+    With several tracks, the plan view shows the plots of all, and every other figure the longest track."""
+    positions = {name: result.positions for name, result in followed.tracks.items()} or {"": followed.positions}
+    longest_first = sorted(positions, key=lambda name: positions[name] is not followed.positions)
+    track = followed.figure_track
     assert track is not None  # a file without rows is refused
-    drawn = {
-        "track": estimates(track),
-        "plan": plan(track, {name: ways[name] for name in order}),
-        "residuals": residuals(track),
-        "nis": innovations(track),
-        "probabilities": probabilities(track),
+    figures = {
+        "track": estimate_figure(track),
+        "plan": plan_figure(track, {name: positions[name] for name in longest_first}),
+        "residuals": residual_figure(track),
+        "nis": innovation_figure(track),
+        "probabilities": probability_figure(track),
     }
-    return {name: panels.joined(figure) for name, figure in drawn.items() if figure is not None}
+    return {name: panels.joined(figure) for name, figure in figures.items() if figure is not None}
 
 
-def _called(name: object) -> str:
+def _track_label(name: object) -> str:
     return tr("track {number}", number=name)
 
 
-def _keys(track: Track) -> list[tuple[str, Style]]:
-    return [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MOST_FILTERS])]
+def _filter_keys(track: Track) -> list[tuple[str, Style]]:
+    return [(panels.literal(name), Style(f, f)) for f, name in enumerate(track.filters[:MAX_FILTERS])]
 
 
-def _time() -> Axis:
+def _time_axis() -> Axis:
     return Axis(tr("time, s"))
 
 
-def _several(name: str, title: str, caption: str, made: list[Panel], keys: Sequence[tuple[str, Style]] = ()) -> Figure:
-    """A figure of panels with their legend, if there are keys, in a cell of its own."""
-    made = [*made, *([Panel(_time(), _time(), (), keys=tuple(keys))] if keys else [])]
-    columns = min(2 if len(made) == 4 else 3, len(made))
-    return Figure(name, title, caption, tuple(made), columns, PAGE_MM if columns > 1 else COLUMN_MM, USUAL_MM)
+def _figure_of_panels(
+    name: str, title: str, caption: str, figure_panels: list[Panel], keys: Sequence[tuple[str, Style]] = ()
+) -> Figure:
+    """A figure of panels; with keys, its legend takes a cell of its own."""
+    if keys:
+        figure_panels = [*figure_panels, Panel(_time_axis(), _time_axis(), (), keys=tuple(keys))]
+    columns = min(2 if len(figure_panels) == 4 else 3, len(figure_panels))
+    width = PAGE_MM if columns > 1 else COLUMN_MM
+    return Figure(name, title, caption, tuple(figure_panels), columns, width, PANEL_MM)
 
 
-def _usual(values: np.ndarray) -> tuple[float | None, float | None]:
-    """Limits for the usual values: the range of 99 % of them and 30 % more, so that the start does not dominate."""
-    known = values[np.isfinite(values)]
-    if known.size < 50:
+def _usual_limits(values: np.ndarray) -> tuple[float | None, float | None]:
+    """Axis limits: the range of 99 % of the values and 30 % more, so that the start does not dominate."""
+    finite = values[np.isfinite(values)]
+    if finite.size < 50:
         return None, None
-    low, high = np.quantile(known, [0.005, 0.995])
-    pad = 0.3 * (high - low)
-    return (float(low - pad), float(high + pad)) if pad else (None, None)
+    low, high = np.quantile(finite, [0.005, 0.995])
+    margin = 0.3 * (high - low)
+    return (float(low - margin), float(high + margin)) if margin else (None, None)
 
 
 # ---- where ----------------------------------------------------------------------------------------------------------
-def plan(track: Track, paths: Mapping[str, Places]) -> Figure | None:
-    """Plan view with equal units, the radar at the origin, and the range over time; None where no range is known."""
-    own = [path for path in _drawn_paths(track, paths) if len(path.t_s)]
-    if not own:
+class _PlanView(NamedTuple):
+    """Positions of tracks to draw, their styles and legend entries, and the unit and its size in m."""
+
+    paths: list[PlotPositions]
+    styles: list[Style]
+    labels: list[str]
+    unit: str
+    unit_m: float
+
+
+def plan_figure(track: Track, positions: Mapping[str, PlotPositions]) -> Figure | None:
+    """Plan view with equal units and the radar at the origin, and the range over time; None if no range is known."""
+    paths = [path for path in _drawable_paths(track, positions) if len(path.t_s)]
+    if not paths:
         return None
-    places = np.concatenate([path.places for path in own])
-    far = np.nanmax(np.abs(places)) > FAR_M
-    unit, size = ("km", 1e3) if far else ("m", 1.0)
-    styles = [Style(i if i < MOST_TRACKS else GREY, None, 0, size_pt=1.6) for i in range(len(own))]
-    names = [panels.literal(name) for name in paths]
-    several = len(own) > 1
-    over_time = [
-        Line(path.t_s, path.places[:, 2] / size, "", style, name=_called(name) if several else tr("plots"))
-        for path, style, name in zip(own, styles, names, strict=False)
-    ]
-    made = [Panel(_time(), Axis(tr("range, {unit}", unit=unit)), tuple(over_time), tr("Range"), direct=False)]
-    if np.isfinite(places[:, :2]).all(axis=1).any():
-        marks: list = [
-            Line(path.places[:, 1] / size, path.places[:, 0] / size, "", style, name=line.name)
-            for path, style, line in zip(own, styles, over_time, strict=True)
-        ]
-        marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR, name=tr("radar")))
-        marks += (ends := _ends(own[0], size))
-        east, north = Axis(tr("east, {unit}", unit=unit)), Axis(tr("north, {unit}", unit=unit))
-        made.insert(0, Panel(east, north, tuple(marks), tr("Plan view"), direct=False, equal=True))
-    keys = [(_called(name), style) for name, style in zip(names[:MOST_TRACKS], styles, strict=False)]
-    if len(own) > MOST_TRACKS:
-        keys.append((tr("{count} more", count=len(own) - MOST_TRACKS), styles[-1]))
-    if several:
-        made.append(Panel(_time(), _time(), (), keys=((tr("radar"), RADAR), *keys)))
-    if len(made) > 1 + several:
-        caption = tr("Positions of the plots. Triangle: the radar.")
-        caption += " " + tr("Start and end of the longest track with their times.") if ends else ""
-        caption += " " + tr("Where a file has no heights, slant range replaces ground range.")
-    else:
-        caption = tr("The range of the plots over time; the file does not give their bearing.")
-    columns = min(len(made), 2)
+    farthest = np.nanmax(np.abs(np.concatenate([path.positions for path in paths])))
+    unit, unit_m = ("km", 1e3) if farthest > KILOMETRES_FROM_M else ("m", 1.0)
+    styles = [Style(i if i < MAX_COLOURED_TRACKS else GREY, None, 0, size_pt=1.6) for i in range(len(paths))]
+    view = _PlanView(paths, styles, [_track_label(panels.literal(name)) for name in positions], unit, unit_m)
+    has_plan = np.isfinite(np.concatenate([path.positions[:, :2] for path in paths])).all(axis=1).any()
+    end_labels = _end_labels(paths[0], unit_m) if has_plan else []
+    figure_panels = [_plan_panel(view, end_labels), _range_panel(view)] if has_plan else [_range_panel(view)]
+    if len(paths) > 1:
+        figure_panels.append(_plan_legend(view))
+    columns = min(len(figure_panels), 2)
     width = PAGE_MM if columns > 1 else COLUMN_MM
-    return Figure("plan", tr("Positions"), caption, tuple(made), columns, width, TALL_MM)
+    caption = _plan_caption(bool(has_plan), bool(end_labels))
+    return Figure("plan", tr("Positions"), caption, tuple(figure_panels), columns, width, PLAN_PANEL_MM)
 
 
-def _drawn_paths(track: Track, paths: Mapping[str, Places]) -> list[Places]:
-    """The places of the plots; for a single track whose file has angles of an antenna, its own coordinates."""
+def _plot_names(view: _PlanView) -> list[str]:
+    """The names of the points of each path: of its track, if there are several."""
+    return view.labels if len(view.paths) > 1 else [tr("plots")]
+
+
+def _range_panel(view: _PlanView) -> Panel:
+    lines = [
+        Line(path.t_s, path.positions[:, 2] / view.unit_m, "", style, name=name)
+        for path, style, name in zip(view.paths, view.styles, _plot_names(view), strict=False)
+    ]
+    return Panel(_time_axis(), Axis(tr("range, {unit}", unit=view.unit)), tuple(lines), tr("Range"), direct=False)
+
+
+def _plan_panel(view: _PlanView, end_labels: list) -> Panel:
+    marks: list = [
+        Line(path.positions[:, 1] / view.unit_m, path.positions[:, 0] / view.unit_m, "", style, name=name)
+        for path, style, name in zip(view.paths, view.styles, _plot_names(view), strict=False)
+    ]
+    marks.append(Line(np.zeros(1), np.zeros(1), "", RADAR_STYLE, name=tr("radar")))
+    east, north = Axis(tr("east, {unit}", unit=view.unit)), Axis(tr("north, {unit}", unit=view.unit))
+    return Panel(east, north, (*marks, *end_labels), tr("Plan view"), direct=False, equal=True)
+
+
+def _plan_legend(view: _PlanView) -> Panel:
+    """An empty panel with the legend: the radar, the coloured tracks, and how many are grey."""
+    keys = list(zip(view.labels[:MAX_COLOURED_TRACKS], view.styles, strict=False))
+    if len(view.paths) > MAX_COLOURED_TRACKS:
+        keys.append((tr("{count} more", count=len(view.paths) - MAX_COLOURED_TRACKS), view.styles[-1]))
+    return Panel(_time_axis(), _time_axis(), (), keys=((tr("radar"), RADAR_STYLE), *keys))
+
+
+def _plan_caption(has_plan: bool, has_ends: bool) -> str:
+    if not has_plan:
+        return tr("The range of the plots over time; the file does not give their bearing.")
+    caption = tr("Positions of the plots. Triangle: the radar.")
+    caption += " " + tr("Start and end of the longest track with their times.") if has_ends else ""
+    return caption + " " + tr("Where a file has no heights, slant range replaces ground range.")
+
+
+def _drawable_paths(track: Track, positions: Mapping[str, PlotPositions]) -> list[PlotPositions]:
+    """The positions of the plots of each track.
+
+    If a single track has antenna angles instead of bearings, its plots are computed from estimates and residuals."""
     names = [name for name, _ in track.components]
-    if len(paths) == 1 and {"x", "y", "z"} <= set(names) and track.residual is not None:
-        (path,) = paths.values()
-        if not np.isfinite(path.places[:, :2]).any():
-            at = track.estimate[..., [names.index(axis) for axis in "xyz"]] + track.residual
-            f = int(np.isfinite(at).all(axis=2).sum(axis=1).argmax())
-            there = np.isfinite(at[f]).all(axis=1)
-            x, y, z = at[f, there].T
-            return [Places(track.t_s[there], np.stack([x, z, np.sqrt(x**2 + y**2 + z**2)], axis=1))]
-    return list(paths.values())
+    if len(positions) == 1 and {"x", "y", "z"} <= set(names) and track.residual is not None:
+        (path,) = positions.values()
+        if not np.isfinite(path.positions[:, :2]).any():
+            plots = track.estimate[..., [names.index(axis) for axis in "xyz"]] + track.residual
+            f = int(np.isfinite(plots).all(axis=2).sum(axis=1).argmax())
+            is_complete = np.isfinite(plots[f]).all(axis=1)
+            x, y, z = plots[f, is_complete].T
+            return [PlotPositions(track.t_s[is_complete], np.stack([x, z, np.sqrt(x**2 + y**2 + z**2)], axis=1))]
+    return list(positions.values())
 
 
-def _ends(path: Places, size: float) -> list:
-    """Labels at the first and the last place of a track, on the side away from the track; none at plots of which
-    several have one time, as among false ones: they are no track."""
-    known = np.flatnonzero(np.isfinite(path.places[:, :2]).all(axis=1))
-    if not known.size or (np.diff(path.t_s[known]) == 0).any():
+def _end_labels(path: PlotPositions, unit_m: float) -> list:
+    """Labels at the first and the last position of a track, on the side away from the track.
+
+    Plots that share a time, as false ones do, are no track and get no labels."""
+    placed = np.flatnonzero(np.isfinite(path.positions[:, :2]).all(axis=1))
+    if not placed.size or (np.diff(path.t_s[placed]) == 0).any():
         return []
-    made, third = [], max(len(known) // 3, 1)  # its direction at an end is that of the nearest third
-    ends = ((known[0], known[min(third, len(known) - 1)], tr("start")), (known[-1], known[-third], tr("end")))
-    for i, inner, what in ends:
-        north, east = path.places[i, :2] - path.places[inner, :2]
-        place = ("s" if north >= 0 else "n") + ("e" if east >= 0 else "w")
-        words = tr("{what}, {t_s:g} s", what=what, t_s=path.t_s[i])
-        made.append(Note(path.places[i, 1] / size, path.places[i, 0] / size, words, place))
-    return made
+    third = max(len(placed) // 3, 1)  # the direction at an end is that of the nearest third
+    start = (placed[0], placed[min(third, len(placed) - 1)], tr("start"))
+    labels = []
+    for i, inner, title in (start, (placed[-1], placed[-third], tr("end"))):
+        north, east = path.positions[i, :2] - path.positions[inner, :2]
+        side = ("s" if north >= 0 else "n") + ("e" if east >= 0 else "w")
+        text = tr("{what}, {t_s:g} s", what=title, t_s=path.t_s[i])
+        labels.append(Note(path.positions[i, 1] / unit_m, path.positions[i, 0] / unit_m, text, side))
+    return labels
 
 
 # ---- estimates and their errors --------------------------------------------------------------------------------------
-def estimates(track: Track) -> Figure:
+def estimate_figure(track: Track) -> Figure:
     """A panel for each component: the filters' estimates with their standard deviations, and the plots."""
-    made, every = [], max(1, len(track.components) // max(1, len(track.measured)))
-    for c, (component, own_unit) in enumerate(track.components):
-        marks: list = []
-        factor, unit = panels.in_degrees(own_unit)
-        d, is_value = divmod(c, every)
-        if track.residual is not None and is_value == 0 and d < len(track.measured):
-            plots = track.residual[..., d] + track.estimate[..., c]  # the same for every filter that has an estimate
-            first, known = np.isfinite(plots).argmax(axis=0), np.isfinite(plots).any(axis=0)
-            plots = plots[first, np.arange(plots.shape[1])]
-            marks.append(Line(track.t_s[known], factor * plots[known], "", PLOT, name=tr("plots")))
-        for f, name in enumerate(track.filters[:MOST_FILTERS]):
-            x, half = factor * track.estimate[f, :, c], factor * Z95 * track.sigma[f, :, c]
-            if np.isfinite(x).any():
-                label = panels.literal(name)
-                marks.append(Line(track.t_s, x, "", Style(f, f), x - half, x + half, name=label))
+    figure_panels = []
+    for c in range(len(track.components)):
+        plots = _plots_of_component(track, c)
+        marks = [*([plots] if plots else []), *_estimate_lines(track, c)]
         if marks:
-            y = Axis(panels.with_unit(panels.letter(component), unit), limits=_usual(factor * track.estimate[..., c]))
-            made.append(Panel(_time(), y, tuple(marks), direct=False))
+            component, component_unit = track.components[c]
+            factor, unit = panels.in_degrees(component_unit)
+            limits = _usual_limits(factor * track.estimate[..., c])
+            y = Axis(panels.with_unit(panels.letter(component), unit), limits=limits)
+            figure_panels.append(Panel(_time_axis(), y, tuple(marks), direct=False))
     caption = tr(
         "Estimates over the recorded plots; bands: twice each filter's own standard deviation (95 % if "
         "the filter is consistent)."
     )
-    return _several("track", tr("Track"), caption, made, [(tr("plots"), PLOT), *_keys(track)])
+    keys = [(tr("plots"), PLOT_STYLE), *_filter_keys(track)]
+    return _figure_of_panels("track", tr("Track"), caption, figure_panels, keys)
 
 
-def residuals(track: Track) -> Figure | None:
-    """Plot minus estimate, a panel for each filter and each measured number, between its ± 2 σ bounds."""
+def _plots_of_component(track: Track, c: int) -> Line | None:
+    """The plots in component c: residual plus estimate; None if c is a rate or is not measured."""
+    components_per_number = max(1, len(track.components) // max(1, len(track.measured)))
+    d, derivative = divmod(c, components_per_number)
+    if track.residual is None or derivative or d >= len(track.measured):
+        return None
+    factor, _ = panels.in_degrees(track.components[c][1])
+    plots = track.residual[..., d] + track.estimate[..., c]  # the same for every filter that has an estimate
+    first_filter, has_plot = np.isfinite(plots).argmax(axis=0), np.isfinite(plots).any(axis=0)
+    plots = plots[first_filter, np.arange(plots.shape[1])]
+    return Line(track.t_s[has_plot], factor * plots[has_plot], "", PLOT_STYLE, name=tr("plots"))
+
+
+def _estimate_lines(track: Track, c: int) -> list[Line]:
+    factor, _ = panels.in_degrees(track.components[c][1])
+    lines = []
+    for f, name in enumerate(track.filters[:MAX_FILTERS]):
+        x, half = factor * track.estimate[f, :, c], factor * Z95 * track.sigma[f, :, c]
+        if np.isfinite(x).any():
+            lines.append(Line(track.t_s, x, "", Style(f, f), x - half, x + half, name=panels.literal(name)))
+    return lines
+
+
+def residual_figure(track: Track) -> Figure | None:
+    """Plot minus estimate between its ± 2 σ bounds, a panel for each filter and each measured number."""
     if track.residual is None:
         return None
-    made: list[Panel] = []
-    fitting = max(MOST_RESIDUALS // len(track.measured), 1)
-    for f, filter_name in enumerate(track.filters[:fitting]):
-        for d, (name, own_unit) in enumerate(track.measured):
-            factor, unit = panels.in_degrees(own_unit)
-            known = np.flatnonzero(np.isfinite(track.residual[f, :, d]))
-            if not known.size:
-                continue
-            known = known[:: -(-known.size // MOST_DOTS)]
-            t, miss = track.t_s[known], factor * track.residual[f, known, d]
-            marks: list = [Reference(0.0), Line(t, miss, "", Style(f, None, 0, size_pt=1.8), name=tr("plots"))]
-            if track.residual_sigma is not None and np.isfinite(track.residual_sigma[f, known, d]).any():
-                bound = 2 * factor * track.residual_sigma[f, known, d]
-                marks += [Line(t, bound, "", BOUND, name="± 2 σ"), Line(t, -bound, "", BOUND, name="± 2 σ")]
-            of = tr("residual of {measured}", measured=name.rpartition("_")[0])
-            axis = Axis(panels.with_unit(of, unit), limits=_usual(miss))
-            made.append(Panel(_time(), axis, tuple(marks), panels.literal(filter_name), direct=False))
+    filter_count = max(MAX_RESIDUAL_PANELS // len(track.measured), 1)
+    candidates = [
+        _residual_panel(track, f, d)
+        for f in range(min(filter_count, len(track.filters)))
+        for d in range(len(track.measured))
+    ]
+    figure_panels = [panel for panel in candidates if panel is not None]
     caption = tr(
         "Difference of each plot from the estimate after it. Dashed: twice the filter's own standard "
         "deviation of that difference; 95 % of the plots lie between if the filter is consistent."
     )
-    if (filters := len(track.filters)) > fitting:
-        caption += tr(" The first {fitting} of {filters} filters are drawn.", fitting=fitting, filters=filters)
-    return _several("residuals", tr("Residuals"), caption, made) if made else None
+    if (filters := len(track.filters)) > filter_count:
+        caption += tr(" The first {fitting} of {filters} filters are drawn.", fitting=filter_count, filters=filters)
+    return _figure_of_panels("residuals", tr("Residuals"), caption, figure_panels) if figure_panels else None
 
 
-def innovations(track: Track) -> Figure | None:
-    """The mean of the normalised innovations squared over the last WINDOW plots, a panel for each test."""
+def _residual_panel(track: Track, f: int, d: int) -> Panel | None:
+    """The residuals of filter f in the measured number d; None if it has none."""
+    assert track.residual is not None  # residual_figure has checked it
+    name, measured_unit = track.measured[d]
+    factor, unit = panels.in_degrees(measured_unit)
+    rows = np.flatnonzero(np.isfinite(track.residual[f, :, d]))
+    if not rows.size:
+        return None
+    rows = rows[:: -(-rows.size // MAX_DOTS)]
+    t, residuals = track.t_s[rows], factor * track.residual[f, rows, d]
+    marks: list = [Reference(0.0), Line(t, residuals, "", Style(f, None, 0, size_pt=1.8), name=tr("plots"))]
+    if track.residual_sigma is not None and np.isfinite(track.residual_sigma[f, rows, d]).any():
+        bound = 2 * factor * track.residual_sigma[f, rows, d]
+        marks += [Line(t, bound, "", BOUND_STYLE, name="± 2 σ"), Line(t, -bound, "", BOUND_STYLE, name="± 2 σ")]
+    label = tr("residual of {measured}", measured=name.rpartition("_")[0])
+    axis = Axis(panels.with_unit(label, unit), limits=_usual_limits(residuals))
+    return Panel(_time_axis(), axis, tuple(marks), panels.literal(track.filters[f]), direct=False)
+
+
+def innovation_figure(track: Track) -> Figure | None:
+    """The mean of the normalised innovations squared over the last NIS_WINDOW plots, a panel for each test."""
     if track.nis is None:
         return None
-    made: list[Panel] = []
-    for q, (name, freedom) in enumerate(track.tested):
-        marks: list = [Reference(1.0)]
-        low, high = normalised_bounds(WINDOW * freedom)
-        for f, filter_name in enumerate(track.filters[:MOST_FILTERS]):
-            known = np.flatnonzero(np.isfinite(track.nis[f, :, q]))
-            if len(known) < WINDOW:
-                continue
-            sums = np.cumsum(np.append(0.0, track.nis[f, known, q])) / (WINDOW * freedom)
-            t, mean = track.t_s[known[WINDOW - 1 :]], sums[WINDOW:] - sums[:-WINDOW]
-            marks.append(Line(t, mean, "", Style(f, f), name=panels.literal(filter_name)))
-        if len(marks) > 1:
-            ends = np.array([marks[1].x[0], max(line.x[-1] for line in marks[1:])])
-            marks += [Line(ends, np.full(2, value), "", BOUND, name=tr("bounds")) for value in (low, high)]
-            values = np.concatenate([line.y for line in marks[1:]])
-            ticks = tuple((at, f"{at:g}") for at in TICKS if values.min() <= at <= values.max())
-            y = Axis(tr("mean NIS"), "log", ticks=ticks)
-            made.append(Panel(_time(), y, tuple(marks), panels.literal(name), direct=False))
+    candidates = [_innovation_panel(track, q) for q in range(len(track.tested))]
+    figure_panels = [panel for panel in candidates if panel is not None]
     caption = tr(
         "Normalised innovation squared, averaged over {window} plots: 1 for a consistent filter, whose "
         "averages lie between the dashed bounds in 95 % of cases. Above: plots worse than stated, or a "
         "manoeuvre.",
-        window=WINDOW,
+        window=NIS_WINDOW,
     )
-    keys = [*_keys(track), (tr("bounds"), BOUND)]
-    return _several("nis", tr("Innovations"), caption, made, keys) if made else None
+    keys = [*_filter_keys(track), (tr("bounds"), BOUND_STYLE)]
+    return _figure_of_panels("nis", tr("Innovations"), caption, figure_panels, keys) if figure_panels else None
 
 
-def probabilities(track: Track) -> Figure | None:
+def _innovation_panel(track: Track, q: int) -> Panel | None:
+    """The running means of test q; None if no filter has enough innovations."""
+    assert track.nis is not None  # innovation_figure has checked it
+    name, freedom = track.tested[q]
+    lines: list[Line] = []
+    for f, filter_name in enumerate(track.filters[:MAX_FILTERS]):
+        rows = np.flatnonzero(np.isfinite(track.nis[f, :, q]))
+        if len(rows) < NIS_WINDOW:
+            continue
+        sums = np.cumsum(np.append(0.0, track.nis[f, rows, q])) / (NIS_WINDOW * freedom)
+        t, mean = track.t_s[rows[NIS_WINDOW - 1 :]], sums[NIS_WINDOW:] - sums[:-NIS_WINDOW]
+        lines.append(Line(t, mean, "", Style(f, f), name=panels.literal(filter_name)))
+    if not lines:
+        return None
+    time_range = np.array([lines[0].x[0], max(line.x[-1] for line in lines)])
+    bounds = [
+        Line(time_range, np.full(2, value), "", BOUND_STYLE, name=tr("bounds"))
+        for value in normalised_bounds(NIS_WINDOW * freedom)
+    ]
+    values = np.concatenate([line.y for line in (*lines, *bounds)])
+    ticks = tuple((tick, f"{tick:g}") for tick in NIS_TICKS if values.min() <= tick <= values.max())
+    y = Axis(tr("mean NIS"), "log", ticks=ticks)
+    return Panel(_time_axis(), y, (Reference(1.0), *lines, *bounds), panels.literal(name), direct=False)
+
+
+def probability_figure(track: Track) -> Figure | None:
     """Probabilities of the models, a panel for each multiple-model filter."""
     if track.probability is None:
         return None
-    made = []
+    figure_panels = []
     for f, name in enumerate(track.filters):
-        known = np.isfinite(track.probability[f]).any(axis=0)
-        if known.sum() > 1:
+        has_model = np.isfinite(track.probability[f]).any(axis=0)
+        if has_model.sum() > 1:
             marks = tuple(
                 Line(track.t_s, track.probability[f, :, m], tr("model {number}", number=m + 1), Style(m, m))
-                for m in np.flatnonzero(known).tolist()
+                for m in np.flatnonzero(has_model).tolist()
             )
             y = Axis(tr("probability"), limits=(0, 1))
-            made.append(Panel(_time(), y, marks, panels.literal(name), direct=False))
+            figure_panels.append(Panel(_time_axis(), y, marks, panels.literal(name), direct=False))
+    if not figure_panels:
+        return None
     caption = tr("Probabilities of each filter's models, in the order of the config.")
-    return _several("probabilities", tr("Probabilities of the models"), caption, made[: panels.MOST]) if made else None
+    title = tr("Probabilities of the models")
+    return _figure_of_panels("probabilities", title, caption, figure_panels[: panels.MOST])
 
 
 # ---- accuracy --------------------------------------------------------------------------------------------------------
-LEAST_TESTS = 10  # below which there is no verdict
-FITS, SMALL, LARGE, UNKNOWN = term("fits"), term("too small"), term("too large"), term("too few plots")
-LOST, DOUBT = term("fold lost"), term("too small?")
+MIN_TESTS = 10  # with fewer tests there is no verdict
+FITS, TOO_SMALL, TOO_LARGE = term("fits"), term("too small"), term("too large")
+TOO_FEW_PLOTS, FOLD_LOST, MAYBE_TOO_SMALL = term("too few plots"), term("fold lost"), term("too small?")
 
 
 @dataclass(frozen=True)
 class Judged:
-    """One test: filter, measured number, mean NIS with its bounds for a consistent filter, verdict."""
+    """The test of a filter's innovations in one measured number: its mean NIS, the bounds of that for a consistent
+    filter, and the verdict on the configured σ."""
 
     filter: str
     name: str
@@ -291,72 +366,76 @@ class Judged:
 
 
 def judged(followed: Followed) -> list[Judged]:
-    """Every filter's tests."""
-    found = [_judge(tally) for tally in followed.tallies.values()]
-    return [replace(one, verdict=_of_folds(followed.case, one, found)) for one in found]
+    """The tests of all filters."""
+    all_tests = [_test_innovations(tally) for tally in followed.tallies.values()]
+    return [replace(test, verdict=_verdict_with_folds(followed.case, test, all_tests)) for test in all_tests]
 
 
-def _judge(tally: Tally) -> Judged:
+def _test_innovations(tally: InnovationTally) -> Judged:
     """The verdict at 95 %."""
     lo, hi = map(float, normalised_bounds(max(tally.count * tally.freedom, 1)))
-    verdict = SMALL if tally.mean > hi else LARGE if tally.mean < lo else FITS
-    if tally.count < LEAST_TESTS:
-        verdict = UNKNOWN
+    verdict = TOO_SMALL if tally.mean > hi else TOO_LARGE if tally.mean < lo else FITS
+    if tally.count < MIN_TESTS:
+        verdict = TOO_FEW_PLOTS
     return Judged(tally.filter, tally.name, tally.count, tally.mean, lo, hi, verdict)
 
 
-def _of_folds(case: Case, one: Judged, every: Sequence[Judged]) -> str:
-    """The verdict of a test, that of a filter that decides the folds by itself in the light of what others say."""
-    of = recorded_of(case)
-    folds = {member.name for member in case.spec.members if of.unfolds(member)}
-    if one.verdict != SMALL or one.filter not in folds:
-        return one.verdict
-    return LOST if any(other.name == one.name and other.verdict in (FITS, LARGE) for other in every) else DOUBT
+def _verdict_with_folds(case: Case, test: Judged, all_tests: Sequence[Judged]) -> str:
+    """The verdict of a test; a filter that unfolds velocities by itself may have chosen a wrong fold, which shows where
+    another filter fits the same plots."""
+    interface = recording_interface(case)
+    unfolding_filters = {member.name for member in case.spec.members if interface.unfolds(member)}
+    if test.verdict != TOO_SMALL or test.filter not in unfolding_filters:
+        return test.verdict
+    fits_elsewhere = any(
+        test_of_filter.name == test.name and test_of_filter.verdict in (FITS, TOO_LARGE) for test_of_filter in all_tests
+    )
+    return FOLD_LOST if fits_elsewhere else MAYBE_TOO_SMALL
 
 
 # ---- words -----------------------------------------------------------------------------------------------------------
-DOUBTLESS = 6  # power of ten from which a ratio of likelihoods says no more than that one model is wrong
-EQUAL = 1e-6  # of the log-likelihood: below it two filters are one
-CLEAR = 3.0  # of the log-likelihood, twenty times: from there on one filter is clearly the best
+MAX_RATIO_POWER = 6  # a larger power of ten of a ratio of likelihoods says no more than that one model is wrong
+EQUAL_FILTERS_GAIN = 1e-6  # difference of the log-likelihood below which two filters are the same
+CLEAR_GAIN = 3.0  # difference of the log-likelihood, a factor of twenty, from which one filter is clearly the best
+
+
+class Statement(NamedTuple):
+    """A line for the user: its label, '' if it continues the line above, and its text."""
+
+    label: str
+    text: str
+
+
+def _terminal_lines(statements: Sequence[Statement]) -> list[str]:
+    return [labelled(*statement) for statement in statements]
 
 
 def verdict(followed: Followed, judged: Sequence[Judged], advised: Advice | None) -> list[str]:
-    """The best filter and the changes advised, by the likelihood; where that is not known, the consistent filters."""
-    return consistent(judged) if advised is None else likely(followed, advised)
+    """Lines with the best filter and the changes advised, by the likelihood; without one, the consistent filters."""
+    return _terminal_lines(answer_statements(followed, judged, advised))
+
+
+def answer_statements(followed: Followed, tests: Sequence[Judged], advice: Advice | None) -> list[Statement]:
+    """The best filter and the changes advised, by the likelihood; without one, the consistent filters."""
+    return consistent_filters(tests) if advice is None else advice_statements(followed, advice)
 
 
 def rows(followed: Followed) -> list[str]:
-    """Numbers of rows and tracks, time covered, missing values, and the gaps."""
-    said: list[tuple[str, str]] = []
-    span, first = followed.last_s - followed.first_s, followed.first_s
-    rows = counted(followed.rows)
-    said.append(("plots", tr("{rows} over {span:g} s, from {first:g} s", rows=rows, span=span, first=first)))
-    if followed.tracks:
-        longest = counted(max(one.rows for one in followed.tracks.values()))
-        said.append(("tracks", tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)))
-    if followed.passed_over:
-        said.append(("passed", tr("{rows} outside any track", rows=counted(followed.passed_over))))
-    if followed.again:
-        words = plural("{count} track number", "{count} track numbers", followed.again)
-        said.append(("again", tr("{numbers} used again after a gap: each begins a new track", numbers=words)))
-    if followed.doubles:
-        words = plural("{count} plot", "{count} plots", followed.doubles)
-        said.append(("doubles", tr("{plots} left out: the same scan has one nearer to the track", plots=words)))
-    missing = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
-    if missing:
-        said.append(("missing", ", ".join(missing)))
-    for name, columns in followed.without_plots.items():
-        told = {"name": name, "columns": listed(columns)}
-        said.append(("missing", tr("{name} used no plot, because it needs {columns}: predictions only", **told)))
-    if followed.silent:
-        said.append(
-            ("no rows", tr("{names}: no estimate from these plots", names=few(followed.silent, len(followed.silent))))
-        )
-    if followed.untested:
-        names = few(followed.untested, len(followed.untested))
-        said.append(("untested", tr("{names}: no innovation with a covariance, so no test", names=names)))
+    """Lines with the numbers of rows and tracks, the time covered, missing values, and gaps."""
+    return _terminal_lines(plot_statements(followed))
+
+
+def plot_statements(followed: Followed) -> list[Statement]:
+    """The numbers of rows and tracks, the time covered, missing values, and gaps."""
+    statements = [*_row_statements(followed), *_missing_statements(followed)]
+    if names := followed.filters_without_estimate:
+        text = tr("{names}: no estimate from these plots", names=few(names, len(names)))
+        statements.append(Statement("no rows", text))
+    if names := followed.filters_without_test:
+        text = tr("{names}: no innovation with a covariance, so no test", names=few(names, len(names)))
+        statements.append(Statement("untested", text))
     if followed.gaps:
-        words = tr(
+        text = tr(
             "{count} longer than three times the usual interval of {usual:g} s; the longest {longest:g} s, "
             "after {at:g} s",
             count=followed.gaps,
@@ -364,8 +443,43 @@ def rows(followed: Followed) -> list[str]:
             longest=followed.longest_gap_s,
             at=followed.longest_gap_at_s,
         )
-        said.append(("gaps", words))
-    return [labelled(label, words) for label, words in said]
+        statements.append(Statement("gaps", text))
+    return statements
+
+
+def _row_statements(followed: Followed) -> list[Statement]:
+    """How many rows there are, of how many tracks, and which were not used."""
+    span, first = followed.last_s - followed.first_s, followed.first_s
+    row_count = counted(followed.rows)
+    text = tr("{rows} over {span:g} s, from {first:g} s", rows=row_count, span=span, first=first)
+    statements = [Statement("plots", text)]
+    if followed.tracks:
+        longest = counted(max(result.rows for result in followed.tracks.values()))
+        text = tr("{count}, the longest of {rows}", count=len(followed.tracks), rows=longest)
+        statements.append(Statement("tracks", text))
+    if followed.trackless_rows:
+        text = tr("{rows} outside any track", rows=counted(followed.trackless_rows))
+        statements.append(Statement("passed", text))
+    if followed.reused_numbers:
+        numbers = plural("{count} track number", "{count} track numbers", followed.reused_numbers)
+        text = tr("{numbers} used again after a gap: each begins a new track", numbers=numbers)
+        statements.append(Statement("again", text))
+    if followed.doubles:
+        plots = plural("{count} plot", "{count} plots", followed.doubles)
+        text = tr("{plots} left out: the same scan has one nearer to the track", plots=plots)
+        statements.append(Statement("doubles", text))
+    return statements
+
+
+def _missing_statements(followed: Followed) -> list[Statement]:
+    """The missing values of each column, and the filters whose columns the file has not."""
+    counts = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
+    statements = [Statement("missing", ", ".join(counts))] if counts else []
+    for name, columns in followed.filters_without_plots.items():
+        fields = {"name": name, "columns": listed(columns)}
+        text = tr("{name} used no plot, because it needs {columns}: predictions only", **fields)
+        statements.append(Statement("missing", text))
+    return statements
 
 
 def counted(rows: int) -> str:
@@ -374,30 +488,39 @@ def counted(rows: int) -> str:
 
 
 def errors(followed: Followed) -> list[dict[str, Any]]:
-    """The filters' errors, where the file has the truth: a row each, by column."""
+    """A table of the filters' errors, where the file has the truth: a row each, by column."""
     columns = ("filter", "component", "RMS error", "unit", "of own σ", "estimates")
-    every = [one for one in followed.errors.values() if one.count]
-    rows = [(one.filter, one.component, one.rms, tr(unit_of(one.unit)), one.ratio, one.count) for one in every]
-    return [dict(zip(columns, row, strict=True)) for row in rows]
+    table = [
+        (sums.filter, sums.component, sums.rms, tr(unit_of(sums.unit)), sums.ratio, sums.count)
+        for sums in followed.errors.values()
+        if sums.count
+    ]
+    return [dict(zip(columns, row, strict=True)) for row in table]
 
 
 ERRORS, TESTS = (term("Errors against the truth"), term("Innovations (NIS of a consistent filter: 1)"))
-FINDINGS = {
-    SMALL: term("the plots are less accurate than stated, or the target manoeuvres harder than the filter allows for"),
-    LARGE: term("the plots are more accurate than stated, or the filter allows for harder manoeuvres than occur"),
-    LOST: term("the velocity is unfolded by a wrong number of spans; other filters fit the same plots"),
-    DOUBT: term("a wrong fold, plots less accurate than stated, or harder manoeuvres than allowed for"),
+VERDICT_MEANINGS = {
+    TOO_SMALL: term(
+        "the plots are less accurate than stated, or the target manoeuvres harder than the filter allows for"
+    ),
+    TOO_LARGE: term("the plots are more accurate than stated, or the filter allows for harder manoeuvres than occur"),
+    FOLD_LOST: term("the velocity is unfolded by a wrong number of spans; other filters fit the same plots"),
+    MAYBE_TOO_SMALL: term("a wrong fold, plots less accurate than stated, or harder manoeuvres than allowed for"),
 }
 
 
 def tests(judged: Sequence[Judged]) -> list[dict[str, Any]]:
-    """The tests of the innovations: a row each, by column."""
+    """A table of the tests of the innovations: a row each, by column."""
     columns = ("filter", "number", "plots", "NIS", "95 % from", "95 % to", "stated σ")
-    rows = [(one.filter, one.name, one.tests, one.nis, one.lo, one.hi, tr(one.verdict)) for one in judged if one.tests]
-    return [dict(zip(columns, row, strict=True)) for row in rows]
+    table = [
+        (test.filter, test.name, test.tests, test.nis, test.lo, test.hi, tr(test.verdict))
+        for test in judged
+        if test.tests
+    ]
+    return [dict(zip(columns, row, strict=True)) for row in table]
 
 
-NUMBERS = {  # columns of these, and how they are printed
+NUMBERS = {  # the columns of numbers in these tables, and their formats
     **{"RMS error": "#.4g", "of own σ": "#.3g", "estimates": ".0f"},
     **{"plots": ".0f", "NIS": ".3g", "95 % from": ".3g", "95 % to": ".3g"},
 }
@@ -405,87 +528,101 @@ NUMBERS = {  # columns of these, and how they are printed
 
 def findings(judged: Sequence[Judged]) -> list[str]:
     """The meaning of the verdicts that occur."""
-    there = {one.verdict for one in judged if one.tests}
-    return [f"{tr(verdict)}: {tr(words)}" for verdict, words in FINDINGS.items() if verdict in there]
+    verdicts = {test.verdict for test in judged if test.tests}
+    return [f"{tr(verdict)}: {tr(meaning)}" for verdict, meaning in VERDICT_MEANINGS.items() if verdict in verdicts]
 
 
-def consistent(judged: Sequence[Judged]) -> list[str]:
+def consistent_filters(tests: Sequence[Judged]) -> list[Statement]:
     """The filters that are consistent in all their tests, unless all are."""
     verdicts: dict[str, set[str]] = {}
-    for one in judged:
-        verdicts.setdefault(one.filter, set()).add(one.verdict)
-    fitting = [name for name, found in verdicts.items() if found == {FITS}]
-    words = tr("{names}: consistent in all tests", names=few(fitting, len(fitting)))
-    return [labelled("", words)] if 0 < len(fitting) < len(verdicts) else []
+    for test in tests:
+        verdicts.setdefault(test.filter, set()).add(test.verdict)
+    names = [name for name, own_verdicts in verdicts.items() if own_verdicts == {FITS}]
+    text = tr("{names}: consistent in all tests", names=few(names, len(names)))
+    return [Statement("", text)] if 0 < len(names) < len(verdicts) else []
 
 
-def likely(followed: Followed, advised: Advice) -> list[str]:
+def advice_statements(followed: Followed, advice: Advice) -> list[Statement]:
     """The filter that predicts the plots best, and errors in the numbers of the one that takes most columns."""
-    compared, lines = advised.compared, []
-    if len(compared.behind) > 1 and advised.folding is None:
-        equal = [name for name, gap in compared.behind.items() if gap < EQUAL or name == compared.best]
-        behind = sorted(((n, gap) for n, gap in compared.behind.items() if n not in equal), key=itemgetter(1))
-        alike: dict[str, list[str]] = {}
-        for name, gap in behind:
-            alike.setdefault(times(gap), []).append(name)
-        others = ", ".join(
-            tr("{times} times under {name}", times=so, name=few(own, len(own))) for so, own in alike.items()
-        )
-        words = few(equal, len(equal))
-        if behind and behind[0][1] <= CLEAR:
-            words = tr("{name} (not clearly)", name=words)
-        if behind:
-            words = tr("{best}; the plots are less likely under the others: {others}", best=words, others=others)
-        lines.append(labelled("best", words))
-    if advised.folding is not None:
-        lines.append(labelled("advice", fit.said(advised.folding, followed.case)))
-    elif not advised.findings:
-        words = plural(
+    comparison, statements = advice.comparison, []
+    if len(comparison.log_ratios) > 1 and advice.folding is None:
+        statements.append(Statement("best", _best_filter_text(comparison)))
+    if advice.folding is not None:
+        statements.append(Statement("advice", fit.folding_message(advice.folding, followed.case)))
+    elif not advice.findings:
+        text = plural(
             "the stated values of {filter} agree with {count} row",
             "the stated values of {filter} agree with {count} rows",
-            advised.asked.rows,
-            filter=compared.fullest,
+            advice.used_rows.rows,
+            filter=comparison.most_columns,
         )
-        lines.append(labelled("advice", words))
-    found = [explained(one, compared.fullest) for one in advised.findings]
-    return [*lines, *(labelled("advice", one) for one in found), *_partly(followed, advised.asked)]
+        statements.append(Statement("advice", text))
+    for finding in advice.findings:
+        statements.append(Statement("advice", finding_text(finding, comparison.most_columns)))
+    return [*statements, *_used_rows_statement(followed, advice.used_rows)]
 
 
-def _partly(followed: Followed, asked: Asked) -> list[str]:
-    """The rows behind best filter and advice, where not all."""
-    if asked.rows >= followed.rows:
-        return []
-    words = tr(
-        "from {rows} of {all}, in {stretches} stretches spread over all tracks and the whole time",
-        rows=counted(asked.rows),
-        all=followed.rows,
-        stretches=asked.stretches,
+def _best_filter_text(comparison: FilterComparison) -> str:
+    """The best filters, and how many times less likely the plots are under the others."""
+    gaps = comparison.log_ratios
+    best = [name for name, gap in gaps.items() if gap < EQUAL_FILTERS_GAIN or name == comparison.best]
+    less_likely = sorted(((name, gap) for name, gap in gaps.items() if name not in best), key=itemgetter(1))
+    if not less_likely:
+        return few(best, len(best))
+    names_by_ratio: dict[str, list[str]] = {}
+    for name, gap in less_likely:
+        names_by_ratio.setdefault(times(gap), []).append(name)
+    ratios = ", ".join(
+        tr("{times} times under {name}", times=ratio, name=few(names, len(names)))
+        for ratio, names in names_by_ratio.items()
     )
-    return [labelled("", words)]
+    best_names = few(best, len(best))
+    if less_likely[0][1] <= CLEAR_GAIN:
+        best_names = tr("{name} (not clearly)", name=best_names)
+    return tr("{best}; the plots are less likely under the others: {others}", best=best_names, others=ratios)
+
+
+def _used_rows_statement(followed: Followed, used_rows: UsedRows) -> list[Statement]:
+    """The rows on which best filter and advice rest, unless these are all."""
+    if used_rows.rows >= followed.rows:
+        return []
+    text = tr(
+        "from {rows} of {all}, in {stretches} stretches spread over all tracks and the whole time",
+        rows=counted(used_rows.rows),
+        all=followed.rows,
+        stretches=used_rows.stretches,
+    )
+    return [Statement("", text)]
 
 
 def times(gain: float) -> str:
-    """A likelihood ratio from the difference of the logarithms: 12, 10⁵; beyond doubt, over 10⁶."""
+    """The likelihood ratio of a difference of logarithms, as text: 12, 10⁵, or over 10⁶."""
     power = gain / math.log(10)
-    if power > DOUBTLESS:
-        return tr("over {number}", number=power_of_ten(DOUBTLESS))
+    if power > MAX_RATIO_POWER:
+        return tr("over {number}", number=power_of_ten(MAX_RATIO_POWER))
     if round(power) >= 4:
         return power_of_ten(round(power))
     return significant_digits(math.exp(gain), "#.2g" if gain < math.log(99) else ".0f")
 
 
-def explained(one: Finding, filter_name: str) -> str:
-    """An error in the numbers, in words, and its weight."""
-    told = {"what": what(one.what, one.value), "times": times(one.gain)}
-    if not one.from_zero:
-        told["key"] = one.what
-        words = tr("{key}: the plots cannot distinguish it from zero; that is no reason to lower it", **told)
+def finding_text(finding: Finding, filter_name: str) -> str:
+    """An error in the configured numbers, its weight, and the cost of a smaller manoeuvre variance."""
+    if finding.from_zero:
+        fields = {"what": what(finding.name, finding.value), "times": times(finding.gain)}
+        text = tr("{what}; the plots are then {times} times as likely", **fields)
     else:
-        words = tr("{what}; the plots are then {times} times as likely", **told)
-    turn = one.turning
-    if turn is None:
-        return words
-    cost = tr(
+        text = tr("{key}: the plots cannot distinguish it from zero; that is no reason to lower it", key=finding.name)
+    if finding.turning is None:
+        return text
+    cost = _turn_cost(finding.turning, filter_name)
+    if not finding.from_zero:
+        cost = tr("at {value} {cost}", value=number(finding.value, 2), cost=cost)
+    return f"{text}; {cost}"
+
+
+def _turn_cost(turn: Turning, filter_name: str) -> str:
+    """The largest error in a turn with a changed value, and that with the configured one."""
+    return tr(
         "in a turn of {load:g} g without missed plots the largest error of {filter} in {component} would be {changed}, "
         "not {stated} {unit}",
         load=turn.acceleration_g,
@@ -495,13 +632,10 @@ def explained(one: Finding, filter_name: str) -> str:
         stated=number(turn.stated, 3),
         unit=tr(unit_of(turn.unit)),
     )
-    if not one.from_zero:
-        cost = tr("at {value} {cost}", value=number(one.value, 2), cost=cost)
-    return f"{words}; {cost}"
 
 
 def what(name: str, value: float) -> str:
-    """An error in words: a key, or one of EXPLANATIONS, and its value."""
+    """The text of an explanation: a key with its value, or one of EXPLANATIONS."""
     if name == OUTLIERS:
         share = significant_digits(100 * value, "#.2g")
         return tr("outliers: {share} % of the plots have errors of ten times their σ", share=share)
@@ -527,62 +661,63 @@ def write(
     advised: Advice | None,
     folder: str | os.PathLike,
 ) -> list[str]:
-    """Write the page and `figures/` into a folder; the names of the figures. Raises StoreError, and ConfigError, with
-    nothing written, where a file would overwrite the plots or the config."""
+    """Write the page and `figures/` into a folder, and return the names of the figures.
+
+    Raises StoreError, or, with nothing written, ConfigError where a file would overwrite the plots or the config."""
     from radarsim.report import files, html
     from radarsim.report.figures import draw
 
-    name = os.path.basename(os.fspath(source))
-    drawings = {stem: draw(figure) for stem, figure in figures(followed).items()}
+    source_name = os.path.basename(os.fspath(source))
+    drawings = {name: draw(figure) for name, figure in track_figures(followed).items()}
     page = html.track_page(
         experiment.stem,
-        name,
-        _said(verdict(followed, judged, advised)) or [_unjudged(followed)],
-        _said(rows(followed)),
+        source_name,
+        _sentences(answer_statements(followed, judged, advised)) or [_no_answer_reason(followed)],
+        _sentences(plot_statements(followed)),
         list(drawings.values()),
-        {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), tr("Tracks"): _tracks(followed)},
+        {tr(ERRORS): errors(followed), tr(TESTS): tests(judged), tr("Tracks"): _track_table(followed)},
         html.config_yaml(experiment.resolved),
-        f"radarsim track {_typed(experiment)} {name}",
+        f"radarsim track {_config_argument(experiment)} {source_name}",
     )
     contents = {NAME: page.encode()}
-    for stem, drawing in drawings.items():
-        contents |= {f"figures/{stem}.{kind}": data for kind, data in drawing.files.items()}
+    for name, drawing in drawings.items():
+        contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.files.items()}
     for path in (Path(folder, name) for name in contents):
-        if any(files.same_file(path, one) for one in (source, experiment.path) if one):
+        if any(files.same_file(path, input_file) for input_file in (source, experiment.path) if input_file):
             raise ConfigError(f"{path}: would be overwritten; choose another folder")
     files.replace_all(Path(folder), contents)
     return list(drawings)
 
 
-def _typed(experiment: Experiment) -> str:
-    """A config as it is asked for: a shipped one by its name."""
+def _config_argument(experiment: Experiment) -> str:
+    """The config in a command: a shipped one by its name, others by their path."""
     path = experiment.path
     return path if path and not Path(path).is_relative_to(SHIPPED) else experiment.stem
 
 
-def _unjudged(followed: Followed) -> str:
+def _no_answer_reason(followed: Followed) -> str:
     """Why the plots do not tell which filter is best."""
-    if followed.untested:
+    if followed.filters_without_test:
         return tr("The plots do not tell which filter is best: the filters give no innovation with a covariance.")
     return tr("Too few plots to judge the filters by.")
 
 
-def _said(lines: Sequence[str]) -> list[str]:
-    """Lines of the terminal as sentences: the label of each with a colon, a line without one after that before it."""
-    made: list[str] = []
-    for line in lines:
-        label, _, rest = line.partition("  ")
-        if label:
-            made.append(f"{label[:1].upper()}{label[1:]}: {rest.strip()}")
-        elif made:
-            made[-1] += f", {rest.strip()}"
+def _sentences(statements: Sequence[Statement]) -> list[str]:
+    """Statements as sentences: a label gets a colon, and a statement without one is appended to the previous."""
+    sentences: list[str] = []
+    for statement in statements:
+        label, text = tr(statement.label), statement.text.strip()
+        if statement.label:
+            sentences.append(f"{label[:1].upper()}{label[1:]}: {text}")
+        elif sentences:
+            sentences[-1] += f", {text}"
         else:
-            made.append(rest.strip())
-    return [f"{sentence}." for sentence in made]
+            sentences.append(text)
+    return [f"{sentence}." for sentence in sentences]
 
 
-def _tracks(followed: Followed) -> list[dict[str, object]]:
+def _track_table(followed: Followed) -> list[dict[str, object]]:
     return [
-        {"track": name, "rows": one.rows, "from, s": one.first_s, "to, s": one.last_s, "gaps": one.gaps}
-        for name, one in followed.tracks.items()
+        {"track": name, "rows": result.rows, "from, s": result.first_s, "to, s": result.last_s, "gaps": result.gaps}
+        for name, result in followed.tracks.items()
     ]

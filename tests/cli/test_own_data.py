@@ -85,7 +85,7 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
     measured = [name for name in columns if not name.startswith("true_")][1:]
     for name in measured:
         columns[name] = np.where(rng.random(300) < 0.2, np.nan, columns[name])
-    study = follow.recorded_of(one.cases[0])
+    study = follow.recording_interface(one.cases[0])
     wanted = {name: columns[name] for name in ("t_s", *measured)}
     whole = study.tracker(one.cases[0]).feed(wanted)
     for size in (1, 7, 299):
@@ -93,7 +93,7 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
         pieces = [
             tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
         ]
-        parts = follow.joined(pieces)
+        parts = follow.join_tracks(pieces)
         scale = np.where(whole.sigma > 0, whole.sigma, 1.0)
         assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(whole.estimate))
         assert np.nanmax(np.abs(parts.estimate - whole.estimate) / scale) < track_rounding(whole)
@@ -108,7 +108,7 @@ def test_uneven_times_and_missing_values_are_least_squares_without_a_manoeuvre()
     z[rng.random(z.shape) < 0.3] = np.nan
     z[0] = 1e5, -250
     columns = {"t_s": t, "range_m": z[:, 0], "velocity_mps": z[:, 1]}
-    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = follow.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
     s = t - t[-1]
     rows = [np.stack([np.ones(60), s, s**2 / 2], axis=1) / 250, np.stack([np.zeros(60), np.ones(60), s], axis=1) / 15]
     for f, observed in enumerate((1, 2)):
@@ -126,7 +126,7 @@ def test_a_row_without_a_value_is_extrapolated():
     one = loaded("rls2")
     columns = {"t_s": np.array([0.0, 10, 20, 30, 47]), "range_m": np.array([1e5, 9.7e4, 9.4e4, 9.1e4, np.nan])}
     columns["velocity_mps"] = np.array([-300.0, -300, -300, -300, np.nan])
-    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = follow.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
     for f in range(2):
         r, v, a = track.estimate[f, 3]
         expected = [r + 17 * v + 17**2 / 2 * a, v + 17 * a, a]
@@ -140,7 +140,7 @@ def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
     monkeypatch.setattr(range_doppler_plots, "LONGEST_START", 40)
     t = np.arange(150.0)  # more than a start looks back
     columns = {"t_s": t, "range_m": np.full(150, np.nan), "velocity_mps": np.full(150, 7.0)}
-    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = follow.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
     assert np.isnan(track.estimate[0]).all()
     assert np.array_equal(np.isfinite(track.estimate[1]), np.tile([False, True, False], (150, 1)))
 
@@ -168,17 +168,17 @@ def test_a_wrong_accuracy_is_seen(tmp_path, config, overrides, key, true, factor
     judged = [one for one in accuracy.judged(found) if one.name == name and one.tests]
     assert judged
     for one in judged:
-        assert one.verdict == (accuracy.SMALL if factor < 1 else accuracy.LARGE)
+        assert one.verdict == (accuracy.TOO_SMALL if factor < 1 else accuracy.TOO_LARGE)
 
 
 def test_a_right_accuracy_is_called_so(tmp_path):
     found = followed(tmp_path, "multimodel", ("scans=3000",))
     verdicts = {one.filter: one for one in accuracy.judged(found)}
-    assert verdicts["Kalman-1 5"].verdict == accuracy.SMALL  # its model lags behind a target that falls
+    assert verdicts["Kalman-1 5"].verdict == accuracy.TOO_SMALL  # its model lags behind a target that falls
     assert 0.9 < verdicts["MMA2-122"].nis < 1.1
     for scans in (8, 4):
         few = [one for one in accuracy.judged(followed(tmp_path, "rls2", (f"scans={scans}",))) if one.tests]
-        assert {one.verdict for one in few} == {accuracy.UNKNOWN}
+        assert {one.verdict for one in few} == {accuracy.TOO_FEW_PLOTS}
         assert all(0 <= one.lo < 1 < one.hi for one in few)
 
 

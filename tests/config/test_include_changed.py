@@ -8,7 +8,7 @@ from radarsim.app.configs import load
 from radarsim.config.experiment import canonical
 from radarsim.config.load import new
 from radarsim.errors import ConfigError
-from radarsim.recorded.follow import one_case
+from radarsim.recorded.follow import single_case
 from radarsim.studies import registry
 from tests.tolerances import assert_rounded
 
@@ -160,8 +160,8 @@ def test_of_several_changed_cases_one_is_chosen_with_its_changes(folder, command
     folder("configs/yours.yaml", MINE)
     folder("configs/other.yaml", "include: [mine, yours]\nscans: 20\n")
     with pytest.raises(ConfigError, match=r"choose one of mine, yours: track other --set 'include=\[mine\]'"):
-        one_case(load("other"), "track with", "track {}")
-    assert one_case(load("other", ["include=[mine]"]), "track with", "track {}").spec.scans == 20
+        single_case(load("other"), "track with", "track {}")
+    assert single_case(load("other", ["include=[mine]"]), "track with", "track {}").spec.scans == 20
 
 
 def test_one_of_ones_own_after_what_includes_a_neighbour_is_written_out(folder):
@@ -185,4 +185,4 @@ def test_in_python_a_case_is_chosen_by_its_arguments(folder):
     folder("configs/yours.yaml", MINE)
     folder("configs/other.yaml", "include: [mine, yours]\nscans: 20\n")
     with pytest.raises(ConfigError, match=r"choose one of mine, yours: 'other', overrides=\['include=\[mine\]'\]$"):
-        one_case(load("other"), "track with", "track {}")
+        single_case(load("other"), "track with", "track {}")

@@ -93,4 +93,6 @@ def test_a_borrowed_part_refuses_keys_that_it_does_not_know(place, warm):
 def test_no_shipped_study_refuses_itself():
     for stem in ("rls2", "ambiguous_rls2", "multimodel", "sonar_smoothing", "sonar_clutter"):
         case = load_all([stem], ())[0].cases[0]
-        assert not any(follow.borrowed(case, part) for part in ("tracker", "simulated", "drawing", "likelihood"))
+        assert not any(
+            follow.unknown_inherited_keys(case, part) for part in ("tracker", "simulated", "drawing", "likelihood")
+        )

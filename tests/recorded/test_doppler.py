@@ -9,8 +9,8 @@ import pytest
 from radarsim.app.run import load_all
 from radarsim.cli.outcomes import report
 from radarsim.recorded import follow, plots
-from radarsim.recorded.fit import STEPS, folding, said
-from radarsim.recorded.page import DOUBT, FITS, LOST, judged
+from radarsim.recorded.fit import SPAN_SEARCH_STEPS, detect_folding, folding_message
+from radarsim.recorded.page import FITS, FOLD_LOST, MAYBE_TOO_SMALL, judged
 from tests.program import Terminal, command
 from tests.tolerances import Z, mean_error
 
@@ -49,14 +49,14 @@ def options(*overrides):
 
 @pytest.mark.parametrize("span", [SPAN, None, 20.0], ids=["known", "not known", "known wrongly"])
 def test_the_span_is_that_of_the_config_or_of_the_plots(flown, span):
-    found = folding([folded(flown)], span)
-    assert found.known == (span == SPAN)
+    found = detect_folding([folded(flown)], span)
+    assert found.is_configured == (span == SPAN)
     assert found.velocity_mps <= SPAN / 2
     assert 240 < found.rate_mps < 280
     # 250 m/s is four spans off: a span of 240 m/s, or a whole part of it.
     whole = found.span_mps / SPAN
     # The mean phase of velocities of σ 3 m/s less rates as good; spans are tried in steps of a 200th of a turn.
-    phase = mean_error(0.9 * 148, 3 * np.sqrt(2) / SPAN, z=3) + 1 / (2 * STEPS)
+    phase = mean_error(0.9 * 148, 3 * np.sqrt(2) / SPAN, z=3) + 1 / (2 * SPAN_SEARCH_STEPS)
     assert whole == pytest.approx(round(whole), rel=0, abs=phase)
 
 
@@ -93,7 +93,7 @@ def test_the_settings_that_are_named_unfold_them(flown, tmp_path, monkeypatch, k
 
 def test_of_what_cannot_be_carried_over_no_settings_are_named(flown):
     (one,) = loaded("radar.bias_range_m=3").cases
-    assert said(folding([folded(flown)], SPAN), one).endswith("the config's span is 60.0 m/s")
+    assert folding_message(detect_folding([folded(flown)], SPAN), one).endswith("the config's span is 60.0 m/s")
 
 
 def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path, monkeypatch):
@@ -103,7 +103,7 @@ def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path,
     plots.write_columns(follow.simulated(config), tmp_path / "plots.csv")
     found = follow.follow(config, tmp_path / "plots.csv")
     verdicts = {one.filter: one.verdict for one in judged(found) if one.tests}
-    assert verdicts.pop("nearest fold") == LOST
+    assert verdicts.pop("nearest fold") == FOLD_LOST
     assert set(verdicts.values()) == {FITS}
     for stderr in (False, True):
         screens = {name: Terminal() for name in ("stdout", "stderr")}
@@ -118,7 +118,7 @@ def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path,
     lone = "filters=[{name: nearest, doppler: folded, manoeuvre_variance: 1e-3, hypotheses: 1}]"
     (config,) = load_all(["ambiguous_rls2"], (lone,))
     (one, *_) = judged(follow.follow(config, tmp_path / "plots.csv"))
-    assert one.verdict == DOUBT
+    assert one.verdict == MAYBE_TOO_SMALL
 
 
 def test_import_notices_them_where_the_recording_does_not_say_by_what(flown, tmp_path):
@@ -135,13 +135,13 @@ def test_import_notices_them_where_the_recording_does_not_say_by_what(flown, tmp
 
 
 def test_velocities_of_the_other_sign_are_not_taken_for_folded(flown):
-    assert folding([flown | {"velocity_mps": -flown["velocity_mps"]}]) is None
+    assert detect_folding([flown | {"velocity_mps": -flown["velocity_mps"]}]) is None
 
 
 def noticed(config, realisations, span, fold):
     """Of how many realisations the velocities are said to be folded."""
     seen = (measured(config, i) for i in range(realisations))
-    return sum(folding([folded(one, span) if fold else one], span) is not None for one in seen)
+    return sum(detect_folding([folded(one, span) if fold else one], span) is not None for one in seen)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -173,10 +173,10 @@ def test_a_remainder_needs_no_range():
     slow = "target={kind: random_polynomial, range_m: 2e5, sigma_velocity_mps: 15, sigma_acceleration_mps2: 0.05}"
     (one,) = load_all(["ambiguous_turns"], ("radar.sigma_velocity_mps=0.1", slow))
     case = one.cases[0]
-    columns = dict(follow.recorded_of(case).simulated(case, 0))
+    columns = dict(follow.recording_interface(case).simulated(case, 0))
     columns["range_m"][7] = np.nan
     measured = {name: column for name, column in columns.items() if not name.startswith("true_")}
-    track = follow.recorded_of(case).tracker(case).feed(measured)
+    track = follow.recording_interface(case).tracker(case).feed(measured)
     found, true = track.estimate[track.filters.index("remainder"), 2:, 1], columns["true_Vr_mps"][2:]
     assert abs(columns["velocity_mps"][7] - columns["true_Vr_mps"][7]) > 14
     np.testing.assert_allclose(found, true, rtol=0, atol=Z * 0.1)  # a velocity's σ

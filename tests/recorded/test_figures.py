@@ -9,10 +9,9 @@ import pytest
 from radarsim.app.run import load_all
 from radarsim.language import speaking
 from radarsim.recorded import follow, page
-from radarsim.recorded.plots import MOST, Places, in_plane
+from radarsim.recorded.plots import MAX_FIGURE_ROWS, PlotPositions, plane_positions
 from radarsim.report import html
 from radarsim.report.drawing import Line, Note
-from radarsim.report.wording import labelled
 from tests.program import command
 from tests.recorded import whole
 from tests.tolerances import assert_rounded, share_error
@@ -55,8 +54,8 @@ def test_plan_view_has_equal_units_and_shows_radar_start_and_end():
     t, angle = np.arange(40) * 10.0, np.linspace(0, 3, 40)
     places = np.stack([5e4 * np.cos(angle), 5e4 * np.sin(angle), np.full(40, 5e4)], axis=1)
     one = loaded("rls2", "scans=40")
-    track = follow.recorded_of(one.cases[0]).tracker(one.cases[0]).feed(follow.simulated(one))
-    view, over_time = page.plan(track, {"": Places(t, places)}).panels
+    track = follow.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(follow.simulated(one))
+    view, over_time = page.plan_figure(track, {"": PlotPositions(t, places)}).panels
     assert (view.equal, view.x.label, view.y.label) == (True, "east, km", "north, km")
     lines = {mark.name: mark for mark in view.marks if isinstance(mark, Line)}
     np.testing.assert_array_equal(lines["plots"].x, places[:, 1] / 1e3)
@@ -68,20 +67,20 @@ def test_plan_view_has_equal_units_and_shows_radar_start_and_end():
 
 def test_places_of_plots():
     x, y, z = np.array([3.0]), np.array([12.0]), np.array([4.0])
-    np.testing.assert_array_equal(in_plane({"x_m": x, "y_m": y, "z_m": z}), [[3, 4, 13]])
+    np.testing.assert_array_equal(plane_positions({"x_m": x, "y_m": y, "z_m": z}), [[3, 4, 13]])
     r = np.array([10.0])
     # The angle's cosine is its rounding.
-    assert_rounded(in_plane({"range_m": r, "bearing_rad": np.array([np.pi / 2])}), [[0, 10, 10]], r)
-    assert np.isnan(in_plane({"range_m": r})[0, :2]).all()
-    assert in_plane({"bearing_rad": r}) is None
+    assert_rounded(plane_positions({"range_m": r, "bearing_rad": np.array([np.pi / 2])}), [[0, 10, 10]], r)
+    assert np.isnan(plane_positions({"range_m": r})[0, :2]).all()
+    assert plane_positions({"bearing_rad": r}) is None
 
 
 def test_places_are_thinned():
-    path = Places()
-    for k in range(0, 10 * MOST, 500):
+    path = PlotPositions()
+    for k in range(0, 10 * MAX_FIGURE_ROWS, 500):
         t = np.arange(k, k + 500.0)
         path.add(t, {"range_m": t, "bearing_rad": t * 0})
-    assert MOST // 2 < len(path.t_s) <= MOST
+    assert MAX_FIGURE_ROWS // 2 < len(path.t_s) <= MAX_FIGURE_ROWS
     assert len(set(np.diff(path.t_s))) == 1
 
 
@@ -123,9 +122,13 @@ def test_a_ratio_beyond_doubt_is_no_number_and_a_line_without_label_goes_on():
     assert [page.times(gain * np.log(10)) for gain in (0.3, 1.5, 5.2, 6.1, 3336)] == [
         *("2.0", "32", "10⁵", "over 10⁶", "over 10⁶")
     ]
-    lines = [labelled("no rows", "a: no estimate"), labelled("advice", "--set a=1"), labelled("", "from 5 rows")]
-    assert page._said(lines) == ["No rows: a: no estimate.", "Advice: --set a=1, from 5 rows."]
-    assert page._said([labelled("", "MMA: consistent")]) == ["MMA: consistent."]
+    lines = [
+        page.Statement("no rows", "a: no estimate"),
+        page.Statement("advice", "--set a=1"),
+        page.Statement("", "from 5 rows"),
+    ]
+    assert page._sentences(lines) == ["No rows: a: no estimate.", "Advice: --set a=1, from 5 rows."]
+    assert page._sentences([page.Statement("", "MMA: consistent")]) == ["MMA: consistent."]
 
 
 def test_the_page_is_in_one_language():

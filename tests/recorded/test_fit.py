@@ -10,7 +10,7 @@ from radarsim.app.run import load_all
 from radarsim.errors import ConfigError
 from radarsim.physics import transition
 from radarsim.recorded import fit, follow, page, plots
-from radarsim.recorded.fit import silent
+from radarsim.recorded.fit import no_progress
 from radarsim.report.statistics import Z95
 from radarsim.studies.interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS
 from radarsim.studies.range_doppler.track import PlotLikelihood
@@ -52,7 +52,7 @@ def likelihood(*tracks, config=None):
 
 def test_the_top_is_where_a_grid_has_it():
     """In the plane of both σ, the manoeuvre variance at its best."""
-    found = fit.fitted(one := likelihood(recording(np.random.default_rng(1))))
+    found = fit.fit_keys(one := likelihood(recording(np.random.default_rng(1))))
     best = np.array([key.value for key in found.keys])
     top = one(best)
     assert found.gain == pytest.approx(top - one(one.stated), rel=0, abs=rounding(abs(top), 2))
@@ -67,7 +67,7 @@ def test_the_ends_of_an_interval_are_where_the_profile_falls_by_1_92():
     from scipy.optimize import minimize
     from scipy.stats import chi2
 
-    found = fit.fitted(one := likelihood(recording(np.random.default_rng(2))))
+    found = fit.fit_keys(one := likelihood(recording(np.random.default_rng(2))))
     best = np.array([key.value for key in found.keys])
     for end in (found.keys[0].lo, found.keys[0].hi):
         options = {"xatol": 1e-6, "fatol": 1e-9}
@@ -78,7 +78,7 @@ def test_the_ends_of_an_interval_are_where_the_profile_falls_by_1_92():
             options=options,
         )
         # The search comes as close to an end, in its logarithm; there the profile falls by 4 · 1.92 in its width.
-        allowed = 4 * fit.HALF_CHI2_95 / np.log(found.keys[0].hi / found.keys[0].lo) * fit.CLOSE + options["fatol"]
+        allowed = 4 * fit.HALF_CHI2_95 / np.log(found.keys[0].hi / found.keys[0].lo) * fit.TOLERANCE + options["fatol"]
         assert one(best) + others.fun == pytest.approx(chi2.ppf(0.95, 1) / 2, rel=0, abs=allowed)
 
 
@@ -106,7 +106,7 @@ def test_last_digits_do_not_show_in_the_fit(of_the_model, robust):
     """Of the likelihood a part in 10¹³; of what is found less than the four digits that are printed can show, a part in
     10⁵. The top is known to √(10⁻¹³ · 10³ / 60) = 10⁻⁶: 10³ is the logarithm of the likelihood, 60 its curvature."""
     one = likelihood(recording(np.random.default_rng(1)) if of_the_model else flown("radar.sigma_range_m=500"))
-    mine, theirs = (fit.fitted(of, (OUTLIERS,) * robust) for of in (one, LastDigits(one)))
+    mine, theirs = (fit.fit_keys(of, (OUTLIERS,) * robust) for of in (one, LastDigits(one)))
     for here, there in zip(mine.keys, theirs.keys, strict=True):
         assert (there.lo, there.hi) == pytest.approx((here.lo, here.hi), rel=1e-5)
         if here.identifiable:
@@ -119,7 +119,7 @@ def test_the_end_is_foretold_from_the_beginning(scans, robust):
     """Within a factor of two of all likelihoods, at each of them, and never under what is done."""
     told = []
     track = recording(np.random.default_rng(5)) if scans == 60 else flown(f"scans={scans}")
-    fit.fitted(likelihood(track), (OUTLIERS,) * robust, progress=lambda done, expected: told.append((done, expected)))
+    fit.fit_keys(likelihood(track), (OUTLIERS,) * robust, progress=lambda done, expected: told.append((done, expected)))
     done, expected = np.array(told).T
     np.testing.assert_array_equal(done, np.arange(1, len(done) + 1))
     assert (expected >= done).all()
@@ -130,7 +130,9 @@ def test_the_end_is_foretold_from_the_beginning(scans, robust):
 @pytest.mark.parametrize("allowing", [[], [OUTLIERS], [CORRELATION]])
 def test_the_end_of_several_fits_is_foretold_from_the_beginning(allowing):
     told = []
-    fit.answered(likelihood(flown("scans=200")), None, allowing, lambda done, expected: told.append((done, expected)))
+    fit.fit_likelihood(
+        likelihood(flown("scans=200")), None, allowing, lambda done, expected: told.append((done, expected))
+    )
     done, expected = np.array(told).T
     assert (np.diff(done) > 0).all()
     assert (expected >= done).all()
@@ -142,7 +144,7 @@ def test_what_cannot_be_allowed_for_is_refused_before_anything_is_computed():
     one = likelihood(recording(np.random.default_rng(5)))
     one.explains, told = (), []
     with pytest.raises(ConfigError, match="cannot allow for outliers"):
-        fit.answered(one, None, [OUTLIERS], lambda *counts: told.append(counts))
+        fit.fit_likelihood(one, None, [OUTLIERS], lambda *counts: told.append(counts))
     assert not told
 
 
@@ -151,7 +153,7 @@ def test_a_key_at_zero_is_raised_where_that_makes_the_plots_likelier():
     near = np.linspace(0.99, 1.01, 21)  # the top at zero lies half a per cent from the other, at most
     for i, above in ((12, 0.03), (15, 0.02)):
         one = likelihood(flown("scans=60", realisation=i))
-        found = fit.fitted(one)
+        found = fit.fit_keys(one)
         best = np.array([key.value for key in found.keys])
         assert best[2] > 0
         at_zero = max(one(np.array([r, v, 0.0])) for r in best[0] * near for v in best[1] * near)
@@ -170,7 +172,7 @@ def test_a_key_at_zero_is_raised_where_that_makes_the_plots_likelier():
 def test_what_is_advised_is_the_top(options):
     """Found to a part in 2000, by a parabola through the neighbours: three digits are printed, on every processor."""
     one = likelihood(recording(np.random.default_rng(3), **options))
-    values = {found.what: found.value for found in fit.findings(one)}
+    values = {found.name: found.value for found in fit.find_errors(one)}
     assert values
 
     def at(what, factor):
@@ -189,11 +191,11 @@ def test_all_plots_as_outliers_are_no_fit():
     from wherever the search begins."""
     one = likelihood(recording(np.random.default_rng(1)))
     for share in (0.05, 0.95):
-        search = fit._Search(one, True, silent)
+        search = fit.LikelihoodSearch(one, True, no_progress)
         mirrored = search.best + np.array([*[np.log(0.1)] * 2, 0.0, np.log(share / (1 - share)) - search.best[3]])
-        at, top = search._climbed(mirrored, None, fit.CLOSE)
-        assert search.natural(at)[3] <= 0.5
-        assert top <= search.top + fit.CLOSE
+        at, top = search._climb(mirrored, None, fit.TOLERANCE)
+        assert search.to_values(at)[3] <= 0.5
+        assert top <= search.top + fit.TOLERANCE
 
 
 def test_an_end_is_found_where_another_key_has_to_rise_from_zero():
@@ -202,7 +204,7 @@ def test_an_end_is_found_where_another_key_has_to_rise_from_zero():
     from scipy.optimize import minimize_scalar
 
     one = likelihood(flown("radar.sigma_range_m=500"))
-    found = fit.fitted(one)
+    found = fit.fit_keys(one)
     best = np.array([key.value for key in found.keys])
 
     def profile(sigma_range):
@@ -225,7 +227,7 @@ def test_an_end_is_found_where_outliers_have_to_rise_from_none():
     from scipy.optimize import minimize
 
     one = likelihood(recording(np.random.default_rng(3)))
-    found = fit.fitted(one, [OUTLIERS])
+    found = fit.fit_keys(one, [OUTLIERS])
     assert found.outliers == 0
     best, lo = np.array([key.value for key in found.keys]), found.keys[2].lo
 
@@ -244,7 +246,7 @@ def test_an_end_is_found_where_outliers_have_to_rise_from_none():
 def test_a_straight_flight_has_no_manoeuvre_variance(tmp_path):
     """The plots of the config's own target: an upper end, and no lower one."""
     columns = follow.simulated(loaded())
-    found = fit.fitted(likelihood({name: columns[name] for name in ("t_s", "range_m", "velocity_mps")}))
+    found = fit.fit_keys(likelihood({name: columns[name] for name in ("t_s", "range_m", "velocity_mps")}))
     sigma_range, sigma_velocity, manoeuvre = found.keys
     assert sigma_range.identifiable
     assert sigma_velocity.lo < 15 < sigma_velocity.hi
@@ -256,7 +258,7 @@ def test_a_straight_flight_has_no_manoeuvre_variance(tmp_path):
 def test_outliers_do_not_break_the_robust_fit():
     """Twenty plots in a hundred at ten σ: the plain fit is fooled, the robust one holds σ and finds their share."""
     tracks = [recording(np.random.default_rng(seed), share=0.2) for seed in range(4)]
-    plain, robust = (fit.fitted(likelihood(*tracks), (OUTLIERS,) * robust) for robust in (False, True))
+    plain, robust = (fit.fit_keys(likelihood(*tracks), (OUTLIERS,) * robust) for robust in (False, True))
     assert plain.outliers is None
     for one, key in zip(robust.keys, plain.keys, strict=True):
         assert one.lo < STATED[one.key] < one.hi
@@ -271,7 +273,7 @@ def test_intervals_cover():
     rng, config = np.random.default_rng(11), loaded()
     held = np.zeros(3)
     for _ in range(1000):
-        found = fit.fitted(likelihood(recording(rng), config=config))
+        found = fit.fit_keys(likelihood(recording(rng), config=config))
         held += [one.lo <= STATED[one.key] <= one.hi for one in found.keys]
     assert np.all(np.abs(held / 1000 - 0.95) < share_error(0.95, 1000, z=3)), held
 
@@ -289,7 +291,7 @@ def advised(tmp_path, columns, config=None):
 
 def named_first(found):
     """The first explanation, or "nothing"."""
-    return found.findings[0].what if found.findings else "nothing"
+    return found.findings[0].name if found.findings else "nothing"
 
 
 FAULTS = [
@@ -314,14 +316,14 @@ OF_FAULTS = pytest.mark.parametrize(
 @OF_FAULTS
 def test_the_wrong_number_is_named(tmp_path, options, expected):
     found, _ = advised(tmp_path, recording(np.random.default_rng(3), **options))
-    assert found.compared.fullest == "r+Vr"  # whichever predicts the ranges best
+    assert found.comparison.most_columns == "r+Vr"  # whichever predicts the ranges best
     assert named_first(found) == expected
     if expected in STATED:
         off = np.log(found.findings[0].value / STATED[expected] / options["changed"][expected])
         if "sigma" in expected:
             assert abs(off) < sigma_error(SCANS)
         else:  # as far as the interval, in standard errors
-            key = fit.fitted(likelihood(recording(np.random.default_rng(3), **options))).keys[2]
+            key = fit.fit_keys(likelihood(recording(np.random.default_rng(3), **options))).keys[2]
             assert abs(off) < np.log(key.hi / key.lo) / 2 / Z95 * Z
 
 
@@ -336,7 +338,7 @@ def test_the_wrong_number_is_named_in_95_of_100(tmp_path, options, expected):
 
 def test_an_all_clear_says_whose_numbers_it_clears(tmp_path):
     found, followed = advised(tmp_path, recording(np.random.default_rng(4)))
-    (line,) = (line for line in page.likely(followed, found) if line.startswith("advice"))
+    (line,) = (text for label, text in page.advice_statements(followed, found) if label == "advice")
     assert "the stated values of r+Vr agree with 60 rows" in line
 
 
@@ -346,13 +348,13 @@ def test_a_quiet_recording_is_no_reason_to_lower_the_manoeuvre_variance(tmp_path
     columns = follow.simulated(config)
     found, followed = advised(tmp_path, columns, config)
     (one,) = found.findings
-    assert (one.what, one.from_zero) == ("manoeuvre_variance", False)
-    text = "\n".join(page.likely(followed, found))
+    assert (one.name, one.from_zero) == ("manoeuvre_variance", False)
+    text = "\n".join(text for _, text in page.advice_statements(followed, found))
     assert "--set" not in text
     assert "the plots cannot distinguish it from zero" in text
     assert "in a turn of 3 g without missed plots the largest error of r+Vr in r would be" in text
     # As `fit` has it, whose interval has no lower end.
-    assert fit.fitted(likelihood(columns, config=config)).keys[2].lo == 0
+    assert fit.fit_keys(likelihood(columns, config=config)).keys[2].lo == 0
 
 
 @pytest.mark.parametrize("seed", [5, 2017])
@@ -361,7 +363,7 @@ def test_what_is_not_told_from_zero_has_an_upper_end(seed):
     radar = (f"radar.{key}" for key in ("sigma_range_m=60", "sigma_velocity_mps=3", "scan_period_s=4"))
     config = loaded("scans=120", "target={kind: polynomial, coefficients: [160e3, -250]}", f"seed={seed}", *radar)
     told = likelihood(follow.simulated(config), config=config)
-    *sigmas, key = fit.fitted(told).keys
+    *sigmas, key = fit.fit_keys(told).keys
     assert key.lo == 0
     assert key.hi < key.stated  # ten times which is not held to be possible
     at = [told(np.array([*(one.value for one in sigmas), value])) for value in (key.hi, 10 * key.hi)]
@@ -387,14 +389,16 @@ def test_a_sigma_of_bearing_that_the_plots_tell_is_advised(tmp_path):
     north, east = 3000 + rng.normal(0, 8, 60), 5.14 * t + rng.normal(0, 8, 60)
     columns = {"t_s": t, "range_m": np.hypot(north, east), "bearing_rad": np.arctan2(east, north)}
     found, _ = advised(tmp_path, columns, config)
-    values = {one.what: one.value for one in found.findings if one.from_zero}
+    values = {one.name: one.value for one in found.findings if one.from_zero}
     assert values["sensor.sigma_range_m"] == pytest.approx(8, rel=sigma_error(60, z=3))
     assert values["sensor.sigma_bearing_rad"] == pytest.approx(8 / 3500, rel=sigma_error(60, z=3))
 
 
 def test_what_a_turn_costs_is_the_exact_error_in_it():
     """Of a run over that turn, by the config's keys."""
-    found = follow.recorded_of(loaded().cases[0]).in_a_turn(loaded().cases[0], "r+Vr", {"manoeuvre_variance": 1e-5})
+    found = follow.recording_interface(loaded().cases[0]).in_a_turn(
+        loaded().cases[0], "r+Vr", {"manoeuvre_variance": 1e-5}
+    )
     turned = np.radians(90) / (3 * 9.80665 / 250)
     scans = 120 + int(np.ceil(turned / T))
     target = {"kind": "turn", "range_m": 250 * T * scans + 60e3, "speed_mps": 250, "aspect_deg": 180,
@@ -407,29 +411,29 @@ def test_what_a_turn_costs_is_the_exact_error_in_it():
 
 
 def test_advice_of_part_of_the_rows_says_of_which(tmp_path, monkeypatch):
-    monkeypatch.setattr(type(follow.recorded_of(loaded().cases[0])), "rows_asked", 40)
+    monkeypatch.setattr(type(follow.recording_interface(loaded().cases[0])), "rows_asked", 40)
     found, followed = advised(tmp_path, recording(np.random.default_rng(5)))
     said = "from {} rows of {}, in {} stretches spread over all tracks and the whole time"
-    assert said.format(40, 60, 1) in page.likely(followed, found)[-1]
+    assert said.format(40, 60, 1) in page.advice_statements(followed, found)[-1].text
     rows = [row + (f",{name}" if i else ",track")
             for name in "abc" for i, row in enumerate((tmp_path / "advised.csv").read_text().splitlines())
             if i or name == "a"]  # fmt: skip
     (tmp_path / "several.csv").write_text("\n".join(rows))
     followed = follow.follow(loaded(), tmp_path / "several.csv", threads=1)
-    monkeypatch.setattr(type(follow.recorded_of(loaded().cases[0])), "rows_asked", 120)
-    assert said.format(120, 180, 3) in page.likely(followed, fit.advised(followed))[-1]
+    monkeypatch.setattr(type(follow.recording_interface(loaded().cases[0])), "rows_asked", 120)
+    assert said.format(120, 180, 3) in page.advice_statements(followed, fit.advised(followed))[-1].text
 
 
 def test_what_is_asked_is_spread_over_all_tracks_and_their_whole_time():
     """Of 5 tracks of 3000 rows, kept in blocks: 1000 rows of all of them, from each quarter of their time."""
     sample = []
     for number in range(5):
-        one = follow.Sample()
+        one = follow.RowSample()
         for start in range(0, 3000, 7):
             one.add({"t_s": np.arange(start, min(start + 7, 3000)) + 1e4 * number})
         assert len(one.columns["t_s"]) == 3000
         sample += one.stretches()
-    chosen = fit.some(sample, 1000)
+    chosen = fit.sample_rows(sample, 1000)
     times = np.concatenate([one["t_s"] for one in chosen])
     assert 900 <= len(times) <= 1000
     for number in range(5):
@@ -439,27 +443,27 @@ def test_what_is_asked_is_spread_over_all_tracks_and_their_whole_time():
 
 
 def test_a_long_track_is_kept_in_blocks_over_its_whole_time():
-    one = follow.Sample()
+    one = follow.RowSample()
     for start in range(0, 30_000, 1000):
         one.add({"t_s": np.arange(start, start + 1000.0)})
     kept = one.columns["t_s"]
-    assert 2500 <= len(kept) <= follow.SAMPLE
+    assert 2500 <= len(kept) <= follow.SAMPLE_ROWS
     assert kept[-1] > 29_000
-    assert all(len(part["t_s"]) == follow.BLOCK and np.ptp(part["t_s"]) == 99 for part in one.stretches())
+    assert all(len(part["t_s"]) == follow.BLOCK_ROWS and np.ptp(part["t_s"]) == 99 for part in one.stretches())
 
 
 def test_the_best_filter_of_a_target_that_turns_late_is_that_of_the_turn(tmp_path, monkeypatch):
     """The first rows alone, which are straight, are likeliest under the filter that allows for no manoeuvre."""
     config = loaded("filters=[{name: calm, observes: [range], manoeuvre_variance: 1e-8},"
                     "{name: agile, observes: [range], manoeuvre_variance: 1}]")  # fmt: skip
-    monkeypatch.setattr(fit, "findings", lambda *given: [])
+    monkeypatch.setattr(fit, "find_errors", lambda *given: [])
     rng, t = np.random.default_rng(8), T * np.arange(8000.0)
     r = 1e9 + 250 * t + np.where(t > 6e4, 5e4 * np.cos(2 * np.pi * (t - 6e4) / 600) - 5e4, 0.0)
     columns = {"t_s": t, "range_m": r + 250 * rng.normal(size=t.size), "velocity_mps": np.full(t.size, np.nan)}
     found, _ = advised(tmp_path, columns, config)
-    assert found.compared.best == "agile"
+    assert found.comparison.best == "agile"
     first, _ = advised(tmp_path, {name: column[:3000] for name, column in columns.items()}, config)
-    assert first.compared.best == "calm"
+    assert first.comparison.best == "calm"
 
 
 # ---- outliers and errors that last -----------------------------------------------------------------------------------
@@ -490,7 +494,7 @@ def test_both_are_allowed_for_where_both_are_plain():
     for one in tracks:
         for name, key in (("range_m", "radar.sigma_range_m"), ("velocity_mps", "radar.sigma_velocity_mps")):
             one[name] += (rng.random(SCANS) < 0.05) * 10 * STATED[key] * rng.normal(size=SCANS)
-    found = fit.answered(likelihood(*tracks))
+    found = fit.fit_likelihood(likelihood(*tracks))
     *keys, time = found.keys
     assert found.outliers == pytest.approx(0.05, abs=share_error(0.05, 4 * SCANS * 2, z=3))
     assert time.lo < -T / np.log(0.6) < time.hi
@@ -507,8 +511,8 @@ def test_outliers_are_allowed_for_where_there_are_some_alone():
     rng, config = np.random.default_rng(41), loaded()
     for share, tracks, count, least, most in ((0, 1, 200, 0, 2), (0.04, 1, 100, 90, 100), (0.04, 3, 50, 48, 50)):
         drawn = ([recording(rng, share=share) for _ in range(tracks)] for _ in range(count))
-        found = [fit.fitted(likelihood(*one, config=config)).beside for one in drawn]
-        switched = sum(one is not None and one.what == OUTLIERS and one.gain > fit.PLAIN for one in found)
+        found = [fit.fit_keys(likelihood(*one, config=config)).beside for one in drawn]
+        switched = sum(one is not None and one.name == OUTLIERS and one.gain > fit.PLAIN_GAIN for one in found)
         assert least <= switched <= most, switched
 
 
@@ -521,12 +525,12 @@ def test_the_interval_of_a_correlation_time_covers():
     true = STATED | {fit.CORRELATION_TIME: -T / np.log(0.6)}
     held, plain = np.zeros(4), np.zeros(3)
     for _ in range(400):
-        found = fit.answered(likelihood(recording(rng, correlation=0.6), config=config), allowing=[CORRELATION])
+        found = fit.fit_likelihood(likelihood(recording(rng, correlation=0.6), config=config), allowing=[CORRELATION])
         held += [one.lo <= true[one.key] <= one.hi for one in found.keys]
         plain += [one.lo <= true[one.key] <= one.hi for one in found.plain.keys]
     assert np.all(np.abs(held / 400 - 0.95) < share_error(0.95, 400, z=3)), held
     assert plain[0] < 0.8 * 400, plain
-    sound = [fit.fitted(likelihood(recording(rng), config=config), [CORRELATION]).keys[3] for _ in range(100)]
+    sound = [fit.fit_keys(likelihood(recording(rng), config=config), [CORRELATION]).keys[3] for _ in range(100)]
     assert sum(one.lo == 0 and not one.identifiable for one in sound) >= 93
 
 
@@ -545,7 +549,7 @@ def test_a_fit_notices_errors_that_last_in_95_of_100():
     rng, config = np.random.default_rng(31), loaded()
     for correlation, least in ((0.6, 95), (0.0, 93)):
         found = [
-            fit.fitted(likelihood(recording(rng, correlation=correlation), config=config)).beside for _ in range(100)
+            fit.fit_keys(likelihood(recording(rng, correlation=correlation), config=config)).beside for _ in range(100)
         ]
         right = [one[0] == CORRELATION if correlation and one else (one is None) == (not correlation) for one in found]
         assert sum(right) >= least, sum(right)
@@ -556,8 +560,8 @@ def test_a_turning_target_needs_another_manoeuvre_variance_not_another_sigma():
     config = loaded("target=turn", "scans=40", "radar.sigma_range_m=60", "radar.sigma_velocity_mps=2")
     columns = follow.simulated(config)
     measured = {name: columns[name] for name in ("t_s", "range_m", "velocity_mps")}
-    found = fit.findings(likelihood(measured, config=config))
-    assert found[0].what == "manoeuvre_variance"
+    found = fit.find_errors(likelihood(measured, config=config))
+    assert found[0].name == "manoeuvre_variance"
     assert found[0].value > 1e-2
 
 
@@ -566,10 +570,10 @@ def test_the_best_filter_is_that_which_foretells_best():
                     "{name: right, observes: [range], manoeuvre_variance: 0.1},"
                     "{name: both, observes: [range, velocity], manoeuvre_variance: 0.1}]")  # fmt: skip
     track = recording(np.random.default_rng(6), {"manoeuvre_variance": 100})
-    found = fit.compared([PlotLikelihood(config.cases[0], name, [track]) for name in ("calm", "right", "both")])
+    found = fit.compare_filters([PlotLikelihood(config.cases[0], name, [track]) for name in ("calm", "right", "both")])
     assert found.best == "both"
-    assert found.behind["both"] == 0
-    assert 0 < found.behind["right"] < found.behind["calm"]
+    assert found.log_ratios["both"] == 0
+    assert 0 < found.log_ratios["right"] < found.log_ratios["calm"]
 
 
 # ---- the command -----------------------------------------------------------------------------------------------------
@@ -670,7 +674,7 @@ def test_a_fixed_target_in_two_steps_is_fitted_whatever_the_config_states(tmp_pa
         assert (found[-1][1].lo, found[-1][1].identifiable) == (0.0, False)
     for one, other in zip(*found, strict=True):
         # The search comes as close to an end, in its logarithm; where there is none, zero is exact.
-        assert (one.lo, one.hi) == pytest.approx((other.lo, other.hi), rel=2 * fit.CLOSE, abs=0)
+        assert (one.lo, one.hi) == pytest.approx((other.lo, other.hi), rel=2 * fit.TOLERANCE, abs=0)
 
 
 def test_plots_that_tell_no_sigma_are_refused(tmp_path):

@@ -37,7 +37,7 @@ def tracks_of(path, config="rls2"):
     """What was found, and the estimates (F, n, C) by track."""
     parts = {}
     followed = follow.follow(loaded(config), path, lambda track, name: parts.setdefault(name, []).append(track))
-    return followed, {name: follow.joined(own).estimate for name, own in parts.items()}
+    return followed, {name: follow.join_tracks(own).estimate for name, own in parts.items()}
 
 
 def test_each_track_is_followed_by_itself(tmp_path, realisations):
@@ -49,7 +49,7 @@ def test_each_track_is_followed_by_itself(tmp_path, realisations):
     path.write_text("\n".join(lines))
     followed, together = tracks_of(path)
     assert set(followed.tracks) == {"a", "b"}
-    assert (followed.rows, followed.passed_over) == (120, 60)
+    assert (followed.rows, followed.trackless_rows) == (120, 60)
     for name in ("a", "b"):
         alone, own = tracks_of(written(tmp_path / f"{name}.csv", {name: tables[name]}))
         np.testing.assert_array_equal(together[name], own[name])
@@ -109,12 +109,12 @@ def numbered(path, *parts):
 @pytest.mark.parametrize("size", [7, 20_000])
 def test_a_number_used_again_after_a_gap_is_another_track(tmp_path, monkeypatch, realisations, size):
     """Each as if it were alone; told once; a gap of ten scans is none."""
-    monkeypatch.setattr(follow.plots, "CHUNK", size)
+    monkeypatch.setattr(follow.plots, "CHUNK_ROWS", size)
     first, second = ({key: one[key].copy() for key in ("t_s", "range_m", "velocity_mps")} for one in realisations[:2])
     second["t_s"] += first["t_s"][-1] + 3524.0
     second["range_m"] += 150e3
     followed, together = tracks_of(numbered(tmp_path / "again.csv", first, second))
-    assert (list(followed.tracks), followed.again) == (["7", "7 (2)"], 1)
+    assert (list(followed.tracks), followed.reused_numbers) == (["7", "7 (2)"], 1)
     for name, one in (("7", first), ("7 (2)", second)):
         _, alone = tracks_of(numbered(tmp_path / "alone.csv", one))
         np.testing.assert_array_equal(together[name], alone["7"])
@@ -122,14 +122,14 @@ def test_a_number_used_again_after_a_gap_is_another_track(tmp_path, monkeypatch,
     assert "1 track number used again after a gap: each begins a new track" in line
     hole = {key: np.delete(first[key], np.arange(20, 30)) for key in first}
     followed, _ = tracks_of(numbered(tmp_path / "hole.csv", hole))
-    assert (list(followed.tracks), followed.again, followed.gaps) == (["7"], 0, 1)
+    assert (list(followed.tracks), followed.reused_numbers, followed.gaps) == (["7"], 0, 1)
 
 
 @pytest.mark.parametrize("size", [7, 20_000])
 @pytest.mark.parametrize("late_s", [0.0, 3.0, -3.0])
 def test_of_several_plots_of_a_scan_the_one_on_the_track_is_kept(tmp_path, monkeypatch, realisations, size, late_s):
     """Reflections 20 km off, at the plot's time or before or after it: as if they were not there, and counted."""
-    monkeypatch.setattr(follow.plots, "CHUNK", size)
+    monkeypatch.setattr(follow.plots, "CHUNK_ROWS", size)
     sound = {key: realisations[0][key] for key in ("t_s", "range_m", "velocity_mps")}
     ghosts = {key: column[10::9].copy() for key, column in sound.items()}
     ghosts["range_m"] += 20e3

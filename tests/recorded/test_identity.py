@@ -18,7 +18,7 @@ def flight(x=0.0, z=50e3, speed=200.0, t=T):
 
 def paths(*aircraft):
     """Of aircraft: fixes, and identities by KINDS."""
-    made = identity.Paths()
+    made = identity.AircraftPaths()
     for number, (fixes, names) in enumerate(aircraft):
         made.add(fixes, [str(number)] * len(fixes), {kind: [name] * len(fixes) for kind, name in names.items()})
     return made
@@ -58,8 +58,8 @@ A, B = {"address": "4ca1fa"}, {"address": "3c6444"}
 def test_whose_a_plot_is(aircraft, plot, wanted):
     one = found(paths(*aircraft), HERE, plot)
     path, kind = wanted or (-1, -1)
-    assert set(one.path) == {path}
-    assert set(one.kind) == {kind}
+    assert set(one.path_numbers) == {path}
+    assert set(one.kind_numbers) == {kind}
     if wanted:
         t = T[1:-1] + 1
         fixes = aircraft[path][0]
@@ -73,23 +73,23 @@ def test_whose_a_plot_is(aircraft, plot, wanted):
 
 def test_a_code_is_its_aircrafts_only_while_it_is_set():
     """An aircraft takes another code half-way, another aircraft near it then takes the first."""
-    made, half = identity.Paths(), len(T) // 2
+    made, half = identity.AircraftPaths(), len(T) // 2
     codes = ["0421"] * half + ["0533"] * half
     made.add(HERE, ["1"] * len(T), {"address": ["4ca1fa"] * len(T), "mode_3a": codes})
-    assert set(found(made, HERE, {"mode_3a": "0421"}, t=np.array([20.0])).path) == {0}
+    assert set(found(made, HERE, {"mode_3a": "0421"}, t=np.array([20.0])).path_numbers) == {0}
     late = flight(t=T + 1000)
     made.add(late, ["1"] * len(T), {"address": ["4ca1fa"] * len(T), "mode_3a": ["0533"] * len(T)})
-    assert set(found(made, late, {"mode_3a": "0421"}, t=T[3:5] + 1000).path) == {-1}
-    assert set(found(made, late, {"mode_3a": "0533"}, t=T[3:5] + 1000).path) == {0}
+    assert set(found(made, late, {"mode_3a": "0421"}, t=T[3:5] + 1000).path_numbers) == {-1}
+    assert set(found(made, late, {"mode_3a": "0533"}, t=T[3:5] + 1000).path_numbers) == {0}
 
 
 def test_a_track_keeps_its_address_where_a_record_does_not_repeat_it():
-    made = identity.Paths()
+    made = identity.AircraftPaths()
     addresses = ["4ca1fa" if k % 3 == 0 else "" for k in range(len(T))]
     made.add(HERE, ["7"] * len(T), {"address": addresses, "mode_3a": ["0421"] * len(T)})
     assert made.names() == ["4ca1fa"]
     assert sum(map(len, made.paths[0].fixes)) == len(T)
-    assert set(found(made, HERE, {"mode_3a": "0421"}).path) == {0}
+    assert set(found(made, HERE, {"mode_3a": "0421"}).path_numbers) == {0}
 
 
 def table(tmp_path, name, flown):

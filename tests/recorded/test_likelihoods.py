@@ -10,7 +10,7 @@ from radarsim.app.run import load_all
 from radarsim.kernels.hypotheses import FACTOR, lasting, log_likelihood
 from radarsim.physics import manoeuvre_covariance, transition
 from radarsim.recorded import fit, follow
-from radarsim.recorded.follow import recorded_of
+from radarsim.recorded.follow import recording_interface
 from radarsim.studies.multimodel.world import start_weights
 from radarsim.studies.sonar import world
 from tests.tolerances import Z, assert_rounded, polynomial_condition, rounding, scaled_condition
@@ -29,7 +29,7 @@ def recording(config, *overrides, number=0):
 
 
 def likelihood(case, name, *tracks):
-    return recorded_of(case).likelihood(case, name, list(tracks))
+    return recording_interface(case).likelihood(case, name, list(tracks))
 
 
 def density_size(off, spread):
@@ -210,7 +210,7 @@ def test_errors_of_a_sonar_that_last_have_the_density_of_their_correlations():
         expected += density(off, spread) - density(off[:2], spread[:2, :2])
         size += density_size(off, spread)
     assert_rounded(one(one.stated, correlation=rho), expected, size, operations=len(t))
-    timed = fit.Correlated(one)
+    timed = fit.CorrelatedLikelihood(one)
     assert_rounded(timed(np.append(one.stated, -usual / np.log(rho))), expected, size, operations=len(t))
     assert timed(np.append(one.stated, 0.0)) == one(one.stated)
 
@@ -230,17 +230,17 @@ def test_a_wrong_error_of_the_sonar_is_named_and_fitted(key, true):
     wrong = [f"{key}={true}"] if key else []
     columns = recording("sonar_smoothing", "frame=cartesian", "scans=80", *wrong)
     one = likelihood(case, "growing", columns)
-    found = fit.findings(one)
-    assert [finding.what for finding in found] == ([key] if key else [])
+    found = fit.find_errors(one)
+    assert [finding.name for finding in found] == ([key] if key else [])
     if key:
-        (fitted,) = (each for each in fit.fitted(one).keys if each.key == key)
+        (fitted,) = (each for each in fit.fit_keys(one).keys if each.key == key)
         assert fitted.lo < true < fitted.hi
         assert fitted.hi / fitted.lo < 1.6
 
 
 def test_a_course_without_manoeuvres_does_not_tell_their_variance():
     case = loaded("sonar_smoothing")
-    *_, manoeuvre = fit.fitted(likelihood(case, "kalman q", recording("sonar_smoothing"))).keys
+    *_, manoeuvre = fit.fit_keys(likelihood(case, "kalman q", recording("sonar_smoothing"))).keys
     assert (manoeuvre.key, manoeuvre.lo, manoeuvre.identifiable) == ("filters.4.manoeuvre_variance", 0.0, False)
 
 
@@ -349,7 +349,7 @@ def test_the_multimodel_likelihood_is_best_of_the_filter_that_fits_and_at_the_tr
     """The case that misled: the advice named the second best filter."""
     case, columns = loaded("multimodel_1hz"), recording("multimodel_1hz", "sensor.sigma_azimuth_deg=0.3")
     known = [likelihood(case, member.name, columns) for member in case.spec.filters]
-    assert fit.compared(known).best == "MMA2-122"
+    assert fit.compare_filters(known).best == "MMA2-122"
     best, gains = known[0], {}
     for i, key in enumerate(best.keys):
         for factor in (1 / 3, 3.0):
@@ -444,11 +444,11 @@ def test_the_likeliest_hypotheses_are_kept_in_their_order():
 
 
 def test_a_wrong_velocity_error_is_named_though_velocities_fold(monkeypatch):
-    monkeypatch.setattr(fit, "MOST_FOUND", 1)
+    monkeypatch.setattr(fit, "MAX_FINDINGS", 1)
     case = loaded("ambiguous_rls4", "filters=[{name: memory, doppler: folded, manoeuvre_variance: 1.0e-7}]")
     wrong = recording("ambiguous_rls4", "radar.sigma_velocity_mps=4")
-    assert fit.findings(likelihood(case, None, wrong))[0].what == "radar.sigma_velocity_mps"
-    assert fit.findings(likelihood(case, None, recording("ambiguous_rls4"))) == []
+    assert fit.find_errors(likelihood(case, None, wrong))[0].name == "radar.sigma_velocity_mps"
+    assert fit.find_errors(likelihood(case, None, recording("ambiguous_rls4"))) == []
 
 
 def test_innovations_of_a_right_filter_over_folded_velocities():
@@ -456,7 +456,7 @@ def test_innovations_of_a_right_filter_over_folded_velocities():
     case = loaded("ambiguous_rls4", "filters=[{name: memory, doppler: folded, manoeuvre_variance: 0.0}]")
     nis = []
     for i in range(20):
-        made = recorded_of(case).tracker(case).feed(recording("ambiguous_rls4", "scans=25", number=i))
+        made = recording_interface(case).tracker(case).feed(recording("ambiguous_rls4", "scans=25", number=i))
         nis.append(made.nis[0, 5:])
         assert np.nanmax(np.abs(made.residual[0, 5:, 1])) <= 7.5
     nis = np.concatenate(nis)

@@ -78,7 +78,7 @@ def test_what_is_wrong_is_told_with_its_place(tmp_path, text, expected):
 IMPORT = "radarsim import plots.csv -o imported.csv"
 
 
-@pytest.mark.parametrize("chunk", [3, plots.CHUNK])
+@pytest.mark.parametrize("chunk", [3, plots.CHUNK_ROWS])
 def test_equal_faults_are_one_line_with_their_cure(tmp_path, chunk):
     rows = ["10:00,1,45", "1,b,1", "10:00,-1,45", "2,1", "1,1,1", "10:00,1,45", "10:00,1,45", "10:00,c,1", "0,1,1"]
     path = tmp_path / "plots.csv"
@@ -152,7 +152,9 @@ def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path, mon
     def without_solution(tracker, columns):
         raise LinAlgError
 
-    monkeypatch.setattr(type(follow.recorded_of(config.cases[0]).tracker(config.cases[0])), "feed", without_solution)
+    monkeypatch.setattr(
+        type(follow.recording_interface(config.cases[0]).tracker(config.cases[0])), "feed", without_solution
+    )
     with pytest.raises(ConfigError, match=r"plots\.csv: t_s: intervals so different"):
         whole.track(config, path)
 

@@ -18,7 +18,7 @@ from radarsim.errors import ConfigError
 from radarsim.recorded import register
 from radarsim.recorded.formats.importing import Options, biases_of, import_recording
 from radarsim.recorded.formats.sites import BIASES, Site, sites_of
-from radarsim.recorded.identity import distance, interpolated
+from radarsim.recorded.identity import distance, interpolate_states
 from radarsim.report.statistics import Z95
 from tests.recorded.formats.made import block, plot_048, position_021
 from tests.tolerances import rounding, share_error, sigma_error
@@ -64,7 +64,9 @@ def pairs(rng, flown, biases, sigma=(0.0, 0.0), plots=60, own=0.0, outliers=0.0,
     rows, paths = [], []
     for number, flight in enumerate(flown):
         fixes = np.arange(-10.0, 4.0 * plots + 20, 5.0) + rng.uniform(0, 5)
-        paths.append(interpolated(np.column_stack([fixes, flight.at(fixes) + rng.normal(0, other, (len(fixes), 3))])))
+        paths.append(
+            interpolate_states(np.column_stack([fixes, flight.at(fixes) + rng.normal(0, other, (len(fixes), 3))]))
+        )
         t = 4.0 * np.arange(plots) + rng.uniform(0, 4)
         t = t[rng.random(plots) >= missed]
         wrong = np.where(rng.random((2, len(t))) < outliers, 20.0, 1.0)
@@ -72,16 +74,18 @@ def pairs(rng, flown, biases, sigma=(0.0, 0.0), plots=60, own=0.0, outliers=0.0,
         r, b = measured(flight, t, biases) + errors
         rows.append(np.stack([t, r, b % (2 * np.pi), np.full(len(t), number)]))
     t, r, b, path = np.concatenate(rows, axis=1)
-    return register.Pairs(t, r, b, path.astype(int), lambda number, at: paths[number](at))
+    return register.MatchedPlots(t, r, b, path.astype(int), lambda number, at: paths[number](at))
 
 
 def predicted(flown, made, biases):
     """Range and bearing of the plots (2, n) that these biases make of the exact paths."""
-    return np.concatenate([measured(one, made.t_s[made.path == k], biases) for k, one in enumerate(flown)], axis=1)
+    return np.concatenate(
+        [measured(one, made.t_s[made.path_numbers == k], biases) for k, one in enumerate(flown)], axis=1
+    )
 
 
 def found(made):
-    return {one.key: one for one in register.adjust(made).biases}
+    return {one.key: one for one in register.fit_biases(made).biases}
 
 
 @pytest.mark.parametrize("biases", [SOME, (-400.0, -0.01, -0.05, -4.0), (0.0, 0.0, 0.2, 0.0), NONE])
@@ -107,8 +111,8 @@ def test_an_independent_search_finds_the_same():
     rng = np.random.default_rng(2)
     flown = flights(rng, 8, turn=0.0)
     made = pairs(rng, flown, SOME, (50.0, 0.0015), outliers=0.05)
-    ours = register.adjust(made)
-    limit = register.BIWEIGHT**2
+    ours = register.fit_biases(made)
+    limit = register.BIWEIGHT_LIMIT**2
 
     def errors(scaled):
         biases = scaled * [100.0, 1e-3, 1e-3, 1.0]
@@ -123,12 +127,12 @@ def test_an_independent_search_finds_the_same():
     theirs = least_squares(errors, np.zeros(4), loss=tukey, xtol=1e-15, ftol=1e-15, gtol=1e-12).x
     for one, value in zip(ours.biases, theirs * [100.0, 1e-3, 1e-3, 1.0], strict=True):
         # Steps end below so many standard errors; ten times that is left where each is 0.9 of the one before.
-        assert abs(one.value - value) < 10 * register.CONVERGED * (one.hi - one.lo) / (2 * Z95)
+        assert abs(one.value - value) < 10 * register.CONVERGENCE_STEP * (one.hi - one.lo) / (2 * Z95)
     for sigma, own in zip(ours.sigma, errors(theirs).reshape(2, -1) * np.array(ours.sigma)[:, None], strict=True):
         # Of the outliers 16 % are within 4 σ, which adds 1.7 %; the biweight is as good as 90 % of the errors would be.
         inner = own[np.abs(own) < 4 * sigma]
         assert sigma == pytest.approx(np.std(inner), rel=0.017 + sigma_error(len(inner), z=3) * np.sqrt(1 / 0.9 - 1))
-    spoilt = np.abs(errors(theirs).reshape(2, -1)).max(axis=0) >= register.BIWEIGHT
+    spoilt = np.abs(errors(theirs).reshape(2, -1)).max(axis=0) >= register.BIWEIGHT_LIMIT
     assert ours.outliers == spoilt.sum()
 
 
@@ -149,7 +153,7 @@ def covered(seed, runs, biases):
             rng = np.random.default_rng((seed, number, run))
             made = pairs(rng, flights(rng, **sky), biases, **({"sigma": (50.0, 0.0015), "other": 8.0} | errors))
             held.append([one.lo <= true <= one.hi if one.identifiable else np.nan
-                         for one, true in zip(register.adjust(made).biases, biases, strict=True)])  # fmt: skip
+                         for one, true in zip(register.fit_biases(made).biases, biases, strict=True)])  # fmt: skip
     return np.array(held).reshape(len(WORLDS), runs, len(BIASES))
 
 
@@ -221,7 +225,7 @@ def recordings(tmp_path, biases=SOME, late=None, of_day=False, count=8):
         plots += [(s, f"{c},{name},{x:.3f},{y % 6.28318530:.6f}") for s, c, x, y in zip(t, clock, r, b, strict=True)]
         t = np.arange(-20.0, 260, 4) + rng.uniform(0, 4)
         north, up, east = flight.at(t - (2.0 if number == late else 0.0)).T
-        lat, lon, height = pymap3d.enu2geodetic(east, north, up, *SITE.place)
+        lat, lon, height = pymap3d.enu2geodetic(east, north, up, *SITE.coordinates)
         zero = 1.7e9 - 1.7e9 % 86400 + 36000 if of_day else 1.7e9
         cells = zip(t, lat, lon, height, strict=True)
         positions += [(s, f"{zero + s:.4f},{name},{x:.8f},{y:.8f},{h:.2f}") for s, x, y, h in cells]
@@ -412,7 +416,7 @@ def test_a_radar_that_knows_codes_alone(tmp_path):
         monitor = zip(t.tolist()[::20], rho.tolist()[::20], (theta % 65536).tolist()[::20], strict=True)
         plots += [(s + 1, plot_048(s + 1, x + 200, y, code=code, kind=b"\x22")) for s, x, y in monitor]
         north, up, east = flight.at(t - 36000 - 1.0).T
-        places = zip((t - 1).tolist(), *pymap3d.enu2geodetic(east, north, up, *SITE.place), strict=True)
+        places = zip((t - 1).tolist(), *pymap3d.enu2geodetic(east, north, up, *SITE.coordinates), strict=True)
         more = {"address": 0xA1 + number, "code": code}
         positions += [(s, position_021(s, x, y, height_ft=h / 0.3048, **more)) for s, x, y, h in places]
     files = tmp_path / "radar", tmp_path / "adsb"

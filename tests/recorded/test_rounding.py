@@ -8,7 +8,7 @@ import pytest
 from radarsim.app.configs import load
 from radarsim.errors import ConfigError
 from radarsim.recorded import follow, plots
-from radarsim.recorded.follow import Twin, unlike
+from radarsim.recorded.follow import RoundingGuard, differing_rows
 from tests.recorded import whole
 from tests.tolerances import rounding
 
@@ -66,7 +66,7 @@ def test_sigma_after_a_gap_is_that_of_exact_arithmetic(tmp_path, gap):
     _, track = whole.track(one, file_with(tmp_path, [gap, 10, 10]))
     for f, options in enumerate(one.cases[0].spec.filters):
         expected = exact(len(options.observes), options.initial_scans, [gap, 10, 10])
-        np.testing.assert_allclose(track.sigma[f, -3:], expected, rtol=follow.SIGMA)  # else it is refused
+        np.testing.assert_allclose(track.sigma[f, -3:], expected, rtol=follow.MAX_SIGMA_CHANGE)  # else it is refused
 
 
 @pytest.mark.parametrize("after", [0, 2])
@@ -81,9 +81,9 @@ def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):
     columns = whole.read(file_with(tmp_path, [1000] * 100 + [10]), (("t_s", "range_m", "velocity_mps"),))
     columns["range_m"][SCANS:-1] = np.nan
     (case,) = load("rls2").cases
-    study = follow.recorded_of(case)
-    twin, track = Twin(study.tracker(case), 10.0), study.tracker(case).feed(columns)
-    assert not twin.lost(columns, track)
+    study = follow.recording_interface(case)
+    twin, track = RoundingGuard(study.tracker(case), 10.0), study.tracker(case).feed(columns)
+    assert not twin.has_lost_digits(columns, track)
     assert (twin.gap_s, twin.gap_row) == (100_010, SCANS + 100)
     expected = exact(1, 3, [1000] * 100 + [10], unseen=range(100))
     # Each interval adds what is positive: twelve operations an element, and a last update.
@@ -121,12 +121,12 @@ def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
     one = load("rls2")
     columns = whole.read(file_with(tmp_path, [1e7, 10, 10]), (("t_s", "range_m", "velocity_mps"),))
     (case,) = one.cases
-    study = follow.recorded_of(case)
+    study = follow.recording_interface(case)
     for size in (1, 5, 14, 100):
-        tracker, twin, lost = study.tracker(case), Twin(study.tracker(case), 10.0), []
+        tracker, twin, lost = study.tracker(case), RoundingGuard(study.tracker(case), 10.0), []
         for i in range(0, SCANS + 3, size):
             piece = {name: column[i : i + size] for name, column in columns.items()}
-            lost.append(twin.lost(piece, tracker.feed(piece)))
+            lost.append(twin.has_lost_digits(piece, tracker.feed(piece)))
             if lost[-1]:
                 break
         assert lost[-1], size
@@ -135,9 +135,9 @@ def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
 
 def test_tracks_differ_by_sigma_estimate_or_an_impossible_sigma(tmp_path):
     _, track = whole.track(load("rls2"), file_with(tmp_path, [10]))
-    assert not unlike(track, track).any()
+    assert not differing_rows(track, track).any()
     for name, value in (("sigma", np.nan), ("sigma", 0.0), ("estimate", np.nan), ("estimate", 7.0)):
-        other = follow.rows_of(track, np.arange(SCANS + 1))
+        other = follow.select_rows(track, np.arange(SCANS + 1))
         getattr(other, name)[1, 9, 0] = value
-        assert unlike(other, track).nonzero()[0].tolist() == [9]
-        assert unlike(track, other).nonzero()[0].tolist() == [9]
+        assert differing_rows(other, track).nonzero()[0].tolist() == [9]
+        assert differing_rows(track, other).nonzero()[0].tolist() == [9]

@@ -17,7 +17,7 @@ def track(experiment, source):
     followed = follow.follow(experiment, source, lambda track, name: parts.append(track))
     if len(followed.tracks) > 1:
         raise ConfigError(f"{source}: one track wanted, got {len(followed.tracks)}")
-    return followed.case, follow.joined(parts)
+    return followed.case, follow.join_tracks(parts)
 
 
 def write(track, path):

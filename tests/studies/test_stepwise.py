@@ -15,7 +15,7 @@ from radarsim.errors import ConfigError
 from radarsim.kernels.traced import elimination, sqrt, updated, where
 from radarsim.papers import one_file_measures
 from radarsim.recorded import page
-from radarsim.recorded.follow import BEFORE, Followed
+from radarsim.recorded.follow import START_ESTIMATES, Followed
 from radarsim.studies import stepwise
 from radarsim.studies.onefile import Component, Measured
 from radarsim.studies.stepwise import Steps, StepStudy
@@ -220,13 +220,13 @@ def test_a_filter_without_a_covariance_is_told_of_beside_recorded_plots():
     columns = dict(study.recording_interface().simulated(case, 1))
     track, found = study.tracker(case).feed(columns), Followed(case)
     truth = {name: columns.pop(name) for name in list(columns) if name.startswith("true_")}
-    found.take(columns, track)
-    found.compare(track, columns["t_s"], truth)
+    found.add(columns, track)
+    found.add_errors(track, columns["t_s"], truth)
     for f, own in enumerate(page.errors(found)):
-        error = (track.estimate[f, :, 0] - truth["true_x_m"])[BEFORE:]
+        error = (track.estimate[f, :, 0] - truth["true_x_m"])[START_ESTIMATES:]
         assert_rounded(own["RMS error"], np.sqrt(np.mean(error**2)), operations=SCANS)
         assert np.isnan(own["of own σ"]) == (f == 1)
-    assert found.untested == ["kalman", "halves"]
+    assert found.filters_without_test == ["kalman", "halves"]
 
 
 def test_missed_plots_are_missed_as_often_as_stated():

@@ -1,12 +1,12 @@
-r"""Common to all readers of recordings: batches of records, as columns.
+r"""Batches of records, the site of a radar, and AIS: the common parts of all readers of recordings.
 
-A radar on the earth (WGS 84): its measurements of positions, and the places of its plots. By pymap3d. Local axes: x
-north, y up, z east, with the origin at the radar. Bearings are counted from north to east. Elevations are above the
-plane that is level at the radar; an aircraft far away and low lies below it.
+A radar on the earth (WGS 84) measures positions, and its plots have positions (by pymap3d). Local axes: x north, y up,
+z east, with the origin at the radar. Bearings are counted from north to east. Elevations are above the plane that is
+level at the radar; an aircraft far away and low lies below it.
 
-Ships by AIS: NMEA sentences `!AIVDM…`, by pyais. A message gives only the second of its minute. The time is that of the
-tag block (`\c:1577836800*..\!AIVDM…`), of a line `$PGHP,1,…`, of a number or ISO time before the sentence, or of a
-number after it; without these, the seconds are unwrapped from minute to minute."""
+Ships send AIS: NMEA sentences `!AIVDM…`, read by pyais. A message gives only the second of its minute. The time is that
+of the tag block (`\c:1577836800*..\!AIVDM…`), of a line `$PGHP,1,…`, of a number or ISO time before the sentence, or of
+a number after it; without these, the seconds are unwrapped from minute to minute."""
 
 import datetime
 import functools
@@ -26,7 +26,7 @@ from radarsim.errors import ConfigError
 from radarsim.language import term, tr
 
 # ---- records ---------------------------------------------------------------------------------------------------------
-BATCH = 20_000  # records held at a time
+BATCH_ROWS = 20_000  # records held at a time
 DAY_S = 86400.0
 PLOTS, POSITIONS = "plots", "positions"
 
@@ -34,7 +34,7 @@ PLOTS, POSITIONS = "plots", "positions"
 PLOT_COLUMNS = ("t_s", "range_m", "bearing_rad", "velocity_mps", "span_mps", "altitude_m")
 BIASES = ("range_m", "range_scale", "bearing_rad", "time_s")  # of plots, to be subtracted
 POSITION_COLUMNS = ("t_s", "latitude_deg", "longitude_deg", "altitude_m", "east_mps", "north_mps", "up_mps")
-NOWHERE = term("records without time or position")  # a reason to skip them
+NO_TIME_OR_POSITION = term("records without time or position")  # a reason to skip them
 
 
 class Batch(NamedTuple):
@@ -50,20 +50,20 @@ class Batch(NamedTuple):
     address: list[str]
     radar: list[str]
     columns: dict[str, np.ndarray]
-    words: Mapping[str, list[str]] = MappingProxyType({})
+    texts: Mapping[str, list[str]] = MappingProxyType({})
 
     @property
     def identity(self) -> dict[str, list[str]]:
-        """What identifies each record, by kind of identity."""
-        return {"address": self.address, **self.words}
+        """The identities of each record, by kind."""
+        return {"address": self.address, **self.texts}
 
     def rows(self, keep: list[int]) -> "Batch":
         """The rows with these indices."""
         track, address, radar, *words = (
-            [column[i] for i in keep] for column in (self.track, self.address, self.radar, *self.words.values())
+            [column[i] for i in keep] for column in (self.track, self.address, self.radar, *self.texts.values())
         )
         columns = {name: column[keep] for name, column in self.columns.items()}
-        return Batch(self.kind, track, address, radar, columns, dict(zip(self.words, words, strict=True)))
+        return Batch(self.kind, track, address, radar, columns, dict(zip(self.texts, words, strict=True)))
 
 
 class Reader(Protocol):
@@ -80,21 +80,21 @@ class Reader(Protocol):
         """The records in batches; raises ConfigError with file, place, expected and actual content."""
 
     def notes(self, radars: Iterable[str]) -> list[str]:
-        """What was assumed, and what is known of the radars that have plots, in words."""
+        """Notes on assumptions, and on the radars that have plots."""
 
 
 @dataclass
-class Gathered:
+class BatchBuilder:
     """Records of one kind, collected until there are enough for a batch."""
 
     kind: str
     names: tuple[str, ...]
-    words: tuple[str, ...] = ()
+    text_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        self._empty()
+        self._clear()
 
-    def _empty(self) -> None:
+    def _clear(self) -> None:
         self.track: list[str] = []
         self.address: list[str] = []
         self.rows: list[tuple[float, ...]] = []
@@ -110,17 +110,17 @@ class Gathered:
         self.rows.append(row)
         self.texts.append(texts)
 
-    def taken(self) -> Batch:
+    def take_batch(self) -> Batch:
         """The records so far as a batch; the collection is emptied."""
         table = np.array(self.rows, dtype=float).reshape(-1, len(self.names))
         columns = dict(zip(self.names, table.T.copy(), strict=True))
-        words = dict(zip(self.words, map(list, zip(*self.texts, strict=True)), strict=True))
-        batch = Batch(self.kind, self.track, self.address, [""] * len(self), columns, words)
-        self._empty()
+        texts = dict(zip(self.text_names, map(list, zip(*self.texts, strict=True)), strict=True))
+        batch = Batch(self.kind, self.track, self.address, [""] * len(self), columns, texts)
+        self._clear()
         return batch
 
 
-class Unrolled:
+class UnrolledClock:
     """Times of a clock with period `period_s`, unwrapped. Records out of order by half of it are taken as they are; so
     are times that fall from, or to, more than near_s from the clock's turn."""
 
@@ -131,16 +131,16 @@ class Unrolled:
     def __call__(self, t: float) -> float:
         """Unwrapped time of a clock time t (s)."""
         if self.last is not None:
-            near = max(t, self.last) >= self.period_s - self.near_s and min(t, self.last) <= self.near_s
-            if near and t < self.last - self.period_s / 2:
+            is_near_turn = max(t, self.last) >= self.period_s - self.near_s and min(t, self.last) <= self.near_s
+            if is_near_turn and t < self.last - self.period_s / 2:
                 self.turns += 1
-            elif near and t > self.last + self.period_s / 2 and self.turns:
+            elif is_near_turn and t > self.last + self.period_s / 2 and self.turns:
                 return t + (self.turns - 1) * self.period_s
         self.last = t
         return t + self.turns * self.period_s
 
     def notes(self) -> list[str]:
-        """How often midnight has passed on a clock of a day."""
+        """A note if midnight has passed on a clock of a day, and how often."""
         return [tr("the times of day pass midnight: t_s runs on ({turns} × 24 h)", turns=self.turns)] * (self.turns > 0)
 
 
@@ -150,14 +150,14 @@ def utc_s(text: str) -> float:
     return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.UTC)).timestamp()
 
 
-def needs(module: str, extra: str) -> ConfigError:
-    """The fault of a library that one of our extras installs."""
+def missing_package(module: str, extra: str) -> ConfigError:
+    """The fault that a library is missing which one of our extras installs."""
     return ConfigError(f"{module} is not installed, which this needs: pip install 'radarsim[{extra}]'")
 
 
-def counted(skipped: Mapping[str, int]) -> list[str]:
-    """Numbers of skipped records, in words."""
-    return [f"{tr(what)} ({count})" for what, count in skipped.items() if count]
+def skip_counts(skipped: Mapping[str, int]) -> list[str]:
+    """The reasons for skipped records, each with its number of records."""
+    return [f"{tr(reason)} ({count})" for reason, count in skipped.items() if count]
 
 
 # ---- site ------------------------------------------------------------------------------------------------------------
@@ -166,8 +166,8 @@ try:
 except ImportError:
     pymap3d = None
 
-CLOSE_M = 0.01  # accuracy of the height when the elevation of a plot is computed
-ROUNDS = 20
+HEIGHT_ACCURACY_M = 0.01  # accuracy of the height when the elevation of a plot is computed
+MAX_ROUNDS = 20
 
 
 class Antenna(NamedTuple):
@@ -178,64 +178,69 @@ class Antenna(NamedTuple):
 
 
 class Site:
-    """Place of a radar: latitude and longitude in degrees, height above the ellipsoid in m."""
+    """The site of a radar: latitude and longitude in degrees, height above the ellipsoid in m."""
 
     def __init__(self, latitude_deg: float, longitude_deg: float, height_m: float):
         if pymap3d is None:
-            raise needs("pymap3d", "recordings")
-        self.place = (latitude_deg, longitude_deg, height_m)
+            raise missing_package("pymap3d", "recordings")
+        self.coordinates = (latitude_deg, longitude_deg, height_m)
 
-    def distance_m(self, other: "Site") -> float:
-        """The distance to another place."""
-        return math.dist(pymap3d.geodetic2ecef(*self.place), pymap3d.geodetic2ecef(*other.place))
+    def distance_m(self, other_site: "Site") -> float:
+        """The distance to another site, m."""
+        return math.dist(pymap3d.geodetic2ecef(*self.coordinates), pymap3d.geodetic2ecef(*other_site.coordinates))
 
     def _axes(self) -> np.ndarray:
         """North, up and east (3, 3) in the axes of the earth."""
         units = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # each east, north, up
-        return np.array([pymap3d.enu2uvw(*one, *self.place[:2]) for one in units])
+        return np.array([pymap3d.enu2uvw(*unit, *self.coordinates[:2]) for unit in units])
 
-    def turned(self, other: "Site", states: np.ndarray) -> np.ndarray:
-        """Positions and speeds (…, 6) in this site's local axes, of those in the other's."""
-        turn = other._axes() @ self._axes().T
-        between = np.subtract(pymap3d.geodetic2ecef(*other.place), pymap3d.geodetic2ecef(*self.place)) @ self._axes().T
-        return np.concatenate([states[..., :3] @ turn + between, states[..., 3:] @ turn], axis=-1)
+    def rotate_states(self, other_site: "Site", states: np.ndarray) -> np.ndarray:
+        """Positions and speeds (…, 6) in this site's local axes, from those in another site's."""
+        rotation = other_site._axes() @ self._axes().T
+        shift = (
+            np.subtract(pymap3d.geodetic2ecef(*other_site.coordinates), pymap3d.geodetic2ecef(*self.coordinates))
+            @ self._axes().T
+        )
+        return np.concatenate([states[..., :3] @ rotation + shift, states[..., 3:] @ rotation], axis=-1)
 
-    def seen(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def measure(self, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Range, bearing, elevation, local position and, where speeds are known, radial velocity of positions (n,). An
         unknown height is taken as 0, sea level."""
         lat, lon = columns["latitude_deg"], columns["longitude_deg"]
         height = np.nan_to_num(columns["altitude_m"], nan=0.0)
-        east, north, up = pymap3d.geodetic2enu(lat, lon, height, *self.place)
+        east, north, up = pymap3d.geodetic2enu(lat, lon, height, *self.coordinates)
         local = np.stack([north, up, east], axis=-1)
-        return described(local) | {"velocity_mps": self._radial(columns, lat, lon, height)}
+        return position_columns(local) | {"velocity_mps": self._radial(columns, lat, lon, height)}
 
     def _radial(self, columns: dict[str, np.ndarray], lat: np.ndarray, lon: np.ndarray, h: np.ndarray) -> np.ndarray:
         """Radial velocities (n,) in m/s, positive where the range grows: speeds over ground, seen along the line."""
         up = np.nan_to_num(columns["up_mps"], nan=0.0)
-        speed = np.stack(pymap3d.enu2uvw(columns["east_mps"], columns["north_mps"], up, lat, lon), axis=-1)
+        velocity = np.stack(pymap3d.enu2uvw(columns["east_mps"], columns["north_mps"], up, lat, lon), axis=-1)
         target = np.stack(pymap3d.geodetic2ecef(lat, lon, h), axis=-1)
-        line = target - np.stack(pymap3d.geodetic2ecef(*self.place))
-        return np.einsum("ni,ni->n", speed, line) / np.linalg.norm(line, axis=-1)
+        line_of_sight = target - np.stack(pymap3d.geodetic2ecef(*self.coordinates))
+        return np.einsum("ni,ni->n", velocity, line_of_sight) / np.linalg.norm(line_of_sight, axis=-1)
 
-    def local(self, range_m: np.ndarray, bearing_rad: np.ndarray, altitude_m: np.ndarray) -> np.ndarray:
+    def local_positions(self, range_m: np.ndarray, bearing_rad: np.ndarray, altitude_m: np.ndarray) -> np.ndarray:
         """Local positions (n, 3) of plots of slant range and bearing at a height (n,), all in m and rad. NaN where the
         height is unknown, or where no point of that range has it."""
         sine = np.zeros_like(range_m)
         bearing = np.degrees(bearing_rad)
         with np.errstate(invalid="ignore"):
-            for _ in range(ROUNDS):
-                height = pymap3d.aer2geodetic(bearing, np.degrees(np.arcsin(sine)), range_m, *self.place)[2]
-                miss = altitude_m - height
+            for _ in range(MAX_ROUNDS):
+                height = pymap3d.aer2geodetic(bearing, np.degrees(np.arcsin(sine)), range_m, *self.coordinates)[2]
+                height_error = altitude_m - height
                 # A step of the sine lifts the point by nearly that part of the range.
-                sine = np.clip(sine + miss / range_m, -1.0, 1.0)
-                if not np.any(np.abs(miss[np.isfinite(miss)]) > CLOSE_M):
+                sine = np.clip(sine + height_error / range_m, -1.0, 1.0)
+                if not np.any(np.abs(height_error[np.isfinite(height_error)]) > HEIGHT_ACCURACY_M):
                     break
-            sine = np.where(np.abs(miss) <= 10 * CLOSE_M, sine, np.nan)
-        flat = range_m * np.sqrt(1 - sine**2)
-        return np.stack([flat * np.cos(bearing_rad), range_m * sine, flat * np.sin(bearing_rad)], axis=-1)
+            sine = np.where(np.abs(height_error) <= 10 * HEIGHT_ACCURACY_M, sine, np.nan)
+        ground_range = range_m * np.sqrt(1 - sine**2)
+        return np.stack(
+            [ground_range * np.cos(bearing_rad), range_m * sine, ground_range * np.sin(bearing_rad)], axis=-1
+        )
 
 
-def described(local: np.ndarray) -> dict[str, np.ndarray]:
+def position_columns(local: np.ndarray) -> dict[str, np.ndarray]:
     """Range, bearing, elevation above the level and the coordinates of local positions (n, 3) in m."""
     x, y, z = local.T
     r = np.linalg.norm(local, axis=-1)
@@ -251,13 +256,13 @@ def described(local: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def biconical(local: np.ndarray, antenna: Antenna) -> dict[str, np.ndarray]:
-    """The angles to an antenna's axes of local positions (n, 3), rad; not-a-number behind the antenna."""
-    placed = physics.to_antenna(local, physics.rotation(*antenna), 0.0)
-    r = np.linalg.norm(placed, axis=-1)
+def antenna_angles(local: np.ndarray, antenna: Antenna) -> dict[str, np.ndarray]:
+    """Elevation and azimuth of local positions (n, 3) from an antenna's normal, rad; NaN behind the antenna."""
+    in_antenna_axes = physics.to_antenna(local, physics.rotation(*antenna), 0.0)
+    r = np.linalg.norm(in_antenna_axes, axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        angles = np.arcsin(placed[:, 1:] / r[:, None])
-    angles[~(placed[:, 0] > 0)] = np.nan
+        angles = np.arcsin(in_antenna_axes[:, 1:] / r[:, None])
+    angles[~(in_antenna_axes[:, 0] > 0)] = np.nan
     return {"elevation_rad": angles[:, 0], "azimuth_rad": angles[:, 1]}
 
 
@@ -268,22 +273,24 @@ def site_of(text: str) -> Site:
     except ValueError:
         raise ConfigError(f"at: must be LATITUDE,LONGITUDE,HEIGHT in degrees, degrees, m; got {text!r}") from None
     limits = (("latitude", -90, 90, "degrees"), ("longitude", -180, 360, "degrees"), ("height", -500, 100_000, "m"))
-    places = zip(limits, (latitude, longitude, height), strict=True)
-    if wrong := [(*one, value) for one, value in places if not one[1] <= value <= one[2]]:
-        raise ConfigError(*("at: the {} must be from {} to {} {}, got {:g}".format(*one) for one in wrong))
+    limited_values = zip(limits, (latitude, longitude, height), strict=True)
+    if faults := [(*limit, value) for limit, value in limited_values if not limit[1] <= value <= limit[2]]:
+        raise ConfigError(*("at: the {} must be from {} to {} {}, got {:g}".format(*fault) for fault in faults))
     return Site(latitude, longitude, height)
 
 
 def sites_of(texts: Sequence[str]) -> tuple[Site | None, dict[str, Site]]:
-    """The site of the one radar, `LAT,LON,HEIGHT`, or of each of several, `SAC/SIC=LAT,LON,HEIGHT`."""
-    named = {name.strip(): site_of(place) for name, sign, place in (text.partition("=") for text in texts) if sign}
-    plain = [text for text in texts if "=" not in text]
-    if len(plain) > 1 or (plain and named) or len(plain) + len(named) < len(texts):
+    """The site of the only radar, `LAT,LON,HEIGHT`, or of each of several radars, `SAC/SIC=LAT,LON,HEIGHT`."""
+    sites_by_name = {
+        name.strip(): site_of(place) for name, sign, place in (text.partition("=") for text in texts) if sign
+    }
+    unnamed = [text for text in texts if "=" not in text]
+    if len(unnamed) > 1 or (unnamed and sites_by_name) or len(unnamed) + len(sites_by_name) < len(texts):
         must = "must be one LAT,LON,HEIGHT, or SAC/SIC=LAT,LON,HEIGHT of each radar, once"
         raise ConfigError(f"at: {must}; got {' '.join(texts)}")
-    if faults := [name for name in named if not re.fullmatch(r"\d{1,3}/\d{1,3}", name)]:
+    if faults := [name for name in sites_by_name if not re.fullmatch(r"\d{1,3}/\d{1,3}", name)]:
         raise ConfigError(*(f"at: SAC/SIC must be two numbers, as 25/12; got {name!r}" for name in faults))
-    return (site_of(plain[0]) if plain else None), named
+    return (site_of(unnamed[0]) if unnamed else None), sites_by_name
 
 
 def antenna_of(text: str) -> Antenna:
@@ -308,17 +315,17 @@ except ImportError:
     pyais = None
 
 KNOT_MPS = 1852 / 3600
-SENTENCE = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
+SENTENCE_PATTERN = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
 TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13})")
-AFTER = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)\s*$")
-GATEHOUSE = re.compile(rb"\$PGHP,1,(\d{4})" + 5 * rb",(\d\d?)" + rb",(\d{1,3}),")  # the time of the next sentence
-PARTS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
-NO_SPEED, NO_COURSE, NO_SECOND = 102.2, 360.0, 60
-MOST_OPEN = 100  # incomplete messages kept
-LEAST_GOOD = 0.5  # of the sentences; a file with fewer is not AIS
+TRAILING_TIME = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)\s*$")
+GATEHOUSE_TIME = re.compile(rb"\$PGHP,1,(\d{4})" + 5 * rb",(\d\d?)" + rb",(\d{1,3}),")  # the time of the next sentence
+PART_NUMBERS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
+MAX_SPEED_KNOTS, UNKNOWN_COURSE_DEG, UNKNOWN_SECOND = 102.2, 360.0, 60
+MAX_OPEN_MESSAGES = 100  # incomplete messages kept
+MAX_DAMAGED_SHARE = 0.5  # of the sentences; a file with fewer is not AIS
 
 
-def sound(sentence: bytes) -> bool:
+def has_valid_checksum(sentence: bytes) -> bool:
     """Whether a sentence has the checksum stated after its asterisk: the exclusive or of all its characters."""
     body, star, stated = sentence[1:].partition(b"*")
     return bool(star) and stated[:2].upper() == b"%02X" % functools.reduce(operator.xor, body, 0)
@@ -331,92 +338,97 @@ class Ais:
 
     def __init__(self, path: str, file: BinaryIO):
         if pyais is None:
-            raise needs("pyais", "ais")
+            raise missing_package("pyais", "ais")
         self.path, self.file = path, file
         self.records = 0
         self.skipped: Counter[str] = Counter()
-        self.open: dict[bytes, list[tuple[bytes, float]]] = {}
-        self.minute = Unrolled(60.0)
-        self.stamp = math.nan  # the last time that a line stated, or that follows from it
-        self.ahead = math.nan  # that of a line of time before the next sentence
-        self.untimed = 0  # reports whose minute none states
+        self.open_messages: dict[bytes, list[tuple[bytes, float]]] = {}
+        self.minute_clock = UnrolledClock(60.0)
+        self.last_time = math.nan  # the last time that a line stated, or that follows from one
+        self.announced_time = math.nan  # of a line that states the time of the next sentence
+        self.untimed_count = 0  # reports whose minute no line states
 
     def notes(self, radars: Iterable[str] = ()) -> list[str]:
-        """How times were found where the lines do not state them."""
-        if not self.untimed:
+        """A note on reports without a time, and how they get one."""
+        if not self.untimed_count:
             return []
-        if math.isnan(self.stamp):
-            return [tr("reports that state no time: {count}; the seconds of their minute run on", count=self.untimed)]
-        return [tr("reports that state no time: {count}; they get the nearest with their second", count=self.untimed)]
+        if math.isnan(self.last_time):
+            return [
+                tr("reports that state no time: {count}; the seconds of their minute run on", count=self.untimed_count)
+            ]
+        return [
+            tr("reports that state no time: {count}; they get the nearest with their second", count=self.untimed_count)
+        ]
 
     def batches(self) -> Iterator[Batch]:
         """The position reports in batches; raises ConfigError where most sentences are damaged."""
-        gathered, damaged, first = Gathered(POSITIONS, POSITION_COLUMNS), 0, ""
+        builder, damaged_count, first_damaged = BatchBuilder(POSITIONS, POSITION_COLUMNS), 0, ""
         for number, line in enumerate(self.file, start=1):
-            sentence = SENTENCE.search(line)
+            sentence = SENTENCE_PATTERN.search(line)
             if not sentence and (not line.strip() or line.lstrip().startswith((b"#", b"$", b"\\"))):
-                self._passed(line)
+                self._read_other_line(line)
                 continue
             try:
-                if not sentence or not sound(sentence[0]):
+                if not sentence or not has_valid_checksum(sentence[0]):
                     raise AISBaseException
-                stated, self.ahead = self._stated(line, sentence.start(), number), math.nan
-                message, t = self._decoded(sentence[0], stated)
+                stated_s, self.announced_time = self._find_stated_time(line, sentence.start(), number), math.nan
+                message, t = self._decode(sentence[0], stated_s)
             except AISBaseException:
-                damaged, first = damaged + 1, first or f"{self.path}:{number}"
+                damaged_count, first_damaged = damaged_count + 1, first_damaged or f"{self.path}:{number}"
                 continue
-            self.stamp = self.stamp if math.isnan(t) else t
+            self.last_time = self.last_time if math.isnan(t) else t
             if message is not None:
-                self._take(message, t, gathered)
-            if len(gathered) >= BATCH:
-                yield gathered.taken()
-        if damaged and damaged >= LEAST_GOOD * (self.records + damaged):
-            raise ConfigError(f"{first}: must be AIS sentences (!AIVDM,…); {damaged} lines are not, or are damaged; "
-                              f"{self.records} messages were read")  # fmt: skip
-        if damaged:
-            self.skipped[term("damaged lines")] = damaged
-        if len(gathered):
-            yield gathered.taken()
+                self._add_report(message, t, builder)
+            if len(builder) >= BATCH_ROWS:
+                yield builder.take_batch()
+        if damaged_count and damaged_count >= MAX_DAMAGED_SHARE * (self.records + damaged_count):
+            raise ConfigError(f"{first_damaged}: must be AIS sentences (!AIVDM,…); {damaged_count} lines are not, or "
+                              f"are damaged; {self.records} messages were read")  # fmt: skip
+        if damaged_count:
+            self.skipped[term("damaged lines")] = damaged_count
+        if len(builder):
+            yield builder.take_batch()
 
-    def _passed(self, line: bytes) -> None:
-        """A line without an AIS sentence: some state the time of the next one."""
-        if found := GATEHOUSE.search(line):
+    def _read_other_line(self, line: bytes) -> None:
+        """Read a line without an AIS sentence, which may state the time of the next one."""
+        if match := GATEHOUSE_TIME.search(line):
             try:
-                year, month, day, hour, minute, second, thousandths = map(int, found.groups())
+                year, month, day, hour, minute, second, thousandths = map(int, match.groups())
                 moment = datetime.datetime(year, month, day, hour, minute, second, 1000 * thousandths, datetime.UTC)
-                self.ahead = moment.timestamp()
+                self.announced_time = moment.timestamp()
             except ValueError:
                 self.skipped[term("damaged lines of time")] += 1
         elif line.lstrip().startswith(b"$"):
             self.skipped[term("sentences other than AIS")] += 1
 
-    def _decoded(self, sentence: bytes, stated: float) -> tuple[Any, float]:
-        """The message that a sentence completes, none while further sentences of it are to come; the first time that
-        they state, s from 1970."""
-        assert pyais is not None  # `__init__` has checked it
-        parts, whole = PARTS.match(sentence), [(sentence, stated)]
-        if parts and parts[1] != b"1":
-            held = self.open.setdefault(parts[3], [])
-            if parts[2] == b"1":
-                held.clear()
-            held += whole
-            if len(self.open) > MOST_OPEN:
-                self.open.pop(next(iter(self.open)))
-            if parts[2] != parts[1]:
-                return None, math.nan
-            whole = self.open.pop(parts[3])
-        self.records += 1
-        times = [t for _, t in whole if not math.isnan(t)]
-        return pyais.decode(*(one for one, _ in whole)), times[0] if times else math.nan
+    def _decode(self, sentence: bytes, stated_s: float) -> tuple[Any, float]:
+        """The message that a sentence completes, and the first time that its sentences state, s from 1970.
 
-    def _stated(self, line: bytes, before: int, number: int) -> float:
-        """The time stated for a sentence, s from 1970; NaN where there is none."""
-        if not math.isnan(self.ahead):
-            return self.ahead
-        head = line[:before]
-        if found := TAG_TIME.search(head) or AFTER.search(line):
-            stamp = float(found[1])
-            return stamp / 1000 if stamp > 1e11 else stamp
+        None while further sentences of the message are to come."""
+        assert pyais is not None  # `__init__` has checked it
+        numbers, parts = PART_NUMBERS.match(sentence), [(sentence, stated_s)]
+        if numbers and numbers[1] != b"1":
+            open_parts = self.open_messages.setdefault(numbers[3], [])
+            if numbers[2] == b"1":
+                open_parts.clear()
+            open_parts += parts
+            if len(self.open_messages) > MAX_OPEN_MESSAGES:
+                self.open_messages.pop(next(iter(self.open_messages)))
+            if numbers[2] != numbers[1]:
+                return None, math.nan
+            parts = self.open_messages.pop(numbers[3])
+        self.records += 1
+        times = [t for _, t in parts if not math.isnan(t)]
+        return pyais.decode(*(part for part, _ in parts)), times[0] if times else math.nan
+
+    def _find_stated_time(self, line: bytes, start: int, number: int) -> float:
+        """The time stated for a sentence, s from 1970; NaN if there is none."""
+        if not math.isnan(self.announced_time):
+            return self.announced_time
+        head = line[:start]
+        if match := TAG_TIME.search(head) or TRAILING_TIME.search(line):
+            time = float(match[1])
+            return time / 1000 if time > 1e11 else time
         text = head.decode("ascii", "replace").strip(" \t,;\\")
         if not text or "*" in text:
             return math.nan
@@ -428,10 +440,10 @@ class Ais:
             return utc_s(text)
         except ValueError:
             must = "the sentence must follow a time in s from 1970 or ISO 8601, or a tag block"
-            read = f"{self.records} messages were read"
-            raise ConfigError(f"{self.path}:{number}: {must}; got {text[:60]!r}; {read}") from None
+            progress = f"{self.records} messages were read"
+            raise ConfigError(f"{self.path}:{number}: {must}; got {text[:60]!r}; {progress}") from None
 
-    def _take(self, message: Any, stated: float, gathered: Gathered) -> None:
+    def _add_report(self, message: Any, stated_s: float, builder: BatchBuilder) -> None:
         latitude, longitude = getattr(message, "lat", None), getattr(message, "lon", None)
         if latitude is None or longitude is None or message.msg_type not in (1, 2, 3, 18, 19):
             self.skipped[term("messages other than ships' positions")] += 1
@@ -440,18 +452,20 @@ class Ais:
             self.skipped[term("messages cut short")] += 1
             return
         second = int(message.second)
-        if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated) and second >= NO_SECOND):
-            self.skipped[NOWHERE] += 1
+        if abs(latitude) > 90 or abs(longitude) > 180 or (math.isnan(stated_s) and second >= UNKNOWN_SECOND):
+            self.skipped[NO_TIME_OR_POSITION] += 1
             return
-        t = stated
+        t = stated_s
         if math.isnan(t):
-            self.untimed += 1
-            near = self.stamp + (second - self.stamp + 30) % 60 - 30  # the nearest time with that second
-            if math.isnan(near):
-                t = self.minute(second)
+            self.untimed_count += 1
+            nearest = self.last_time + (second - self.last_time + 30) % 60 - 30  # the nearest time with that second
+            if math.isnan(nearest):
+                t = self.minute_clock(second)
             else:
-                t = self.stamp = near
+                t = self.last_time = nearest
         speed, course = float(message.speed), math.radians(float(message.course))
-        known = speed <= NO_SPEED and float(message.course) < NO_COURSE
-        east, north = (speed * KNOT_MPS * part(course) if known else math.nan for part in (math.sin, math.cos))
-        gathered.add(str(message.mmsi), str(message.mmsi), (t, latitude, longitude, 0.0, east, north, 0.0))
+        is_known = speed <= MAX_SPEED_KNOTS and float(message.course) < UNKNOWN_COURSE_DEG
+        east, north = (
+            speed * KNOT_MPS * component(course) if is_known else math.nan for component in (math.sin, math.cos)
+        )
+        builder.add(str(message.mmsi), str(message.mmsi), (t, latitude, longitude, 0.0, east, north, 0.0))

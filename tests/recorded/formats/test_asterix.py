@@ -10,7 +10,7 @@ import pytest
 from radarsim.recorded.formats import layout
 from radarsim.recorded.formats.importing import Options
 from radarsim.recorded.formats.sites import Site
-from radarsim.recorded.identity import Tracks
+from radarsim.recorded.identity import TrackNames
 from tests.program import command
 from tests.recorded.formats.made import (
     EARTH_M,
@@ -215,7 +215,7 @@ def test_radars_stand_where_they_say(tmp_path):
             np.full(5, 5000 * 2 * math.pi / 65536),
             np.full(5, 25e3 * 0.3048),
         )
-        np.testing.assert_array_equal(at[n::2], Site(*steps, place[2]).local(*polar))
+        np.testing.assert_array_equal(at[n::2], Site(*steps, place[2]).local_positions(*polar))
     assert not any("--at" in note for note in done.notes)
     moved = Site(45.70, 16.01, 100)
     given = {"25/12": moved, "25/14": SITE}
@@ -263,7 +263,7 @@ def test_truth_of_each_of_several_radars(tmp_path):
             place = dict(
                 zip(("latitude_deg", "longitude_deg", "altitude_m"), np.array([[at], [4.9], [height]]), strict=True)
             )
-            seen = site.seen(given | place)
+            seen = site.measure(given | place)
             own = polar(float(seen["range_m"][0] * np.cos(seen["bearing_rad"][0])),
                         float(seen["range_m"][0] * np.sin(seen["bearing_rad"][0])))  # fmt: skip
             number = 10 + (site is sites["25/11"])
@@ -354,24 +354,24 @@ def test_a_code_used_twice_is_two_aircraft(tmp_path):
 
 def test_a_code_is_that_of_the_aircraft_that_flies_there():
     """Two pass each other 1 km apart, and fly three times as far between plots."""
-    tracks, rng = Tracks(), np.random.default_rng(4)
+    tracks, rng = TrackNames(), np.random.default_rng(4)
     for k in range(40):
         for name, north, east in (("A7000", 250 * 12 * (k - 20), 0), ("A7000-2", 250 * 12 * (20.5 - k), 1000)):
             north, east = (float(one + rng.normal(0, 50)) for one in (north, east))
-            assert tracks.by_code("1/1", "7000", 12.0 * k, north, east) == name
+            assert tracks.name_by_code("1/1", "7000", 12.0 * k, north, east) == name
 
 
 def test_codes_that_cross(tmp_path):
     """40 aircraft of one code at random, 4 s apart: no track has plots of two as long as they keep 5 km apart."""
     rng = np.random.default_rng(3)
     places, speeds = rng.uniform(-150e3, 150e3, (40, 2)), rng.uniform(-200, 200, (40, 2))
-    tracks, of, close = Tracks(), {}, set()
+    tracks, of, close = TrackNames(), {}, set()
     for k in range(100):
         now = places + 4 * k * speeds
         far = np.linalg.norm(now[:, None] - now[None], axis=-1) + 1e9 * np.eye(40)
         close |= set(np.argwhere(far < 5e3).ravel().tolist())
         for i, (north, east) in enumerate((now + rng.normal(0, 100, now.shape)).tolist()):
-            of.setdefault(tracks.by_code("1/1", "7000", 4 * k + i / 20, north, east), set()).add(i)
+            of.setdefault(tracks.name_by_code("1/1", "7000", 4 * k + i / 20, north, east), set()).add(i)
     assert all(len(own) == 1 for own in of.values() if not own & close)
     assert len(of) - 40 <= len(close)
     assert len(close) < 20
@@ -429,7 +429,7 @@ def test_category_021_to_the_last_step(tmp_path):
         "north_mps": speed * NM * np.cos(np.radians(course)),
         "up_mps": 6.25 * climb * 0.3048 / 60,
     }
-    for name, column in SITE.seen(given).items():
+    for name, column in SITE.measure(given).items():
         np.testing.assert_array_equal(columns[name], column)
 
 
@@ -449,7 +449,7 @@ def test_category_021_what_else_it_may_say(tmp_path):
     moved |= {"north_mps": 820 / 2**14 * NM, "up_mps": 2000 * 0.3048 / 60}
     level = moved | {"up_mps": np.nan}
     speeds = [
-        SITE.seen({name: np.array([one]) for name, one in own.items()})["velocity_mps"][0] for own in (moved, level)
+        SITE.measure({name: np.array([one]) for name, one in own.items()})["velocity_mps"][0] for own in (moved, level)
     ]
     expected = [np.nan, *speeds, np.nan]
     turned = speeds[0] * half[1] / columns["range_m"][1]  # by the fine step
@@ -503,9 +503,9 @@ def test_an_old_edition_is_refused_by_name(tmp_path):
 
 
 def test_a_datagram_that_only_begins_like_asterix_is_none():
-    assert layout.content(BLOCKS[0] + bytes(17)) == ([], 0)
-    assert layout.content(b"\x30\x00\x03") == ([], 0)
-    assert layout.content(bytes([250]) + BLOCKS[0][1:]) == ([], 0)
+    assert layout.datagram_blocks(BLOCKS[0] + bytes(17)) == ([], 0)
+    assert layout.datagram_blocks(b"\x30\x00\x03") == ([], 0)
+    assert layout.datagram_blocks(bytes([250]) + BLOCKS[0][1:]) == ([], 0)
 
 
 def sound():

@@ -11,8 +11,15 @@ import pytest
 
 from radarsim.errors import ConfigError
 from radarsim.recorded.formats.importing import Options, encoding_named, import_recording
-from radarsim.recorded.formats.sites import CLOSE_M, Antenna, Site, Unrolled, biconical, described
-from radarsim.recorded.formats.text import split
+from radarsim.recorded.formats.sites import (
+    HEIGHT_ACCURACY_M,
+    Antenna,
+    Site,
+    UnrolledClock,
+    antenna_angles,
+    position_columns,
+)
+from radarsim.recorded.formats.text import split_unit
 from tests.recorded.formats.made import (
     CLOCK_S,
     EARTH_M,
@@ -148,7 +155,7 @@ def test_the_tracks_of_two_radars_stay_apart(tmp_path):
     assert line.endswith("has plots of 2: 25/12, 25/13")
     _, columns, _ = imported(tmp_path, block(48, *records), Options(sites=places))
     for n, site in enumerate(places.values()):
-        alone = site.local(
+        alone = site.local_positions(
             np.full(4, 6000.0 * (n + 1) * NM / 256), np.full(4, 5000 * STEP), np.full(4, 20_000 * 0.3048)
         )
         np.testing.assert_array_equal(np.stack([columns[name][n::2] for name in ("x_m", "y_m", "z_m")], -1), alone)
@@ -243,7 +250,7 @@ def test_every_length_of_item_is_followed(tmp_path):
 
 
 def test_a_clock_that_turns():
-    unrolled = Unrolled(60.0)
+    unrolled = UnrolledClock(60.0)
     assert [unrolled(t) for t in (50, 58, 3, 59, 4, 30, 59, 1)] == [50, 58, 63, 59, 64, 90, 119, 121]
 
 
@@ -275,12 +282,12 @@ def axes(latitude_deg, longitude_deg):
 
 def local(*place):
     """North, up and east of the radar."""
-    return axes(*SITE.place[:2]) @ (cartesian(*place) - cartesian(*SITE.place))
+    return axes(*SITE.coordinates[:2]) @ (cartesian(*place) - cartesian(*SITE.coordinates))
 
 
 def radial(latitude_deg, longitude_deg, height_m, north_mps):
     """The radial velocity of one that moves north."""
-    line = cartesian(latitude_deg, longitude_deg, height_m) - cartesian(*SITE.place)
+    line = cartesian(latitude_deg, longitude_deg, height_m) - cartesian(*SITE.coordinates)
     return north_mps * axes(latitude_deg, longitude_deg)[0] @ line / np.linalg.norm(line)
 
 
@@ -315,19 +322,19 @@ def test_a_plot_of_known_height_is_placed_where_that_height_is():
         "latitude_deg": rng.uniform(49.5, 55, n), "longitude_deg": rng.uniform(0, 9, n),
         "altitude_m": rng.uniform(-50, 20e3, n), **{name: np.zeros(n) for name in ("east_mps", "north_mps", "up_mps")},
     }  # fmt: skip
-    seen = SITE.seen(columns)
-    local = SITE.local(seen["range_m"], seen["bearing_rad"], columns["altitude_m"])
+    seen = SITE.measure(columns)
+    local = SITE.local_positions(seen["range_m"], seen["bearing_rad"], columns["altitude_m"])
     np.testing.assert_allclose(
-        local, np.stack([seen[name] for name in ("x_m", "y_m", "z_m")], axis=-1), rtol=0, atol=CLOSE_M
+        local, np.stack([seen[name] for name in ("x_m", "y_m", "z_m")], axis=-1), rtol=0, atol=HEIGHT_ACCURACY_M
     )
-    impossible = SITE.local(np.array([1000.0, 1000.0]), np.zeros(2), np.array([5000.0, np.nan]))
+    impossible = SITE.local_positions(np.array([1000.0, 1000.0]), np.zeros(2), np.array([5000.0, np.nan]))
     assert np.isnan(impossible[:, 1]).all()
 
 
 def test_the_angles_of_an_antenna_are_those_that_multimodel_takes(tmp_path):
     antenna = Antenna(math.radians(10), math.radians(5))
     local = np.array([[50e3, 4e3, 9e3], [-50e3, 4e3, 9e3]])
-    angles = biconical(local, antenna)
+    angles = antenna_angles(local, antenna)
     normal = np.array(
         [math.cos(antenna[1]) * math.cos(antenna[0]), math.sin(antenna[1]), math.cos(antenna[1]) * math.sin(antenna[0])]
     )
@@ -444,7 +451,7 @@ def test_a_spreadsheet_with_its_own_names_and_units(tmp_path):
 
 
 def test_names_and_units():
-    assert [split(name) for name in ("Range [km]", "range_km", "Azimuth (deg)", "time", "slant range", "t_s")] == [
+    assert [split_unit(name) for name in ("Range [km]", "range_km", "Azimuth (deg)", "time", "slant range", "t_s")] == [
         ("range", "km"), ("range", "km"), ("azimuth", "deg"), ("time", ""), ("slant_range", ""), ("t", "s"),
     ]  # fmt: skip
 
@@ -643,7 +650,7 @@ def test_a_span_of_zero_is_none(tmp_path):
 
 
 def test_described_is_textbook():
-    seen = described(np.array([[3.0, 12.0, 4.0], [-1.0, 0.0, -1.0]]))
+    seen = position_columns(np.array([[3.0, 12.0, 4.0], [-1.0, 0.0, -1.0]]))
     assert_rounded(seen["range_m"], [13, math.sqrt(2)], operations=4)
     assert_rounded(seen["bearing_rad"], [math.atan2(4, 3), 1.25 * math.pi], operations=4)
     assert_rounded(seen["level_elevation_rad"], [math.asin(12 / 13), 0], 13 / 5, operations=6)  # 1/cosine

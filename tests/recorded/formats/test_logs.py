@@ -278,7 +278,7 @@ def test_a_log_of_the_way_is_the_truth_of_plots(tmp_path, given):
     )
     rows = [f"2024-05-01T10:00:{10 * k + 5:02}Z,{cells},{r:.3f},0\n" for k, r in enumerate(SEEN)]
     text = f"Time,{header},range [m],azimuth [deg]\n{''.join(rows)}".encode()
-    options = Options(site=SITE, truth=path, whose=whose)
+    options = Options(site=SITE, truth=path, owner=whose)
     if whose == "9":
         (line,) = refused(tmp_path, text, options, beside=["own.gpx"])
         assert "at that time and place; it has 9, the plots 1" in line
@@ -294,7 +294,7 @@ def test_a_log_is_of_nobody_until_that_is_said(tmp_path):
     (line,) = refused(tmp_path, text, Options(site=SITE, truth=str(truth)), beside=["truth"])
     assert line.endswith("has 4 without (if all are of one track ID of the plots: --truth ID=truth)")
     truth.write_bytes(gpx([point(1)]).replace(b"</gpx>", b"<trk>" + point(2).encode() + b"</trk></gpx>"))
-    (line,) = refused(tmp_path, text, Options(site=SITE, truth=str(truth), whose="1"), beside=["truth"])
+    (line,) = refused(tmp_path, text, Options(site=SITE, truth=str(truth), owner="1"), beside=["truth"])
     assert "must be the path of one alone, as 1= says; has 2, Ferry" in line
 
 

@@ -270,7 +270,7 @@ def test_too_many_folds_have_no_likelihood():
     columns = {"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t, "span_mps": np.full(15, 2.0)}
     likelihood = track.PlotLikelihood(case, case.spec.filters[5], [columns])
     assert likelihood(likelihood.stated) == -np.inf
-    _, sigma, _ = fit.fitted(likelihood).keys  # unless the velocities tell nothing
+    _, sigma, _ = fit.fit_keys(likelihood).keys  # unless the velocities tell nothing
     assert sigma.value >= 2.0
 
 
