@@ -22,6 +22,7 @@ from radarsim.app.ahead import Progress, Weighed
 from radarsim.app.case_work import CaseWork
 from radarsim.app.configs import Config, Overrides, command, load, repeated
 from radarsim.config.experiment import Case, Experiment
+from radarsim.config.load import texts
 from radarsim.engine import run as stopping
 from radarsim.engine.machine import available_cores
 from radarsim.engine.results import CaseResult
@@ -507,7 +508,7 @@ def trust(scheduler: str) -> str | None:
 def merged(overrides: Overrides, realisations: float | None = None, seed: int | None = None) -> tuple[str, ...]:
     """Overrides as texts, with realisations and seed, if given, as two more."""
     given = {"realisations": realisations, "seed": seed}
-    return (*configs.reading.texts(overrides), *(f"{key}={value}" for key, value in given.items() if value is not None))
+    return (*texts(overrides), *(f"{key}={value}" for key, value in given.items() if value is not None))
 
 
 def stored_result(

@@ -22,8 +22,8 @@ def problem(case: Case, design: Designed, baseline: int) -> Problem:
 
 def layout(design: Designed) -> Layout:
     """The arrays of the sums, and their shapes."""
-    shapes = (linear if design.plain else missed).shapes(len(design.filters), len(design.t))
-    return Layout(**shapes)
+    size = len(design.filters), len(design.t)
+    return Layout(**linear.shapes(*size) if design.plain else missed.shapes(*size))
 
 
 def shared_gains(case: Case, design: Designed, baseline: int) -> linear.Problem:
@@ -66,7 +66,9 @@ def own_gains(case: Case, design: Designed, baseline: int) -> missed.Problem:
 
 def errors(simulated_problem: Problem, first: int, count: int) -> np.ndarray:
     """The errors (F, count, K, 3) of the realisations of a block; NaN where a filter has no estimate."""
-    return (missed if isinstance(simulated_problem, missed.Problem) else linear).errors(simulated_problem, first, count)
+    if isinstance(simulated_problem, missed.Problem):
+        return missed.errors(simulated_problem, first, count)
+    return linear.errors(simulated_problem, first, count)
 
 
 def sums(simulated_problem: Problem, layout_of_sums: Layout, first: int, count: int) -> np.ndarray:

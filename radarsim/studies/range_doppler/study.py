@@ -166,10 +166,9 @@ class Known:
 
 def exact_values(designed_case: Designed, baseline: int) -> Known:
     """Of filters that get every plot."""
+    inputs = designed_case.plots, designed_case.x, designed_case.dt, designed_case.drawn
     errors = [
-        (given if d.given else filters).error_recursion(
-            d, designed_case.plots, designed_case.x, designed_case.dt, designed_case.drawn
-        )
+        given.error_recursion(d, *inputs) if d.given else filters.error_recursion(d, *inputs)
         for d in designed_case.filters
     ]
     lasting, covariance = np.stack([E for E, _ in errors]), np.stack([S for _, S in errors])
