@@ -349,7 +349,7 @@ def interval(but_one: np.ndarray, value: float) -> tuple[float, float, float]:
     return value, value - half, value + half
 
 
-def tornado(found: Sensitivity) -> Figure:
+def tornado(found: "Sensitivity") -> Figure:
     """Bars of the changes of the leading component by key: each quantity of each filter."""
     rows = [row for row in found.rows if row["component"] == found.leading]
     filters = list(dict.fromkeys(row["filter"] for row in rows))

@@ -727,7 +727,7 @@ def _told(
     )
 
 
-def _minimised(of: Objective, cases: int) -> str:
+def _minimised(of: "Objective", cases: int) -> str:
     """What the search makes least, or largest, in words."""
     said = of.curves[0].quantity.said
     if cases == 1:

@@ -22,8 +22,6 @@ from radarsim.report.sentences import Sentence
 if TYPE_CHECKING:
     import pandas as pd
 
-    Row = pd.Series[Any]
-
 TablesByName = Mapping[str, "pd.DataFrame"]
 ROUNDING = 1e-6  # per cent: half-width of a gain that is nought but for rounding, whose variance is a difference
 SINGLE = 1e-3  # per cent: width of the interval of a gain that is nought but for rounding to single precision
@@ -242,15 +240,15 @@ class _Comparison:
     name: str
     unit: str
     gains: "pd.DataFrame"  # against every other filter
-    sigma: "Row"  # of `curves`: the user filter's
-    best_sigma: "Row"  # of `curves`: that of the config's best filter
+    sigma: "pd.Series[Any]"  # of `curves`: the user filter's
+    best_sigma: "pd.Series[Any]"  # of `curves`: that of the config's best filter
     rivals: Mapping[str, float]  # the config's best filter, then its best tuned one, if any; their σ, exact first
 
     @property
     def best(self) -> str:
         return next(iter(self.rivals))
 
-    def gain_against(self, baseline: str) -> "Row":
+    def gain_against(self, baseline: str) -> "pd.Series[Any]":
         return self.gains[self.gains["baseline"] == baseline].iloc[0]
 
 
@@ -424,7 +422,7 @@ def _extreme_gains(gains: "pd.DataFrame", comparison: _Comparison) -> list[Sente
     return [Sentence(text, sentences.intervals("gains", "gain", extremes))]
 
 
-def _gain(row: "Row") -> str:
+def _gain(row: "pd.Series[Any]") -> str:
     """A gain with its interval, to a thousandth of a per cent, its bounds outward: what is finer is rounding."""
     value, low, high = (float(row[key]) for key in GAIN)
     rounded = np.round(value, 3), np.floor(1e3 * low) / 1e3, np.ceil(1e3 * high) / 1e3

@@ -511,7 +511,7 @@ def problem_of(
 class RowModel:
     """A filter's model over rows of recorded plots, whatever the times between them."""
 
-    def __init__(self, study: LinearStudy, spec: Any, filter_keys: Any):
+    def __init__(self, study: "LinearStudy", spec: Any, filter_keys: Any):
         self.study, self.spec, self.filter_keys = study, spec, filter_keys
         self.columns = study.columns(spec, filter_keys)
         self.matrices = study.matrices(spec, filter_keys)
@@ -561,7 +561,7 @@ class LinearTracker:
     most_rows: int | None = None
     several = False
 
-    def __init__(self, study: LinearStudy, spec: Any):
+    def __init__(self, study: "LinearStudy", spec: Any):
         self.study, self.names = study, tuple(keys.name for keys in spec.filters)
         self.filters = [RowModel(study, spec, keys) for keys in spec.filters]
         self.states = [(rows.matrices.x.copy(), rows.matrices.P.copy()) for rows in self.filters]
@@ -612,7 +612,7 @@ class PlotLikelihood:
 
     explains: tuple[str, ...] = (OUTLIERS, CORRELATION)
 
-    def __init__(self, study: LinearStudy, spec: Any, track: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
+    def __init__(self, study: "LinearStudy", spec: Any, track: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec, self.filter, self.model = spec, track.name, RowModel(study, spec, track)
         self.tracks, self.rows = len(tracks), sum(len(track["t_s"]) for track in tracks)
         self.keys = study.fitted

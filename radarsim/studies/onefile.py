@@ -371,7 +371,7 @@ class OneFileRecordings(RecordedPlots):
     from_any_origin = True
     of_any_keys = True
 
-    def __init__(self, study: OneFile, drawing: "Callable[[Case], Draw]", tracker: "Callable[[Case], Tracker]"):
+    def __init__(self, study: "OneFile", drawing: "Callable[[Case], Draw]", tracker: "Callable[[Case], Tracker]"):
         self.study, self._drawing, self._tracker = study, drawing, tracker
 
     def columns(self, spec: Any) -> Sequence[Sequence[str]]:

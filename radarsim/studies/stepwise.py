@@ -593,7 +593,7 @@ class Tracker:
     most_rows: int | None = None
     several = False
 
-    def __init__(self, study: StepStudy, spec: Any):
+    def __init__(self, study: "StepStudy", spec: Any):
         self.study, self.names = study, tuple(filter_keys.name for filter_keys in spec.filters)
         filter_steps = [study.kinds[filter_keys.kind] for filter_keys in spec.filters]
         self.filters = [
