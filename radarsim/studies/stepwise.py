@@ -535,7 +535,10 @@ def traced_step(function: Callable[..., Any], *arguments: Any) -> Any:
             if not isinstance(number, traced.Lane) and not math.isfinite(number)
         ]:
             raise fault(function, f"gives {wrong[0]:g}, which is no number to calculate with")
-    formulas = ([getattr(number, "at", number) for number in traced.leaves(numbers)] for numbers in (result, repeated))
+    formulas = (
+        [number.index if isinstance(number, traced.Lane) else number for number in traced.leaves(numbers)]
+        for numbers in (result, repeated)
+    )
     if next(formulas) != next(formulas):
         raise fault(function, f"{DIFFERENT_FORMULA}: draw by normals")
     return result
