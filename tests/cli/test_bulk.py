@@ -16,7 +16,7 @@ CLUTTER = "sweep.sensor.false_plots_per_km2=[0.03]"
 @pytest.fixture
 def small(monkeypatch):
     """Batches of eight, so that a few realisations are several."""
-    monkeypatch.setattr(follow, "NUMBERS", 1)
+    monkeypatch.setattr(follow, "NUMBERS_PER_DRAW", 1)
 
 
 @pytest.mark.parametrize(("config", "overrides"), [("rls2", ()), ("sonar_clutter", (CLUTTER,))])
