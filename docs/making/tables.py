@@ -12,7 +12,14 @@ from radarsim.report import notes, outside, rare
 from radarsim.report import tables as common
 from radarsim.studies import floor, registry
 
-SHARED = (common.leading, common.components, common.realisations, common.interval_columns, notes.exact_columns, notes.add_notes)
+SHARED = (
+    common.leading,
+    common.components,
+    common.realisations,
+    common.interval_columns,
+    notes.exact_columns,
+    notes.add_notes,
+)
 SEVERAL = {  # tables that studies have in common
     "curves": (common.curves, floor.with_floors),
     "gains": (common.gains,),

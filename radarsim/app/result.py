@@ -99,7 +99,7 @@ class Result(Shown):
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
         ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
-        return {name: with_note_texts(table).copy() for name, table in self._tables.items()}
+        return {name: with_note_texts(table) for name, table in self._tables.items()}
 
     @cached_property
     def _tables(self) -> dict:
@@ -116,12 +116,12 @@ class Result(Shown):
         >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
         True
         """
-        return with_note_texts(self._tables["curves"]).copy()
+        return with_note_texts(self._tables["curves"])
 
     @property
     def gains(self) -> "pd.DataFrame":
         """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
-        return with_note_texts(self._tables["gains"]).copy()
+        return with_note_texts(self._tables["gains"])
 
     @property
     def last_scan(self) -> "pd.DataFrame":

@@ -37,7 +37,7 @@ def new(name: str, like: str) -> None:
 @click.argument("name", metavar="NAME")
 @click.option("--step", is_flag=True, help="For nonlinear filters: you write the step of one realisation.")
 def new_study(name: str, step: bool) -> None:
-    """Write a package with a small study, to make your own: ./NAME.
+    """Write a package with a small study to edit: ./NAME.
 
     It compares two filters on a random walk: one file with keys, matrices, claims and a reading, from which kernel,
     exact values, tables, figures and recorded plots follow; a config; a test. With --step the filters are functions of

@@ -149,7 +149,7 @@ def solve(config: str, key: str, filter_name: str | None, as_json: bool, **given
 @click.option("--write", metavar="FILE.yaml", help="Also write a config with the tuned values.")
 @group.json_option
 def tune(config: str, filter_name: str | None, wanted: str, write: str | None, as_json: bool, **asked: Any) -> None:
-    """Find the best values of a filter's keys, and what they gain.
+    """Find the best values of a filter's keys, and the gain.
 
     The quantity is one of `radarsim solve`. Over several cases the root of the mean of σ², or the mean of a rate, is
     brought to its best. If σ is known exactly, so is the answer. Otherwise values are compared on the same noise, and
@@ -190,7 +190,7 @@ def tune(config: str, filter_name: str | None, wanted: str, write: str | None, a
 @group.drawing_options
 @group.json_option
 def chart(configs: tuple[str, ...], drawing: group.Drawing, as_json: bool, **asked: Any) -> None:
-    """Chart the gain by Doppler for all radars, with yours marked.
+    """Chart the gain by Doppler for all radars, yours marked.
 
     Simulates nothing. Draws gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), the only
     parameter that matters for a short scan period, and a map that includes the period. Prints where each case of CONFIG

@@ -42,7 +42,7 @@ CLASS_MEANINGS = {  # of each class, for the headline
 
 
 def claims_page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool = True) -> str:
-    """The page, from the rows of `claims.listed`; pages holds the stem of a paper's page, by the paper.
+    """The page, from the rows of `list_claims.claims`; pages holds the stem of a paper's page, by the paper.
 
     parts: whether a folded table of all measured parts follows."""
     text = [TITLE, "", INTRODUCTION, *_class_lines(rows), ""]

@@ -81,7 +81,7 @@ def interpretations(
     markdown: bool,
     **options: Any,
 ) -> None:
-    """Judge claims under every interpretation that the paper allows.
+    """Judge claims under every interpretation of the paper.
 
     A paper leaves choices open: how a filter starts, which flight, which of two printed numbers. Each claim is judged
     under all of them: exactly where possible, otherwise by small runs, which are stored and can be continued. E and U

@@ -211,7 +211,7 @@ class ChangedResults:
 
     results (in the order of the config) have the sums and axes of the run and the keys of the paper's own case, by
     which claims find it; run_results has them with the keys of the run. tables and places are as in
-    `claims.Evidence`."""
+    `evidence.Evidence`."""
 
     results: Sequence[CaseResult]
     run_results: Sequence[CaseResult]

@@ -114,7 +114,7 @@ def simulate(
     "--keep-marked", is_flag=True, help="Keep test targets, field monitors and coasted records in tracks and truth."
 )
 def import_(recording: str, output: str, **asked: Any) -> None:
-    """Read a recording into plots: ASTERIX, ADS-B, AIS, GPS or a table.
+    """Read ASTERIX, ADS-B, AIS, GPS or a table into plots.
 
     PLOTS.csv has one row per plot and all tracks of the recording, each named in the column `track`; `radarsim track`
     and `radarsim fit` read it. Its first lines describe the columns. For a damaged recording nothing is written.

@@ -532,6 +532,7 @@ def rows_of(track: Track, name: str | None = None) -> Iterator[tuple[str, ...]]:
 
 
 def number_text(value: float) -> str:
+    """A number as text, '' for NaN."""
     return "" if math.isnan(value) else repr(value)
 
 

@@ -65,7 +65,7 @@ def concerns(note: object, interval: str) -> bool:
 
 
 def with_note_texts(table: "pd.DataFrame") -> "pd.DataFrame":
-    """The table with the texts of its notes, as files have them; the same table where it has no notes."""
+    """A copy of the table with the texts of its notes, as files have them."""
     if "note" not in table or table["note"].dtype != object:
-        return table
+        return table.copy()
     return table.assign(note=[str(note) if isinstance(note, RowNote) else note for note in table["note"]])

@@ -391,9 +391,14 @@ class StepStudy(OneFile):
         tables_of_study = super().tables(results)
         if any("nees" in result.sums for result in results):
             tested = [result for result in results if "nees" in result.sums]
-            tables_of_study["curves"] = tables.joined(map(self._curves, results))
+            tables_of_study["curves"] = self.curves(results)
             tables_of_study["consistency"] = tables.joined(map(self._consistency, tested))
         return tables_of_study
+
+    def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.report import tables
+
+        return tables.joined(map(self._curves, results))
 
     def _curves(self, result: CaseResult) -> Mapping[str, Any]:
         """The curves, with the σ that filters with a covariance predict: the root of its mean variance."""
@@ -535,7 +540,10 @@ def traced_step(function: Callable[..., Any], *arguments: Any) -> Any:
             if not isinstance(number, traced.Lane) and not math.isfinite(number)
         ]:
             raise fault(function, f"gives {wrong[0]:g}, which is no number to calculate with")
-    formulas = ([getattr(number, "at", number) for number in traced.leaves(numbers)] for numbers in (result, repeated))
+    formulas = (
+        [number.index if isinstance(number, traced.Lane) else number for number in traced.leaves(numbers)]
+        for numbers in (result, repeated)
+    )
     if next(formulas) != next(formulas):
         raise fault(function, f"{DIFFERENT_FORMULA}: draw by normals")
     return result

@@ -10,6 +10,7 @@ import pytest
 from radarsim.cli import console, outcomes
 from radarsim.config import document
 from radarsim.papers.claims_table import CLASS_COLUMNS
+from radarsim.papers.print_claims import print_claims
 from radarsim.report import notes
 from radarsim.report.wording import significant_digits
 from radarsim.threads import limited
@@ -59,16 +60,16 @@ def parts(*extensions):
 
 def test_a_part_that_is_not_counted_says_so(capsys):
     """Beside the paper's own parts, once; of a claim that is an extension as a whole its first line says it."""
-    outcomes.print_claims(parts(False, True), {"P9.1"})
+    print_claims(parts(False, True), {"P9.1"})
     lines = capsys.readouterr().out.split("size")[1:]
     assert ["extension, not counted" in line for line in lines] == [False, True]
-    outcomes.print_claims(parts(True, True), {"P9.1"})
+    print_claims(parts(True, True), {"P9.1"})
     assert capsys.readouterr().out.count("extension, not counted") == 1
 
 
 def test_a_list_of_claims_is_a_line_each(capsys):
     long = "one two three four five six seven eight nine ten eleven twelve thirteen"
-    outcomes.print_claims([*parts(False, False), *[one | {"claim": "P9.2", "statement": long} for one in parts(False)]])
+    print_claims([*parts(False, False), *[one | {"claim": "P9.2", "statement": long} for one in parts(False)]])
     first, second, counted, hint = capsys.readouterr().out.splitlines()
     assert first == "P9.1   confirmed  It is so"
     assert second == f"P9.2   confirmed  {long.removesuffix('thirteen')}…"
@@ -85,7 +86,7 @@ def test_every_claim_is_one_line_of_a_terminal(monkeypatch):
     long = "a claim of very many words that no line of such a terminal could ever hold"
     of = [("P9.1", "depends on", False), ("P9.2", "the print contradicts itself", False), ("P9.3", "refuted", True)]
     rows = [one | {"claim": claim, "class": kind, "statement": long} for claim, kind, ours in of for one in parts(ours)]
-    outcomes.print_claims(rows)
+    print_claims(rows)
     claims, told = screen.getvalue().splitlines()[:3], screen.getvalue().splitlines()[3:]
     assert [line.split()[0] for line in claims] == ["P9.1", "P9.2", "P9.3"]
     assert [line[6:36].strip() for line in claims] == ["depends", "the print contradicts itself", "(refuted)"]

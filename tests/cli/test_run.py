@@ -13,7 +13,10 @@ import pytest
 from radarsim.cli import main
 from tests.program import command, csv_bytes, newcomer, record
 
-CURVES = "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma,exact_bias,n_eff"
+CURVES = (
+    "case,filter,component,unit,k,t_s,n,sigma,sigma_lo,sigma_hi,bias,bias_se,spread,exact_sigma,exact_bias,n_eff,"
+    "believed_sigma,floor,floor_kind"
+)
 GAINS = "case,filter,baseline,component,k,t_s,gain_percent,gain_lo,gain_hi,exact_percent"
 
 
@@ -166,8 +169,8 @@ def test_linear_algebra_takes_one_thread_unless_told_otherwise(given, threads):
     ],
 )
 def test_what_is_written_like_a_claim_and_is_none_is_told_which_there_are(name, said):
-    from radarsim.app.run import claims
     from radarsim.errors import ConfigError
+    from radarsim.papers.list_claims import claims
 
     with pytest.raises(ConfigError) as caught:
         claims(name, out="nowhere")
@@ -177,7 +180,7 @@ def test_what_is_written_like_a_claim_and_is_none_is_told_which_there_are(name, 
 
 @pytest.mark.slow
 def test_claims_are_shown_by_name_by_paper_and_beside_those_of_a_config(tmp_path):
-    from radarsim.app.run import claims
+    from radarsim.papers.list_claims import claims
 
     def named(*names):
         return [row["claim"] for row in claims(*names, out=tmp_path).rows]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from radarsim.app.run import load_all
-from radarsim.cli.outcomes import report
 from radarsim.recorded import follow, plots
 from radarsim.recorded.fit import SPAN_SEARCH_STEPS, detect_folding, folding_message
 from radarsim.recorded.page import FITS, FOLD_LOST, MAYBE_TOO_SMALL, judged
+from radarsim.recorded.print_results import print_track
 from tests.program import Terminal, command
 from tests.tolerances import Z, mean_error
 
@@ -109,7 +109,7 @@ def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path,
         screens = {name: Terminal() for name in ("stdout", "stderr")}
         for name, screen in screens.items():
             monkeypatch.setattr(f"sys.{name}", screen)
-        report(found, judged(found), None, stderr)
+        print_track(found, judged(found), None, stderr)
         own, other = (screens[name].getvalue() for name in (("stderr", "stdout") if stderr else ("stdout", "stderr")))
         assert other == ""
         lines = [re.sub(r"\x1b\[\d*m", "", line) for line in own.splitlines()]

@@ -3,6 +3,7 @@
 import pytest
 
 from radarsim import language
+from radarsim.papers import report_section
 from radarsim.report import html, wording
 
 MADE = ("curves", "gains", "locks", "detections", "consistency")
@@ -28,11 +29,11 @@ def test_a_claim_leads_to_the_figure_of_its_component():
         "missed": ("curves",),
         "locks": ("locks",),
     }
-    assert html.figures_showing_tables([("gains", "Vr")], drawn) == ["gain_Vr"]
-    assert html.figures_showing_tables([("curves", "r"), ("gains", "r")], drawn) == ["sigma_r", "gain_r"]
-    assert html.figures_showing_tables([("curves", "ar")], drawn) == ["sigma_r", "missed"]  # its own is not drawn
-    assert html.figures_showing_tables([("locks", ""), ("none", "")], drawn) == ["locks"]
-    assert html.figures_showing_tables([], drawn) == []
+    assert report_section.linked_figures([("gains", "Vr")], drawn) == ["gain_Vr"]
+    assert report_section.linked_figures([("curves", "r"), ("gains", "r")], drawn) == ["sigma_r", "gain_r"]
+    assert report_section.linked_figures([("curves", "ar")], drawn) == ["sigma_r", "missed"]  # its own is not drawn
+    assert report_section.linked_figures([("locks", ""), ("none", "")], drawn) == ["locks"]
+    assert report_section.linked_figures([], drawn) == []
 
 
 def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():

@@ -137,7 +137,7 @@ def test_its_claims_are_listed_among_all(ran, radarsim, tmp_path):
     rows = json.loads(radarsim("claims", "--json").stdout)
     (own,) = [row for row in rows if row["claim"] == "fifth.1"]
     assert (own["paper"], own["overall"], own["config"]) == (
-        *("Kalman 1960", "confirmed as shipped; other readings not judged", "fifth"),
+        *("Kalman 1960", "confirmed as shipped; other interpretations not judged", "fifth"),
     )
     assert {row["claim"].partition(".")[0] for row in rows} == {"P1", "P2", "P3", "P4", "fifth"}
     assert "fifth.1" in radarsim("claims", "fifth").stdout

@@ -6,9 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from radarsim.report.claims import Evidence, PaperClaims
 
 from radarsim.config.fields import Study as Keys
+from radarsim.papers.claim import PaperClaims
+from radarsim.papers.evidence import Evidence
+from radarsim.papers.paper_keys import paper_key
+from radarsim.papers.study_claims import claims_of
 from radarsim.studies import registry
 from radarsim.studies.interface import RecordedPlots, Study
 
@@ -27,10 +30,10 @@ def test_methods_take_the_parameters_of_the_interface(study):
 @pytest.mark.parametrize("study", STUDIES, ids=lambda study: study.name)
 def test_keys_claims_and_recorded_plots_are_of_the_declared_types(study):
     assert issubclass(study.keys(), Keys)
-    claims = study.claims()
+    claims = claims_of(study)
     assert isinstance(claims, PaperClaims)
     assert issubclass(claims.evidence, Evidence)
-    assert {claim.id.partition(".")[0] for claim in claims.claims} == {study.paper_key()}
+    assert {claim.id.partition(".")[0] for claim in claims.claims} == {paper_key(study)}
     assert isinstance(study.recording_interface(), RecordedPlots | None)
 
 

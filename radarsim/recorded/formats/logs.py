@@ -146,6 +146,7 @@ def _record_rows(document: Sequence[Any], sheet: Sheet) -> Iterator[list[str]]:
 
 
 def finite_number(value: Any) -> float:
+    """A value as a float; NaN where it is no number or implausibly large."""
     return float(value) if isinstance(value, int | float) and abs(value) < 1e18 else math.nan
 
 

@@ -86,11 +86,11 @@ class AmbiguousDoppler(Study):
         return tables.inputs(results)
 
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         from radarsim.studies.ambiguous_doppler import figures
 
-        return figures.figures(results, made, experiment)
+        return figures.figures(results, tables, experiment)
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         from radarsim.studies.ambiguous_doppler import figures
@@ -102,10 +102,10 @@ class AmbiguousDoppler(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.ambiguous_doppler import words
 
-        return words.answer(results, made)
+        return words.answer(results, tables)
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
         from radarsim.studies.ambiguous_doppler import words

@@ -68,11 +68,11 @@ class Discriminator(Study):
         return tables.curves(results)
 
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         from radarsim.studies.discriminator import figures
 
-        return figures.figures(results, made, experiment)
+        return figures.figures(results, tables, experiment)
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         from radarsim.studies.discriminator import figures
@@ -84,10 +84,10 @@ class Discriminator(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.discriminator import words
 
-        return words.answer(results, made)
+        return words.answer(results, tables)
 
 
 STUDY = Discriminator()

@@ -73,17 +73,17 @@ class MultiModel(Study):
 
         return tables.tables(results)
 
-    def cost(self, made: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
-        from radarsim.studies.multimodel import tables
+    def cost(self, tables: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":
+        from radarsim.studies.multimodel.tables import cost
 
-        return tables.cost(made, run)
+        return cost(tables, run)
 
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         from radarsim.studies.multimodel import figures
 
-        return figures.figures(results, made, experiment)
+        return figures.figures(results, tables, experiment)
 
     def shown(self) -> Sequence[Component]:
         from radarsim.studies.multimodel import figures
@@ -100,10 +100,10 @@ class MultiModel(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.multimodel import words
 
-        return words.answer(results, made)
+        return words.answer(results, tables)
 
     def recording_interface(self) -> "Recorded":
         from radarsim.studies.multimodel.track import Recorded

@@ -94,6 +94,11 @@ class RangeDoppler(Study):
 
         return tables.tables(results)
 
+    def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.studies.range_doppler import tables
+
+        return tables.curves(results)
+
     def gains(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
         from radarsim.studies.range_doppler import tables
 
@@ -105,11 +110,11 @@ class RangeDoppler(Study):
         return tables.inputs(results)
 
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         from radarsim.studies.range_doppler import figures
 
-        return figures.figures(results, made, experiment)
+        return figures.figures(results, tables, experiment)
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         from radarsim.studies.range_doppler import figures
@@ -121,10 +126,10 @@ class RangeDoppler(Study):
 
         return words.question(experiment)
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.range_doppler import words
 
-        return words.answer(results, made)
+        return words.answer(results, tables)
 
     def recording_interface(self) -> "Recorded":
         from radarsim.studies.range_doppler.track import Recorded

@@ -156,6 +156,11 @@ def _curves(result: Result) -> common.Columns:
     return common.curve_columns(result, np.sqrt(variance))
 
 
+def curves(results: Sequence[Result]) -> "pd.DataFrame":
+    """The table `curves` alone."""
+    return common.joined(map(_curves, results))
+
+
 @table("consistency")
 def _normalised_errors(result: Result) -> common.Columns:
     """NEES of all components that a filter estimates at a scan; the bounds are shared among all scans of a filter.

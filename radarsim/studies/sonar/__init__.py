@@ -277,13 +277,18 @@ class Sonar(Study):
             tables |= {} if part is SMOOTHING else part.tables(members)
         return {name: table for name, table in tables.items() if len(table)}
 
+    def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
+        from radarsim.studies.sonar import tables
+
+        return tables.curves(results)
+
     def figures(
-        self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
         figures: dict[str, Figure | None] = {}
         for part, members in reversed(by_part(results)):  # first what answers the question, which is the last part's
-            figures |= {} if part is SMOOTHING else part.figures(members, made, experiment)
-        figures |= SMOOTHING.figures(results, made, experiment)
+            figures |= {} if part is SMOOTHING else part.figures(members, tables, experiment)
+        figures |= SMOOTHING.figures(results, tables, experiment)
         return {name: figure for name, figure in figures.items() if figure}
 
     def shown(self) -> "Sequence[Component]":
@@ -298,8 +303,8 @@ class Sonar(Study):
         part, cases = by_part(experiment.cases)[-1]
         return part.question([case.spec for case in cases])
 
-    def answer(self, results: "Sequence[CaseResult]", made: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        answers = (part.answer(members, made) for part, members in reversed(by_part(results)))
+    def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+        answers = (part.answer(members, tables) for part, members in reversed(by_part(results)))
         return [sentence for answer in answers for sentence in answer]
 
     def recording_interface(self) -> "RecordedPlots":

@@ -63,6 +63,11 @@ def _curves(result: CaseResult[SonarAxes]) -> Columns:
     return common.curve_columns(result, np.sqrt(variance))
 
 
+def curves(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
+    """The table `curves` alone."""
+    return common.joined(map(_curves, results))
+
+
 @table("consistency")
 def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
     """NEES of a coordinate's state, where it is complete; the bounds are shared among all scans of a filter."""

@@ -8,6 +8,7 @@ import pytest
 from radarsim.app import run
 from radarsim.bursts.burst import phase_turns, sample_times, signal
 from radarsim.papers.discriminator import measures
+from radarsim.papers.evidence import MissingEvidence
 from radarsim.report.drawing import Line
 from radarsim.studies.discriminator import study, words
 from radarsim.studies.discriminator import tables as report
@@ -170,7 +171,7 @@ def replace_estimator(estimator, **change):
 def test_a_case_is_found_by_its_interpretation(made):
     evidence = measures.Evidence(made.cases, made.tables, {})
     assert evidence.case(measures.COMPUTED) is made.cases[0]
-    with pytest.raises(measures.Missing):
+    with pytest.raises(MissingEvidence):
         evidence.case(measures.PRINTED)
 
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from radarsim.papers.range_doppler import filter_versions
 from radarsim.papers.range_doppler.measures import RADARS
 from radarsim.physics import manoeuvre_covariance, transition
-from radarsim.studies.range_doppler import filters, search
+from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler.filters import Plots, design
 from tests.studies.range_doppler import naive
 from tests.tolerances import absolute_product, assert_rounded, rounding, scaled_condition
@@ -17,7 +18,7 @@ VARIANCES = (1e-5, 1e-3, 1e-1)
 @pytest.mark.parametrize(("start", "scans"), [("weighted", (3, 2)), ("four_and_four", (4, 4))])
 def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scans):
     sigma, dt = np.array(radar[:2], dtype=float), radar[2]
-    found = search.both(radar, [("random_jerk", v, start) for v in VARIANCES], 29)
+    found = filter_versions.both(radar, [("random_jerk", v, start) for v in VARIANCES], 29)
     for observes, of in zip((1, 2), found, strict=True):
         for i, variance in enumerate(VARIANCES):
             one = design(observes, scans[observes - 1], variance, sigma, dt, 29)
@@ -37,7 +38,7 @@ def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scan
 def test_a_start_with_process_noise_is_a_kalman_filter_without_a_prior(observes):
     sigma, dt = np.array([25.0, 5.0]), 10.0
     Q, variance, push = manoeuvre_covariance(1e-2, dt), 1e-2, np.array([dt**3 / 6, dt**2 / 2, dt])
-    believed, _ = search.started("process_noise", observes, sigma, dt, Q[None])
+    believed, _ = filter_versions.started("process_noise", observes, sigma, dt, Q[None])
     # The information form of the filter, from nothing: plot, step, plot, …
     H, R = np.eye(3)[:observes], np.diag(sigma[:observes] ** 2)
     F = transition(dt)
@@ -54,8 +55,8 @@ def test_a_start_with_process_noise_is_a_kalman_filter_without_a_prior(observes)
 def test_the_true_error_of_a_start_with_process_noise_is_that_of_its_weights():
     sigma, dt = np.array([25.0, 5.0]), 10.0
     Q = manoeuvre_covariance(1e-1, dt)[None]
-    believed, true = search.started("process_noise", 2, sigma, dt, Q)
-    least, _ = search.started("weighted", 2, sigma, dt, Q)
+    believed, true = filter_versions.started("process_noise", 2, sigma, dt, Q)
+    least, _ = filter_versions.started("weighted", 2, sigma, dt, Q)
     gap = np.linalg.eigvalsh(true[0] - least[0])
     assert gap.min() > -rounding(scaled_condition(least[0]), 10) * np.trace(true[0])
     assert gap.max() > 0
@@ -64,13 +65,13 @@ def test_the_true_error_of_a_start_with_process_noise_is_that_of_its_weights():
 
 def test_first_differences_and_unweighted_starts_by_hand():
     sigma, dt, Q = np.array([30.0, 4.0]), 5.0, np.zeros((1, 3, 3))
-    _, true = search.started("first_differences", 2, sigma, dt, Q)
+    _, true = filter_versions.started("first_differences", 2, sigma, dt, Q)
     assert_rounded(np.diag(true[0]), [30.0**2, 4.0**2, 2 * 4.0**2 / dt**2], operations=10)
-    _, three = search.started("first_differences", 1, sigma, dt, Q)
+    _, three = filter_versions.started("first_differences", 1, sigma, dt, Q)
     assert_rounded(np.diag(three[0]), [30.0**2, 2 * 30.0**2 / dt**2, 6 * 30.0**2 / dt**4], operations=10)
     rows = np.concatenate([np.eye(3)[:2] @ transition(-dt), np.eye(3)[:2]])  # both scans, plain least squares
     weights = np.linalg.inv(rows.T @ rows) @ rows.T
-    _, plain = search.started("unweighted", 2, sigma, dt, Q)
+    _, plain = filter_versions.started("unweighted", 2, sigma, dt, Q)
     exact_form = weights @ np.diag(np.tile(sigma**2, 2)) @ weights.T
     size = absolute_product(weights, np.diag(np.tile(sigma**2, 2)), weights.T)
     assert_rounded(plain[0], exact_form, size=size, condition=scaled_condition(rows.T @ rows), operations=10)
@@ -83,10 +84,10 @@ def test_forms_of_the_manoeuvre_covariance():
     for _ in range(steps):  # a white jerk of density 1 is many small independent steps of acceleration
         g = np.array([0.0, 0.0, 1.0])
         Q = small @ Q @ small.T + dt / steps * np.outer(g, g)
-    white = search.covariance_of("white_jerk", 1.0, 1.0, dt)
+    white = filter_versions.covariance_of("white_jerk", 1.0, 1.0, dt)
     np.testing.assert_allclose(white, Q, rtol=3 / steps)  # a sum of t⁴ is 5/2 of a step off its integral
-    assert_rounded(search.covariance_of("white_jerk_rate", 1.0, 1.0, dt), dt * white, operations=10)
-    step = search.covariance_of("acceleration_step", 2.0, 1.0, dt)
+    assert_rounded(filter_versions.covariance_of("white_jerk_rate", 1.0, 1.0, dt), dt * white, operations=10)
+    step = filter_versions.covariance_of("acceleration_step", 2.0, 1.0, dt)
     np.testing.assert_array_equal(step, 2.0 * np.outer([8.0, 4.0, 1.0], [8.0, 4.0, 1.0]))
-    normalised = search.covariance_of("normalised", 1e-3, 25.0, dt)
+    normalised = filter_versions.covariance_of("normalised", 1e-3, 25.0, dt)
     assert_rounded(normalised, manoeuvre_covariance(1e-3 * 625, dt), operations=10)

@@ -89,7 +89,7 @@ def test_cases_of_all_parts_in_one_run(tmp_path):
     (tmp_path / "all.yaml").write_text("include: [plain, moving, among]\n", encoding="utf-8")
     result = radarsim.run(tmp_path / "all.yaml")
     rows = {name: set(table["case"]) for name, table in result.tables.items() if "case" in table}
-    assert rows["extrapolation"] == rows["believed"] == {"plain", "moving", "among"}
+    assert rows["extrapolation"] == rows["curves"] == {"plain", "moving", "among"}
     assert rows["plots"] == {"plain"}
     assert rows["detections"] == {"moving"}
     assert rows["tracks"] == {"among"}
