@@ -99,7 +99,7 @@ schema: $(VENV)/installed
 
 # The tables that `radarsim doctor` compares with: made anew after a change that is meant to change numbers.
 known: $(VENV)/installed
-	$(BIN)/python -m radarsim.app.doctor
+	$(BIN)/python -m radarsim.api.maintenance.doctor
 
 # Every warning is an error: a link that leads nowhere, a page in no contents, a docstring that does not read.
 docs: $(VENV)/documented

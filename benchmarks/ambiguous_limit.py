@@ -19,8 +19,8 @@ from pathlib import Path
 import limits
 import numpy as np
 
-from radarsim.app.configs import load
-from radarsim.studies.ambiguous_doppler import filters, study
+from radarsim.api.configs import load
+from radarsim.studies.ambiguous_doppler import exact_errors, filter_design, study
 
 SOURCE = Path(__file__).with_suffix(".c")
 DOUBLES = ctypes.POINTER(ctypes.c_double)
@@ -41,15 +41,15 @@ def plan_of(radar: str):
     memory = next(one for one in case.spec.filters if one.name == "memory")
     spec = case.spec.model_copy(update={"filters": (memory,), "baseline": None})
     plan = study.prepare(type(case)(case.name, case.stem, case.study, spec, (), 1, 1))
-    of = filters.kalman_gains(
-        filters.members(memory)[0], spec.prior, plan.world.sigma, spec.radar.scan_period_s, spec.scans
+    of = exact_errors.kalman_gains(
+        filter_design.members(memory)[0], spec.prior, plan.world.sigma, spec.radar.scan_period_s, spec.scans
     )
     gains = np.zeros((spec.scans, 8))
     gains[:, 1:4], gains[:, 4], gains[:, 5:] = of.range, of.variance, of.velocity
     for k in range(1, spec.scans):
         P = (
             of.F @ of.covariance[k - 1] @ of.F.T
-            + filters.model(2, memory.manoeuvre_variance, spec.radar.scan_period_s)[1]
+            + filter_design.model(2, memory.manoeuvre_variance, spec.radar.scan_period_s)[1]
         )
         gains[k, 0] = 0.5 / (P[0, 0] + plan.world.sigma[0] ** 2)
     return plan, spec, memory, np.ascontiguousarray(gains)

@@ -22,8 +22,8 @@ def compiled(names: list[str]) -> dict[str, float]:
     """CPU seconds by kernel that is called from Python, of all cases of these configs."""
     from numba.core import event
 
-    from radarsim.app.case_work import CaseWork
-    from radarsim.app.configs import load
+    from radarsim.api.case_work import CaseWork
+    from radarsim.api.configs import load
 
     found: dict[str, float] = {}
 
@@ -51,7 +51,7 @@ def compiled(names: list[str]) -> dict[str, float]:
 
 def studies() -> dict[str, list[str]]:
     """The shipped configs of each study."""
-    from radarsim.app.configs import load
+    from radarsim.api.configs import load
 
     out: dict[str, list[str]] = {}
     for path in sorted(CONFIGS.glob("*.yaml")):

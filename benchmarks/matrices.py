@@ -10,12 +10,15 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.config.experiment import Case
-from radarsim.config.fields import Member, Model, Positive, Probability, key
+from radarsim.config.key_types import Positive, Probability, key
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member
+from radarsim.report.quantities import Component
 from radarsim.studies import registry
 from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Component, Measured
+from radarsim.studies.onefile import Measured
 
 SCANS, BLOCK = 15, 8192
 WORK = {  # states, numbers of a plot, process noises, probability of a plot

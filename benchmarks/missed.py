@@ -9,8 +9,8 @@ import argparse
 import statistics
 import time
 
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
 
 WORLDS = (
     ("radar.detection_probability=0.9",),

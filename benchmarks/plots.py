@@ -18,18 +18,20 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 import radarsim
-from radarsim.app.configs import load
-from radarsim.kernels import linear
-from radarsim.kernels.compile import aligned_zeros, kernel
+from radarsim.api.configs import load
+from radarsim.kernels import random, second_order
+from radarsim.kernels.compiler import aligned_zeros, kernel
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies import registry
-from radarsim.studies.ambiguous_doppler.kernels import records as folds
-from radarsim.studies.ambiguous_doppler.kernels.steps import fill_normals, put_plots
-from radarsim.studies.multimodel.kernels import records, strip
-from radarsim.studies.range_doppler.kernels import missed
-from radarsim.studies.sonar import study as sonar
-from radarsim.studies.sonar.kernels.patterns import detect
-from radarsim.studies.sonar.kernels.shared_gains import CHUNK, move_and_measure
+from radarsim.studies.ambiguous_doppler.kernels import layout
+from radarsim.studies.ambiguous_doppler.kernels.plots import fill_normals, put_plots
+from radarsim.studies.multimodel.kernels import layout as kernels_layout
+from radarsim.studies.multimodel.kernels import plots as kernels_plots
+from radarsim.studies.range_doppler.kernels import missed_block, missed_draws, missed_steps
+from radarsim.studies.sonar import kernel_inputs
+from radarsim.studies.sonar.kernels.plots import detect
+from radarsim.studies.sonar.kernels.shared_gains import CHUNK
+from radarsim.studies.sonar.kernels.world import move_and_measure
 from radarsim.studies.sonar.scene import build_scene
 
 CASES = {  # config, overrides, realisations, realisations in a chunk
@@ -44,23 +46,23 @@ CASES = {  # config, overrides, realisations, realisations in a chunk
 
 @kernel
 def draw_plain(x, count, key, truth, sigma):
-    next_word = np.empty(linear.CHUNK, np.uint64)
-    for first in range(0, count, linear.CHUNK):
+    next_word = np.empty(second_order.CHUNK, np.uint64)
+    for first in range(0, count, second_order.CHUNK):
         for k in range(truth.shape[0]):
-            linear.fill_plots(key, first, k, truth[k], sigma[k], next_word, x[0], x[1])
+            second_order.fill_plots(key, first, k, truth[k], sigma[k], next_word, x[0], x[1])
 
 
 @kernel
 def draw_missed(made, count, problem):
     keys, truth, sigma, detection = problem.keys, problem.truth, problem.sigma, problem.detection
-    at, next_word = missed.places(made), np.empty(missed.CHUNK, np.uint64)
-    for first in range(0, count, missed.CHUNK):
-        missed.begin_chunk(keys, first, made, problem.bias, problem.sigma_bias, problem.sigma_flight)
+    at, next_word = missed_steps.addresses(made), np.empty(missed_steps.CHUNK, np.uint64)
+    for first in range(0, count, missed_steps.CHUNK):
+        missed_block.begin_chunk(keys, first, made, problem.bias, problem.sigma_bias, problem.sigma_flight)
         for k in range(truth.shape[0]):
-            missed.fill_plots(keys[0], first, k, truth[k], sigma, next_word, made.plots[0], made.plots[1])
+            second_order.fill_plots(keys[0], first, k, truth[k], sigma, next_word, made.plots[0], made.plots[1])
             if k % 2 == 0:
-                missed.fill_uniform_pairs(keys[1], first, k // 2, made.detected, made.other)
-            missed.count_plots(at, k, detection, missed.CHUNK)
+                random.fill_uniform_pairs(keys[1], first, k // 2, made.detected, made.other)
+            missed_draws.count_plots(at, k, detection, missed_steps.CHUNK)
 
 
 @kernel
@@ -83,23 +85,23 @@ def drawing_alone(name: str, case: object, count: int) -> Callable[[], object] |
     plan = registry.study(case.study).prepare(case)
     if name.startswith("sonar"):
         scene = build_scene(case)
-        world, detections = sonar.world(case, scene), sonar.detections(case, scene)
+        world, detections = kernel_inputs.kernel_world(case, scene), kernel_inputs.kernel_detections(case, scene)
         room, detected = np.zeros((world.fresh.shape[1], 4, CHUNK)), np.empty(CHUNK)
         return None if "clutter" in name else lambda: draw_sonar(room, detected, count, world, detections)
     if name == "multimodel":
-        world, random = plan.world, rows(strip.RANDOM)
-        of = world.keys, world.frame, world.plot_truth, records.START
-        plots = rows(len(world.truth) * records.PLOT)
-        return lambda: [strip.fill_plots(*of, first, random, plots) for first in range(0, count, WIDTH)]
+        world, random = plan.world, rows(kernels_plots.RANDOM)
+        of = world.keys, world.frame, world.plot_truth, kernels_layout.START
+        plots = rows(len(world.truth) * kernels_layout.PLOT)
+        return lambda: [kernels_plots.fill_plots(*of, first, random, plots) for first in range(0, count, WIDTH)]
     if name == "ambiguous_rls2":
         scans = len(plan.world.t)
-        normals, plots = rows(2 + 2 * scans), rows(scans * folds.PLOT)
+        normals, plots = rows(2 + 2 * scans), rows(scans * layout.PLOT)
         return lambda: draw_folded(normals, plots, count, plan.world)
     problem = plan.problem.plain()
-    if isinstance(problem, missed.Problem):
-        made = missed.work(1)
+    if isinstance(problem, missed_block.Problem):
+        made = missed_steps.make_workspace(1)
         return lambda: draw_missed(made, count, problem)
-    x = aligned_zeros(2, linear.CHUNK)
+    x = aligned_zeros(2, second_order.CHUNK)
     return lambda: draw_plain(x, count, problem.key, problem.truth, problem.sigma)
 
 

@@ -7,7 +7,7 @@ import argparse
 import statistics
 import time
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.studies.registry import study
 
 

@@ -26,7 +26,7 @@ PAIRS = {10**6: 15, 10**7: 7, 10**8: 3}
 
 def overhead(n: int) -> dict:
     """Engine over kernels, without and with a store; what the main thread does beside is in it."""
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
 
     made = work()
     with ThreadPoolExecutor(1) as pool, tempfile.TemporaryDirectory() as folder:
@@ -52,7 +52,7 @@ def overhead(n: int) -> dict:
 def scaling(n: int) -> dict:
     """Wall time of one over that of two threads, and workers."""
     from radarsim.engine.cluster import Cluster
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
 
     made = work()
     collect(made, 10**6)
@@ -71,7 +71,7 @@ def large(n: int) -> dict:
     """One run as the command does it, with a store: seconds, rate, peak memory in MiB, distance from exact σ."""
     import numpy as np
 
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
 
     made = work()
     made.simulate(0, 1)

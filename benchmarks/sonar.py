@@ -33,8 +33,8 @@ SONAR = {
 
 def work(config, coordinates: int, **sensor):
     """A case as the engine sees it, and its filter-scans a realisation, in each of so many coordinates."""
-    from radarsim.app.case_work import CaseWork
-    from radarsim.app.configs import load
+    from radarsim.api.case_work import CaseWork
+    from radarsim.api.configs import load
 
     if sensor:
         config = config | {"sensor": config["sensor"] | sensor}

@@ -38,9 +38,9 @@ def config(association: str, density: float) -> dict:
 
 def measure(n: int) -> dict:
     """Figures of one process."""
-    from radarsim.app.case_work import CaseWork
-    from radarsim.app.configs import load
-    from radarsim.studies.sonar.clutter.kernels.tracker import FALSE, FALSE_KEPT, LOOKED
+    from radarsim.api.case_work import CaseWork
+    from radarsim.api.configs import load
+    from radarsim.studies.sonar.clutter.kernels.track_sums import FALSE_CONFIRMED, FALSE_IN_GATE_COUNT, GATE_COUNT
 
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-1:])
     out = {}
@@ -53,11 +53,11 @@ def measure(n: int) -> dict:
             sums = sum(work.simulate(first, work.block) for first in range(0, n, work.block))
             best = min(best, time.thread_time() - started)
         found = work.plan.layout.unpack(sums)
-        false = found["begun"][0, :, : FALSE_KEPT + 1].sum()
+        false = found["begun"][0, :, : FALSE_CONFIRMED + 1].sum()
         out[name] = {
             "million_track_scans_per_s": (n * SCANS + false) / best / 1e6,
             "of_the_target_alone": n * SCANS / best / 1e6,
-            "false_in_gate": found["counts"][0, :, FALSE].sum() / found["counts"][0, :, LOOKED].sum(),
+            "false_in_gate": found["counts"][0, :, FALSE_IN_GATE_COUNT].sum() / found["counts"][0, :, GATE_COUNT].sum(),
         }
     return out
 

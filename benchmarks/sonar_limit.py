@@ -21,7 +21,8 @@ import numpy as np
 import sonar
 import sonar_clutter
 
-from radarsim.studies.sonar.clutter.kernels.tracker import COUNTS, FALSE_COUNTS, FALSE_KEPT, PDA, RATIOS
+from radarsim.studies.sonar.clutter.kernels.gate import PDA
+from radarsim.studies.sonar.clutter.kernels.track_sums import COUNTS, FALSE_CONFIRMED, FALSE_COUNTS, RATIOS
 
 SUMS = 29  # of a filter, scan and coordinate: as in sonar_limit.c
 PLACES = {"error": slice(0, 12), "paired": slice(12, 15), "estimates": slice(15, 18), "joint": slice(21, 25)}
@@ -158,7 +159,7 @@ def one_tracker(library, pool, n: int, pairs: int, name: str) -> str:
         library.tracked(ctypes.byref(world), ctypes.byref(own), ctypes.c_uint64(0), n, *to)
 
     found, mine, least, ratio = timed(made, pool, limit, n, pairs)
-    tracks = n * scans + found["begun"][0, :, : FALSE_KEPT + 1].sum()
+    tracks = n * scans + found["begun"][0, :, : FALSE_CONFIRMED + 1].sum()
     # Whole numbers, but for the expected number of false plots and for weights, which ratios sum.
     same = all(np.allclose(found[of], theirs[of], rtol=1e-10, atol=0) for of in ("counts", "begun", "ratios", "scores"))
     apart = filters_apart(found, theirs["sums"], TRACKED)

@@ -12,8 +12,8 @@ import time
 import numpy as np
 from numba import njit
 
-from radarsim.app.configs import load
-from radarsim.kernels.compile import aligned_zeros
+from radarsim.api.configs import load
+from radarsim.kernels.compiler import aligned_zeros
 from radarsim.kernels.lanes import WIDTH
 from radarsim.studies import registry
 

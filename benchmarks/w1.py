@@ -46,8 +46,8 @@ def c_limit(folder: Path):
 
 def work():
     """RLS 2 as the engine sees it."""
-    from radarsim.app.case_work import CaseWork
-    from radarsim.app.configs import load
+    from radarsim.api.case_work import CaseWork
+    from radarsim.api.configs import load
 
     (case,) = load(CONFIG).cases
     made = CaseWork(case)
@@ -89,7 +89,7 @@ def worst_deviation(made, n: int) -> float:
     """Largest distance of σ from its exact value in standard errors, over filters, scans and components."""
     import numpy as np
 
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
 
     axes = made.plan.axes
     error = made.plan.layout.unpack(collect(made, n, threads=1).values)["error"]
@@ -100,7 +100,7 @@ def worst_deviation(made, n: int) -> float:
 
 def measure_speed(n: int, folder: Path) -> dict:
     """One core: kernels and engine against C; two threads against one."""
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
 
     cores = sorted(os.sched_getaffinity(0))
     made, (reference, reason) = work(), c_limit(folder)
@@ -134,7 +134,7 @@ def measure_start() -> dict:
 
 def measure_growth() -> dict:
     """Nanoseconds a realisation and peak memory (MiB) from 10⁴ to 10⁷ realisations, one thread."""
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
 
     made, out = work(), {}
     collect(made, 10_000, threads=1)

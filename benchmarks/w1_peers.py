@@ -134,7 +134,7 @@ def serve(name: str, path: str, repeats: int) -> None:
 
 def problem_of(made) -> dict[str, np.ndarray]:
     """The case as plain arrays."""
-    from radarsim.physics import manoeuvre_covariance, transition
+    from radarsim.physics.motion import manoeuvre_covariance, transition
 
     problem, axes = made.plan.problem, made.plan.axes
     dt, before = axes.scan_period_s, ~axes.available.all(axis=2)
@@ -154,7 +154,7 @@ def problem_of(made) -> dict[str, np.ndarray]:
 
 def engine_ns(made) -> float:
     """CPU nanoseconds a realisation of the engine in one thread, all moments summed."""
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
 
     started = time.process_time()
     collect(made, ENGINE_REALISATIONS, threads=1)

@@ -33,18 +33,18 @@ class Given:
 
     def __init__(self, common):
         from radarsim.kernels.lanes import rows
-        from radarsim.studies.multimodel.kernels import records
+        from radarsim.studies.multimodel.kernels import layout
 
-        self.layout = records
+        self.layout = layout
         self.z, self.start, self.P0 = common.w2_meas(GROUP), common.w2_truth()[0] + common.W2_X0_OFF, common.W2_P0
-        self.plots, self.out = rows(SCANS * records.PLOT), rows(SCANS * records.OUTPUT)
-        cells = self.plots.reshape(SCANS, records.PLOT, GROUP)
+        self.plots, self.out = rows(SCANS * layout.PLOT), rows(SCANS * layout.OUTPUT)
+        cells = self.plots.reshape(SCANS, layout.PLOT, GROUP)
         cells[:, :3], cells[:, 9] = self.z, 1
         cells[:, 3:9] = common.w2_R()[:, UPPER[0], UPPER[1], None]
 
     def run(self, models=MODELS[:3], T=T3, family="imm", rule="moment", output="moment"):
         """All scans; estimates (SCANS, 9, GROUP)."""
-        from radarsim.studies.multimodel.kernels import strip
+        from radarsim.studies.multimodel.kernels import filter_strip
         from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 
         layout, size = self.layout, len(models)
@@ -64,7 +64,7 @@ class Given:
         intervals, times, everything = np.zeros(SCANS, np.int64), np.array([0.05]), np.zeros(SCANS, np.int64)
         frame = np.zeros(18)
         arrays = (models.ravel(), np.ascontiguousarray(T).ravel(), intervals, times, rules, frame, everything, self.out)
-        strip.filter_strip(work, numbers, self.plots, 0, SCANS, *arrays)
+        filter_strip.filter_strip(work, numbers, self.plots, 0, SCANS, *arrays)
         return self.out.reshape(SCANS, layout.OUTPUT, GROUP)[:, :9]
 
 
@@ -75,8 +75,8 @@ def full_matrix(size: int) -> np.ndarray:
 
 def work(every: int, name: str = "multimodel", filters: int = 1):
     """The whole chain of a shipped config, its first filters."""
-    from radarsim.app.case_work import CaseWork
-    from radarsim.app.configs import load
+    from radarsim.api.case_work import CaseWork
+    from radarsim.api.configs import load
 
     (case,) = load(name, (f"report_every={every}", f"scans={SCANS}")).cases
     spec = case.spec.model_copy(update={"filters": case.spec.filters[:filters]})
@@ -118,7 +118,7 @@ def measure_speed(folder) -> dict:
         for every in (1, 10):
             out |= measure_chain(pool, limit, every)
     if len(cores) > 1:
-        from radarsim.engine.run import collect
+        from radarsim.engine.collect import collect
 
         os.sched_setaffinity(0, cores[-2:])
         made = work(10)

@@ -48,7 +48,7 @@ def c_limit(folder: Path):
 
 def plan(engine: str, estimator: dict, variance: float = 2.25, prior: dict | None = None, truth: dict | None = None):
     """A prepared plan of one estimator on the paper's burst."""
-    from radarsim.app.configs import load
+    from radarsim.api.configs import load
     from radarsim.studies.discriminator import study
 
     config = {

@@ -17,19 +17,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from radarsim.app.compare import chart, compare
-    from radarsim.app.judge import judge
-    from radarsim.app.outlook import check
-    from radarsim.app.result import Result
-    from radarsim.app.run import run
-    from radarsim.app.run import stored_result as load
-    from radarsim.app.sensitivity import sensitivity
-    from radarsim.app.solve import solve
-    from radarsim.app.tune import tune
+    from radarsim.api.compare import compare
+    from radarsim.api.cost import check
+    from radarsim.api.design.sensitivity import sensitivity
+    from radarsim.api.design.solve import solve
+    from radarsim.api.design.tune import tune
+    from radarsim.api.doppler_chart import chart
+    from radarsim.api.judge import judge
+    from radarsim.api.result import Result
+    from radarsim.api.run import run
+    from radarsim.api.stored_runs import stored_result as load
     from radarsim.errors import ConfigError, RadarsimError
     from radarsim.papers.judge_interpretations import interpretations
     from radarsim.papers.list_claims import claims
-    from radarsim.recorded.python import fit, plots, read_plots, register, simulate, track
+    from radarsim.recordings.python import fit, plots, read_plots, register, simulate, track
 
 __version__ = "0.3.0"
 __all__ = [
@@ -57,13 +58,21 @@ __all__ = [
 ]
 
 _HOMES = {
-    **{"judge": "app.judge:judge", "tune": "app.tune:tune", "run": "app.run:run", "Result": "app.result:Result"},
-    **{name: f"recorded.python:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
-    **{"chart": "app.compare:chart", "check": "app.outlook:check", "claims": "papers.list_claims:claims"},
-    **{"compare": "app.compare:compare", "load": "app.run:stored_result"},
-    **{"interpretations": "papers.judge_interpretations:interpretations"},
-    **{"sensitivity": "app.sensitivity:sensitivity", "solve": "app.solve:solve"},
-    **{"ConfigError": "errors:ConfigError", "RadarsimError": "errors:RadarsimError"},
+    "ConfigError": "errors:ConfigError",
+    "RadarsimError": "errors:RadarsimError",
+    "Result": "api.result:Result",
+    "chart": "api.doppler_chart:chart",
+    "check": "api.cost:check",
+    "claims": "papers.list_claims:claims",
+    "compare": "api.compare:compare",
+    "interpretations": "papers.judge_interpretations:interpretations",
+    "judge": "api.judge:judge",
+    "load": "api.stored_runs:stored_result",
+    "run": "api.run:run",
+    "sensitivity": "api.design.sensitivity:sensitivity",
+    "solve": "api.design.solve:solve",
+    "tune": "api.design.tune:tune",
+    **{name: f"recordings.python:{name}" for name in ("fit", "plots", "read_plots", "register", "simulate", "track")},
 }
 _OLD_NAMES = {"readings": "interpretations"}
 

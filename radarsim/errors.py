@@ -14,7 +14,7 @@ def argument(name: str, option: str = "") -> str:
     return (option or f"--{name}") if ON_COMMAND_LINE.get() else name
 
 
-OF_AUTHORS = Exception, SystemExit  #: what code that is not radarsim's may raise: a package may call sys.exit
+AUTHOR_ERRORS = Exception, SystemExit  #: what code that is not radarsim's may raise: a package may call sys.exit
 
 
 class RadarsimError(Exception):
@@ -83,7 +83,7 @@ class NonFiniteError(RadarsimError):
     exit_code = 5
 
 
-class Interrupted(RadarsimError):
+class Interruption(RadarsimError):
     """A signal stopped the run; finished blocks are stored, and a further run continues."""
 
     def __init__(self, signal_number: int, goes_on: bool = True):

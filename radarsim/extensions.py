@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from markupsafe import Markup
 
-    from radarsim.app.result import Result
-    from radarsim.app.run import RunOptions, SimulatedCases
+    from radarsim.api.result import Result
+    from radarsim.api.simulate_cases import RunOptions, SimulatedCases
     from radarsim.config.experiment import Experiment
     from radarsim.engine.results import CaseResult
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
 
-MODULES = ("radarsim.papers.extension", "radarsim.recorded.extension")
+MODULES = ("radarsim.papers.extension", "radarsim.recordings.extension")
 
 Tables = Mapping[str, "pd.DataFrame"]
 
@@ -60,7 +60,7 @@ class StopRule(Protocol):
 class Extension:
     """An optional part of radarsim; a derived class overrides what it adds."""
 
-    command_module: str = ""  # registers commands with the group of `radarsim.cli.group` when it is imported
+    command_module: str = ""  # registers commands with the group of `radarsim.cli.command_group` when it is imported
     command_sections: Mapping[str, Sequence[str]] = {}  # titles and names of these commands in `radarsim --help`
     figure_names: Sequence[str] = ()  # figures that it adds to results of any study
     table_names: Sequence[str] = ()  # tables that it adds, which its section of the report shows

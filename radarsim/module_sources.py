@@ -1,4 +1,4 @@
-"""SHA-256 of a module's source as this process has loaded it, and which modules are the user's.
+"""SHA-256 of a module's source as this process has loaded it.
 
 A hash must name the code that runs, not what an editor has written since: stored blocks and compiled kernels are kept
 by it. So a module that is loaded keeps the hash that was taken first, and is hashed as early as possible; one that is
@@ -9,9 +9,7 @@ import hashlib
 import marshal
 import os
 import sys
-import sysconfig
 import weakref
-from functools import cache
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from importlib.util import MAGIC_NUMBER, find_spec
 from pathlib import Path
@@ -20,8 +18,6 @@ from typing import Any
 
 from radarsim.errors import ConfigError
 
-PACKAGE = str(Path(__file__).parent)
-PROGRAM_FOLDERS = ("/proc", "/sys", "/dev", "/etc", "/usr", "/lib", "/lib64", "/bin", "/sbin", "/System", "/Library")
 INSTALLED = {"site-packages", "dist-packages"}
 
 BYTECODE_HEADER = 16  # bytes: the number of Python's version, flags, time and size of the source
@@ -91,11 +87,11 @@ def check_bytecode(module: ModuleType) -> None:
         times = b"".join(number.to_bytes(4, "little") for number in numbers)
         if content[:4] != MAGIC_NUMBER or flags == 3 or (flags == 0 and content[8:BYTECODE_HEADER] != times):
             return
-        if marshal.loads(content[BYTECODE_HEADER:]) != _compiled(spec.origin):
+        if marshal.loads(content[BYTECODE_HEADER:]) != _compile_source(spec.origin):
             raise ConfigError(f"{spec.origin}: Python runs bytecode of another text: delete {spec.cached}")
 
 
-def _compiled(source: str) -> CodeType | None:
+def _compile_source(source: str) -> CodeType | None:
     """The bytecode of a source; None where it is no Python."""
     try:
         return compile(Path(source).read_bytes(), source, "exec", dont_inherit=True)
@@ -107,33 +103,3 @@ def note_loaded_modules(top: str) -> None:
     """Take the hashes of the modules of a top-level package that are loaded by now."""
     for name in [name for name in sys.modules if name.partition(".")[0] == top]:
         module_digest(name)
-
-
-def is_users_module(top: str) -> bool:
-    """Whether a top-level module is the user's: neither a library nor a part of Python or of radarsim."""
-    spec = module_spec(top)
-    if spec is None:
-        return False
-    paths = [spec.origin] if spec.has_location and spec.origin else list(spec.submodule_search_locations or [])
-    return any(not is_of_programs(path) for path in paths)
-
-
-def is_within(path: str, folder: str) -> bool:
-    """Whether a path is that of a folder, or lies in it."""
-    return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
-
-
-@cache
-def folders_of_programs() -> tuple[str, ...]:
-    """Folders of Python, of libraries and of radarsim, whose files are no data of the user's."""
-    paths = {PACKAGE, sys.prefix, sys.base_prefix, *sysconfig.get_paths().values()}
-    return tuple({folder for path in paths for folder in (path, os.path.realpath(path)) if folder != os.sep})
-
-
-def is_of_programs(path: str) -> bool:
-    """Whether a file outside the user's folders is one that programs come with or keep for themselves."""
-    caches = [value for name, value in os.environ.items() if "CACHE" in name and os.path.isabs(value)]
-    if any(is_within(path, folder) for folder in (*folders_of_programs(), *PROGRAM_FOLDERS, *caches)):
-        return True
-    hidden = os.path.join(os.path.expanduser("~"), ".")
-    return path.startswith(hidden) or bool((INSTALLED | {"__pycache__"}) & set(path.split(os.sep)))

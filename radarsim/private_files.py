@@ -83,9 +83,9 @@ def make_readable_folder(path: str | os.PathLike) -> None:
 
     Folders that exist keep their permissions. Raises OSError where one cannot be created."""
     folder = Path(path)
-    for place in (*reversed(folder.parents), folder):
-        if not place.is_dir():
-            place.mkdir(mode=0o755, exist_ok=True)
+    for directory in (*reversed(folder.parents), folder):
+        if not directory.is_dir():
+            directory.mkdir(mode=0o755, exist_ok=True)
 
 
 def create_readable_file(path: str | os.PathLike) -> BinaryIO:

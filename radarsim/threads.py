@@ -16,11 +16,11 @@ def forbidden() -> bool:
 @contextmanager
 def limited(count: int | None) -> Iterator[None]:
     """While entered no thread is started, if the count is 0."""
-    before = _forbidden.set(forbidden() or count == 0)
+    token = _forbidden.set(forbidden() or count == 0)
     try:
         yield
     finally:
-        _forbidden.reset(before)
+        _forbidden.reset(token)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import os
 
 from click.testing import CliRunner
 
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 from radarsim.kernels.cache import cache_root
 
 

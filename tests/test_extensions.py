@@ -16,7 +16,7 @@ import sys
 sys.path.insert(0, {folder!r})
 sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]  # it knows the whole package
 import radarsim
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 from radarsim.extensions import extensions
 
 assert radarsim.__file__.startswith({folder!r})

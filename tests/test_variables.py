@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import pytest
 
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 from radarsim.kernels.cache import cache_root
 from tests.program import Terminal
 from tests.variables import CLEARED, KEPT

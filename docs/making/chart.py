@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from radarsim.app.compare import chart
+from radarsim.api.doppler_chart import chart
 
 
 def draw_chart(app, exception) -> None:

@@ -10,7 +10,6 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from radarsim.app import run
 from radarsim.errors import StoreError
 from radarsim.papers import list_claims
 from radarsim.papers.claim_rows import cell_number, group_by_claim, part_name, worst_part
@@ -69,7 +68,7 @@ def markdown(results: Path = RESULTS) -> str:
 def draw_figure(app, exception) -> None:
     """The figure of claims beside the page, when it is built as HTML."""
     if exception is None and app.builder.format == "html":
-        run.Claims(rows()[0]).draw(Path(app.outdir, "docs", FIGURE))
+        list_claims.Claims(rows()[0]).draw(Path(app.outdir, "docs", FIGURE))
 
 
 def main(results: str) -> None:

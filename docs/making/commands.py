@@ -2,7 +2,7 @@
 
 import click
 
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 
 WIDTH = 110
 

@@ -15,6 +15,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import chdir
 from dataclasses import dataclass
@@ -100,7 +101,7 @@ def output(command: str) -> str:
 
         from click.testing import CliRunner
 
-        from radarsim.cli import main
+        from radarsim.cli.command_group import main
 
         result = CliRunner().invoke(main, shlex.split(command)[1:])
         code, out, err = result.exit_code, result.stdout, result.stderr + (repr(result.exception) or "")

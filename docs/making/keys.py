@@ -2,8 +2,8 @@
 
 import re
 
-from radarsim.config.fields import in_degrees
-from radarsim.config.schema import schema
+from radarsim.config.json_schema import json_schema
+from radarsim.config.model import in_degrees
 from radarsim.studies import registry
 
 COMMON = ("include", "sweep", "realisations", "seed", "figures")
@@ -12,7 +12,7 @@ BOUNDS = {"minimum": "≥ {}", "exclusiveMinimum": "> {}", "maximum": "≤ {}", 
 
 def markdown() -> str:
     """A heading for each study and for each kind of mapping in it, with a table of the keys."""
-    definitions = schema(registry)["$defs"]
+    definitions = json_schema(registry)["$defs"]
     common = {key: definitions["include"]["properties"][key] for key in COMMON}
     parts = ["## Keys of every config", table(common, definitions, ())]
     for study in definitions["include"]["properties"]["study"]["enum"]:

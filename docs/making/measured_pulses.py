@@ -4,7 +4,7 @@ import math
 
 from making.numbers import Results
 from making.result_rows import bounded, select_rows
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 
 SIGMA_V = (5, 15, 15, 1, 1)  # of P1's radars, m/s
 SHOWN_SNR = (-4, -2, 0, 2, 4, 6, 10, 14)

@@ -13,11 +13,12 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from radarsim.app.configs import inventory
-from radarsim.config.check import models_in
-from radarsim.config.fields import Model
-from radarsim.config.schema import Common
-from radarsim.language import ANY, NUMBERS, catalogue
+from radarsim.api.inventory import inventory
+from radarsim.config.common_keys import CommonKeys
+from radarsim.config.model import Model
+from radarsim.config.validate import models_in
+from radarsim.language import gettext_catalogue
+from radarsim.language.translate import NUMBER_PLACEHOLDER, NUMBERS
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN, UNCLEAR
 from radarsim.papers.interpretations import with_spaces
 from radarsim.papers.study_claims import claims_of, interpretations_of
@@ -29,7 +30,7 @@ PACKAGE = ROOT / "radarsim"
 CATALOGUES = PACKAGE / "language"
 CALLS = {"tr": 1, "term": 1, "plural": 2}  # functions that say messages, and how many texts they take
 SAYING = ("exact_but_for",)  # functions of studies that return a message
-APART = ("app/one_file", "app/one_step")  # of other packages
+APART = ("api/maintenance/one_file", "api/maintenance/one_step")  # of other packages
 IN_TEMPLATE = re.compile(r'\b(tr|plural)\(((?:"(?:[^"\\]|\\.)*"(?:,\s*)?)+)')
 QUOTED = re.compile(r'"((?:[^"\\]|\\.)*)"')
 
@@ -51,7 +52,10 @@ def found() -> dict[tuple[str, str, str], list[str]]:
 
 def together(said: dict[tuple[str, str, str], list[str]]) -> dict[tuple[str, str, str], list[str]]:
     """The messages, of those that differ in their numbers alone one for all of them."""
-    like = {key: (key[0], key[1] if key[2] or "{" in key[1] else NUMBERS.sub(ANY, key[1]), key[2]) for key in said}
+    like = {
+        key: (key[0], key[1] if key[2] or "{" in key[1] else NUMBERS.sub(NUMBER_PLACEHOLDER, key[1]), key[2])
+        for key in said
+    }
     count = Counter(like.values())
     merged: dict[tuple[str, str, str], list[str]] = {}
     for key, places in said.items():
@@ -86,7 +90,7 @@ def in_templates() -> Iterator[tuple[str, str, str]]:
 
 def in_schemas() -> Iterator[tuple[str, str, str]]:
     """Titles, units and descriptions of all keys."""
-    models: list[type[Model]] = [Common, *(registry.keys(name) for name in registry.SHIPPED)]
+    models: list[type[Model]] = [CommonKeys, *(registry.keys(name) for name in registry.SHIPPED)]
     seen: set[type[Model]] = set()
     while models:
         model = models.pop(0)
@@ -137,7 +141,7 @@ def in_inventory() -> Iterator[tuple[str, str, str]]:
     """What `radarsim list` says of configs, scenarios, studies and filters."""
     for _, _, rows in inventory():
         for row in rows:
-            yield row[-1], "", "radarsim/app/stored.py"
+            yield row[-1], "", "radarsim/api/stored_tables.py"
 
 
 def in_scenarios() -> Iterator[tuple[str, str, str]]:
@@ -149,7 +153,7 @@ def in_scenarios() -> Iterator[tuple[str, str, str]]:
 
 def brought_up(text: str) -> str:
     """A catalogue with the messages of today: what is translated stays, forms of words that are asked for stay too."""
-    entries = catalogue.entries(text)
+    entries = gettext_catalogue.entries(text)
     old = {one.key: one for one in entries}
     made = [one for one in entries if one.context or not one.id]
     forms, file = 3 if "nplurals=3" in text else 2, ""
@@ -157,14 +161,16 @@ def brought_up(text: str) -> str:
         before = old.get((context, message))
         said = dict(before.translations) if before and before.plural == plural else {}
         said = said or dict.fromkeys(range(forms if plural else 1), "")
-        made.append(catalogue.Entry(message, context, plural, said, [f"#: {places[0]}"] * (places[0] != file)))
+        made.append(gettext_catalogue.Entry(message, context, plural, said, [f"#: {places[0]}"] * (places[0] != file)))
         file = places[0]
-    return catalogue.written(made)
+    return gettext_catalogue.catalogue_text(made)
 
 
 def untranslated(code: str) -> list[str]:
     """The messages that a catalogue lacks."""
-    entries = {one.key: one for one in catalogue.entries((CATALOGUES / f"{code}.po").read_text(encoding="utf-8"))}
+    entries = {
+        one.key: one for one in gettext_catalogue.entries((CATALOGUES / f"{code}.po").read_text(encoding="utf-8"))
+    }
     return [text for context, text, _ in found() if (context, text) not in entries or not entries[context, text].done]
 
 

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 import radarsim
 from making import tables
 
-FLOORS = ("constants", "physics", "kernels", "bursts", "studies", "engine", "report", "config", "recorded", "app")
+FLOORS = ("constants", "physics", "kernels", "bursts", "studies", "engine", "report", "config", "recordings", "api")
 
 
 def markdown() -> str:

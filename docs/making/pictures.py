@@ -18,11 +18,11 @@ from itertools import product
 from pathlib import Path
 
 import radarsim
-from radarsim.app import result as output
-from radarsim.app.compare import described
-from radarsim.report import figures
-from radarsim.report.drawing import Figure
-from radarsim.report.wording import spoken
+from radarsim.api import result_content
+from radarsim.api.doppler_chart import describe_chart
+from radarsim.report.drawing import canvas
+from radarsim.report.drawing.model import Figure
+from radarsim.report.math_text import plain_text
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "pictures"
@@ -61,9 +61,9 @@ def figures_by_config() -> dict[str, set[tuple[str, float | None]]]:
 def figures_of(config: str, results: Path) -> dict[str, Figure]:
     """The figures of a stored result by their name; ConfigError, with the command, where it is not there."""
     if config == CHART:
-        return dict(described([]).figures)
+        return dict(describe_chart([]).figures)
     result = radarsim.load(config, out=results)
-    return output.case_figures(result.cases, result.tables, result.experiment)
+    return result_content.case_figures(result.cases, result.tables, result.experiment)
 
 
 def file_stem(config: str, name: str, width: float | None) -> str:
@@ -73,7 +73,7 @@ def file_stem(config: str, name: str, width: float | None) -> str:
 
 def picture_file(figure: Figure, width: float | None) -> tuple[str, bytes]:
     """The ending and the bytes of a picture: SVG, or PNG in as many colours as keep it under MOST_BYTES."""
-    files = figures.save(figure, ("svg", "png"), width)
+    files = canvas.save(figure, ("svg", "png"), width)
     return ("svg", files["svg"]) if len(files["svg"]) < MAX_BYTES else ("png", compressed_png(files["png"]))
 
 
@@ -96,9 +96,10 @@ def compressed_png(png: bytes) -> bytes:
 def picture_text(page: Path, parts: list[tuple[str, Figure, Path]]) -> str:
     """What stands in a page between the marks: the pictures, and below them their captions."""
     images = [
-        f"![{spoken(figure.title)}]({Path(os.path.relpath(file, page.parent)).as_posix()})" for _, figure, file in parts
+        f"![{plain_text(figure.title)}]({Path(os.path.relpath(file, page.parent)).as_posix()})"
+        for _, figure, file in parts
     ]
-    captions = [f"*{spoken(figure.title)}.* {spoken(figure.caption)}" for _, figure, _ in parts]
+    captions = [f"*{plain_text(figure.title)}.* {plain_text(figure.caption)}" for _, figure, _ in parts]
     if len(parts) > 1:
         captions = [f"* {caption}" for caption in captions]
         return "\n".join(images) + "\n\n" + "\n".join(captions) + "\n"

@@ -1,4 +1,4 @@
-"""Result tables as Markdown, from the docstrings of what makes them: see `radarsim.report.tables.Tables`."""
+"""Result tables as Markdown, from the docstrings of what makes them: see `radarsim.report.tables.TableMakers`."""
 
 import inspect
 import pkgutil
@@ -8,25 +8,27 @@ from importlib import import_module
 from types import ModuleType
 from typing import NamedTuple
 
-from radarsim.report import notes, outside, rare
+from radarsim.report import consistency_tables, exact_check, interval_notes, rare_events
 from radarsim.report import tables as common
-from radarsim.studies import floor, registry
+from radarsim.report.user_filters import tables
+from radarsim.studies import registry
+from radarsim.studies.floors import table
 
 SHARED = (
-    common.leading,
-    common.components,
-    common.realisations,
+    common.label_columns,
+    common.component_columns,
+    common.realisation_counts,
     common.interval_columns,
-    notes.exact_columns,
-    notes.add_notes,
+    exact_check.exact_columns,
+    interval_notes.add_notes,
 )
 SEVERAL = {  # tables that studies have in common
-    "curves": (common.curves, floor.with_floors),
+    "curves": (common.curves, table.with_floors),
     "gains": (common.gains,),
-    "consistency": (notes.normalised,),
-    "rare": (rare.rows,),
-    "failures": (outside.failures,),
-    "nees": (outside.consistency, notes.normalised),
+    "consistency": (consistency_tables.normalised_square_columns,),
+    "rare": (rare_events.rate_columns,),
+    "failures": (tables.failure_columns,),
+    "nees": (tables.nees_columns, consistency_tables.normalised_square_columns),
 }
 UNITS = {  # by how a name ends
     **{"_s": "s", "_m": "m", "_mps": "m/s", "_mps2": "m/s²", "_rad": "rad", "_hz": "Hz", "_db": "dB"},

@@ -2,8 +2,9 @@
 
 import click
 
-from radarsim.cli.group import completed, main
-from radarsim.language import tr
+from radarsim.cli.command_group import main
+from radarsim.cli.options import complete_config
+from radarsim.language.translate import tr
 
 
 @main.command()
@@ -12,7 +13,7 @@ from radarsim.language import tr
     "--like",
     required=True,
     metavar="CONFIG",
-    shell_complete=completed,
+    shell_complete=complete_config,
     help="The config to start from; `radarsim list` lists them.",
 )
 def new(name: str, like: str) -> None:
@@ -25,12 +26,14 @@ def new(name: str, like: str) -> None:
     Example
       radarsim new mine --like rls2
     """
-    from radarsim.app import configs
+    from radarsim.api import configs
     from radarsim.cli import console
 
     path = configs.new(name, like)
-    console.field("config", str(path))
-    console.field("", tr("edit its values, then `radarsim check {path}` and `radarsim run {path}`", path=str(path)))
+    console.print_field("config", str(path))
+    console.print_field(
+        "", tr("edit its values, then `radarsim check {path}` and `radarsim run {path}`", path=str(path))
+    )
 
 
 @main.command(name="new-study")
@@ -50,12 +53,12 @@ def new_study(name: str, step: bool) -> None:
       pip install -e my_paper
       radarsim run my_paper
     """
-    from radarsim.app.reproduce import new_study as write
+    from radarsim.api.maintenance.new_study import new_study as write
     from radarsim.cli import console
 
     path = write(name, form="step" if step else "linear")
     values = {"path": str(path), "name": name, "guide": str(path / "src" / name / "__init__.py")}
-    console.field("package", str(path))
-    console.field(
+    console.print_field("package", str(path))
+    console.print_field(
         "", tr("`pip install -e {path}`, then `radarsim run {name}`; {guide} explains what to edit", **values)
     )

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from radarsim.cli import group
+from radarsim.cli import command_group, options
 
 if TYPE_CHECKING:
     from radarsim.report.quantities import Quantity
 
-OF = "of_"  # what the parameters of quantities begin with
+QUANTITY_PREFIX = "of_"  # of the parameters' names that quantities' options have
 
 
-class Named(click.ParamType):
+class NameOption(click.ParamType):
     """A name after an option; never the next option, which click would accept and then fail on the rest."""
 
     def __init__(self, metavar: str):
@@ -29,7 +29,7 @@ class Named(click.ParamType):
         return text
 
 
-class Asking(click.Command):
+class QuantityCommand(click.Command):
     """A command with an option for each quantity that a study measures, shipped or installed."""
 
     @functools.cached_property
@@ -37,12 +37,13 @@ class Asking(click.Command):
         """Those options, by the quantity's name."""
         from radarsim.studies import registry
 
-        measured: dict[str, dict[str, Quantity]] = {}
-        for study, every in registry.parts(lambda one: registry.declared(one, None)).items():
-            for one in every:
-                measured.setdefault(one.name, {})[study] = one
-        everywhere = len(registry.names())
-        return {name: _option(by_study, len(by_study) == everywhere) for name, by_study in measured.items()}
+        studies_by_quantity: dict[str, dict[str, Quantity]] = {}
+        quantities_by_study = registry.call_studies(lambda study: registry.study_quantities(study, None))
+        for study_name, quantities in quantities_by_study.items():
+            for quantity in quantities:
+                studies_by_quantity.setdefault(quantity.name, {})[study_name] = quantity
+        study_count = len(registry.study_names())
+        return {name: _option(by_study, len(by_study) == study_count) for name, by_study in studies_by_quantity.items()}
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         return [*super().get_params(ctx), *self.asking.values()]
@@ -54,19 +55,31 @@ class Asking(click.Command):
                 formatter.write_dl([record for option in options if (record := option.get_help_record(ctx))])
 
 
-def _option(by_study: "Mapping[str, Quantity]", everywhere: bool) -> click.Option:
+def _option(by_study: "Mapping[str, Quantity]", in_all_studies: bool) -> click.Option:
     """The option of a quantity, by the studies that measure it."""
-    one = next(iter(by_study.values()))
-    (metavar, *others) = dict.fromkeys(of.per.upper() or "NAME" for of in by_study.values())
-    metavar = "NAME" if others else metavar
+    first_quantity = next(iter(by_study.values()))
+    (metavar, *other_metavars) = dict.fromkeys(quantity.per.upper() or "NAME" for quantity in by_study.values())
+    metavar = "NAME" if other_metavars else metavar
     studies: dict[str, list[str]] = {}
-    for study, of in by_study.items():
-        unit = of.shown_unit("in the component's unit" if of.per == "component" else "")
+    for study, quantity in by_study.items():
+        unit = quantity.shown_unit("in the component's unit" if quantity.per == "component" else "")
         studies.setdefault(unit and f", {unit}", []).append(study)
-    each = [unit if everywhere and len(studies) == 1 else f"{unit} ({', '.join(of)})" for unit, of in studies.items()]
-    words = one.words[0].upper() + one.words[1:] if one.words[0].isascii() else one.words
-    text = f"{words}{''.join(each)}."
-    return click.Option([one.option, f"{OF}{one.name}"], type=Named(metavar), metavar=metavar, help=text)
+    unit_texts = [
+        unit if in_all_studies and len(studies) == 1 else f"{unit} ({', '.join(names)})"
+        for unit, names in studies.items()
+    ]
+    words = (
+        first_quantity.words[0].upper() + first_quantity.words[1:]
+        if first_quantity.words[0].isascii()
+        else first_quantity.words
+    )
+    text = f"{words}{''.join(unit_texts)}."
+    return click.Option(
+        [first_quantity.option, f"{QUANTITY_PREFIX}{first_quantity.name}"],
+        type=NameOption(metavar),
+        metavar=metavar,
+        help=text,
+    )
 
 
 at_options = (
@@ -75,8 +88,8 @@ at_options = (
 )
 
 
-@group.main.command(cls=Asking)
-@group.config_argument
+@command_group.main.command(cls=QuantityCommand)
+@options.config_argument
 @click.argument("key", metavar="KEY")
 @click.option("--filter", "filter_name", metavar="NAME", help="The filter, if there are several.")
 @at_options[0]
@@ -84,12 +97,12 @@ at_options = (
 @click.option("--equals", type=float, required=True, metavar="X", help="Target value; in per cent for gains and rates.")
 @click.option("--between", type=(float, float), metavar="LO HI", help="Range of KEY to search.")
 @click.option("--case", metavar="CASE", help="The case, if the config has several.")
-@group.set_option
-@group.realisations_option
-@group.seed_option
-@group.threads_option
-@group.json_option
-def solve(config: str, key: str, filter_name: str | None, as_json: bool, **given: Any) -> None:
+@options.set_option
+@options.realisations_option
+@options.seed_option
+@options.threads_option
+@options.json_option
+def solve(config: str, key: str, filter_name: str | None, as_json: bool, **values: Any) -> None:
     """Find the value of KEY at which a quantity reaches a target.
 
     KEY is any key that holds a number, by its dotted path as for --set; a bare filter key applies to all filters. If
@@ -106,28 +119,33 @@ def solve(config: str, key: str, filter_name: str | None, as_json: bool, **given
       radarsim solve sonar_clutter sensor.detection_probability --loss nearest --equals 5 --between 0.6 1 \\
           --case "sonar_clutter sensor.false_plots_per_km2=1" -n 2000
     """
-    from radarsim.app import shown
-    from radarsim.app.solve import solve as solving
-    from radarsim.cli import console, outcomes
+    from radarsim.api import json_output
+    from radarsim.api.design import solve as design_solve
+    from radarsim.cli import console, print_answers
+    from radarsim.cli import progress as cli_progress
     from radarsim.errors import TargetUnmet
 
-    asked = {name.removeprefix(OF): value for name, value in given.items()} | {"filter": filter_name}
-    with console.Progress(key, quiet=as_json) as progress:
-        said = None if as_json else console.say_aside
-        answer = solving(config, key, progress=progress.update, notify=said, **asked)
+    arguments = {name.removeprefix(QUANTITY_PREFIX): value for name, value in values.items()} | {"filter": filter_name}
+    with cli_progress.Progress(key, quiet=as_json) as progress:
+        notify = None if as_json else console.print_error_line
+        answer = design_solve.solve(config, key, progress=progress.update, notify=notify, **arguments)
     if as_json:
-        click.echo(shown.text(shown.answer(answer)))
+        click.echo(json_output.text(json_output.answer(answer)))
     elif answer.value is not None:
-        outcomes.print_answer(answer)
+        print_answers.print_answer(answer)
     if answer.value is None:
         raise TargetUnmet(*answer.unattained)
 
 
-@group.main.command()
-@group.config_argument
+@command_group.main.command()
+@options.config_argument
 @click.option("--filter", "filter_name", metavar="NAME", help="The filter, if there are several.")
 @click.option(
-    "--for", "wanted", required=True, metavar="TEXT", help="Quantity, as in 'sigma r at 60 s', 'gain r', 'lock at k 6'."
+    "--for",
+    "quantity",
+    required=True,
+    metavar="TEXT",
+    help="Quantity, as in 'sigma r at 60 s', 'gain r', 'lock at k 6'.",
 )
 @click.option(
     "--free",
@@ -142,13 +160,15 @@ def solve(config: str, key: str, filter_name: str | None, as_json: bool, **given
     help="One of a family of targets; repeatable. Default: the config's cases.",
 )
 @click.option("--case", multiple=True, metavar="CASE", help="One of the config's cases; repeatable. Default: all.")
-@group.set_option
-@group.realisations_option
-@group.seed_option
-@group.threads_option
+@options.set_option
+@options.realisations_option
+@options.seed_option
+@options.threads_option
 @click.option("--write", metavar="FILE.yaml", help="Also write a config with the tuned values.")
-@group.json_option
-def tune(config: str, filter_name: str | None, wanted: str, write: str | None, as_json: bool, **asked: Any) -> None:
+@options.json_option
+def tune(
+    config: str, filter_name: str | None, quantity: str, write: str | None, as_json: bool, **arguments: Any
+) -> None:
     """Find the best values of a filter's keys, and the gain.
 
     The quantity is one of `radarsim solve`. Over several cases the root of the mean of σ², or the mean of a rate, is
@@ -162,34 +182,35 @@ def tune(config: str, filter_name: str | None, wanted: str, write: str | None, a
       radarsim tune rls2_manoeuvres --filter r+Vr --for "sigma r" --free manoeuvre_variance --free initial_scans=2:7
       radarsim tune multimodel --filter MMA2-11 --for "sigma y at 60 s" --free models -n 500
     """
-    from radarsim.app import configs, shown
-    from radarsim.app import tune as tuning
-    from radarsim.cli import console, outcomes
-    from radarsim.report import wording
+    from radarsim.api import configs, json_output
+    from radarsim.api.design import tune as design_tune
+    from radarsim.cli import console, print_answers
+    from radarsim.cli import progress as cli_progress
+    from radarsim.report import output_labels
 
     if write:
-        configs.writable(write, config, asked["overrides"])
-    with console.Progress(config, quiet=as_json) as progress:
-        said = None if as_json else console.say_aside
-        asked |= {"filter": filter_name, "progress": progress.update, "notify": said}
-        found = tuning.tune(config, wanted, **asked)
+        configs.check_writable(write, config, arguments["overrides"])
+    with cli_progress.Progress(config, quiet=as_json) as progress:
+        notify = None if as_json else console.print_error_line
+        arguments |= {"filter": filter_name, "progress": progress.update, "notify": notify}
+        result = design_tune.tune(config, quantity, **arguments)
     if as_json:
-        click.echo(shown.text(shown.tuned(found)))
+        click.echo(json_output.text(json_output.tuning(result)))
     else:
-        outcomes.print_tuned(found)
+        print_answers.print_tuning(result)
     if write:
         path = pathlib.Path(write)
-        made = configs.new(path.name, config, path.parent, found.settings, asked["overrides"])
-        click.echo(wording.labelled("config", str(made)), err=as_json)
+        config_path = configs.new(path.name, config, path.parent, result.settings, arguments["overrides"])
+        click.echo(output_labels.labelled_line("config", str(config_path)), err=as_json)
 
 
-@group.main.command()
-@click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=group.completed)
-@group.set_option
-@group.out_option
-@group.drawing_options
-@group.json_option
-def chart(configs: tuple[str, ...], drawing: group.Drawing, as_json: bool, **asked: Any) -> None:
+@command_group.main.command()
+@click.argument("configs", nargs=-1, metavar="[CONFIG…]", shell_complete=options.complete_config)
+@options.set_option
+@options.out_option
+@options.drawing_options
+@options.json_option
+def chart(configs: tuple[str, ...], drawing: options.Drawing, as_json: bool, **arguments: Any) -> None:
     """Chart the gain by Doppler for all radars, yours marked.
 
     Simulates nothing. Draws gains over time and in the long run against c = (σ_r/σ_V)² (D_M/σ_r²)^(1/3), the only
@@ -201,31 +222,32 @@ def chart(configs: tuple[str, ...], drawing: group.Drawing, as_json: bool, **ask
       radarsim chart                              the first paper's five radars
       radarsim chart rls2 --set radar.sigma_velocity_mps=5
     """
-    from radarsim.app import compare, shown
-    from radarsim.cli import console, outcomes
+    from radarsim.api import doppler_chart, json_output
+    from radarsim.cli import print_answers
+    from radarsim.cli import progress as cli_progress
 
-    with console.Progress("chart", quiet=as_json) as progress:
-        drawn = compare.chart(*configs, progress=progress.update, **asked, **drawing.arguments)
+    with cli_progress.Progress("chart", quiet=as_json) as progress:
+        result = doppler_chart.chart(*configs, progress=progress.update, **arguments, **drawing.arguments)
     if as_json:
-        click.echo(shown.text(shown.drawn(drawn)))
+        click.echo(json_output.text(json_output.doppler_chart(result)))
     else:
-        outcomes.print_drawn(drawn)
+        print_answers.print_doppler_chart(result)
 
 
-@group.main.command()
-@group.config_argument
+@command_group.main.command()
+@options.config_argument
 @at_options[0]
 @at_options[1]
 @click.option("--of", metavar="NAME", help="Quantity (`radarsim solve --help` lists them); default: σ and gain.")
 @click.option("--component", metavar="COMPONENT", help="The component shown and used for sorting; default: the first.")
 @click.option("--case", metavar="CASE", help="The case, if the config has several.")
-@group.set_option
-@group.realisations_option
-@group.seed_option
-@group.out_option
-@group.drawing_options
-@group.json_option
-def sensitivity(config: str, drawing: group.Drawing, as_json: bool, **asked: Any) -> None:
+@options.set_option
+@options.realisations_option
+@options.seed_option
+@options.out_option
+@options.drawing_options
+@options.json_option
+def sensitivity(config: str, drawing: options.Drawing, as_json: bool, **arguments: Any) -> None:
     """Show what +10 % of each key changes, largest effect first.
 
     Prints changes of σ and gain, or of another quantity. Every numeric key is raised by a tenth, one at a time; whole
@@ -240,13 +262,14 @@ def sensitivity(config: str, drawing: group.Drawing, as_json: bool, **asked: Any
       radarsim sensitivity rls2 --at 60 --component Vr
       radarsim sensitivity discriminator --of lock -n 2000
     """
-    from radarsim.app import sensitivity as finding
-    from radarsim.app import shown
-    from radarsim.cli import console, outcomes
+    from radarsim.api import json_output
+    from radarsim.api.design import sensitivity as design_sensitivity
+    from radarsim.cli import print_answers
+    from radarsim.cli import progress as cli_progress
 
-    with console.Progress(config, quiet=as_json) as progress:
-        found = finding.sensitivity(config, progress=progress.update, **asked, **drawing.arguments)
+    with cli_progress.Progress(config, quiet=as_json) as progress:
+        result = design_sensitivity.sensitivity(config, progress=progress.update, **arguments, **drawing.arguments)
     if as_json:
-        click.echo(shown.text(shown.sensitivity(found)))
+        click.echo(json_output.text(json_output.sensitivity(result)))
     else:
-        outcomes.print_sensitivity(found)
+        print_answers.print_sensitivity(result)

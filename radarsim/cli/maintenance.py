@@ -2,7 +2,8 @@
 
 import click
 
-from radarsim.cli.group import Count, json_option, main, out_option, seed_option, set_option
+from radarsim.cli.command_group import main
+from radarsim.cli.options import Count, json_option, out_option, seed_option, set_option
 from radarsim.errors import StoreError
 
 
@@ -23,17 +24,17 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
       radarsim list sonar clutter
       radarsim list --json | jq -r '.configs[].name'
     """
-    from radarsim.app.configs import inventory, selected
+    from radarsim.api.inventory import filter_inventory, inventory
 
-    found = selected(inventory(), words)
+    matches = filter_inventory(inventory(), words)
     if as_json:
-        from radarsim.app import shown
+        from radarsim.api import json_output
 
-        click.echo(shown.text(shown.inventory(found)))
+        click.echo(json_output.text(json_output.inventory(matches)))
         return
-    from radarsim.cli import outcomes
+    from radarsim.cli import print_results
 
-    outcomes.print_inventory(found) if words else outcomes.print_names(found)
+    print_results.print_inventory(matches) if words else print_results.print_names(matches)
 
 
 @main.command()
@@ -44,7 +45,7 @@ def schema() -> None:
     Example
       radarsim schema > schema.json     editors then check what `radarsim new` writes beside it
     """
-    from radarsim.app.configs import schema_json
+    from radarsim.api.configs import schema_json
 
     click.echo(schema_json(), nl=False)
 
@@ -64,16 +65,16 @@ def compile_(configs: tuple[str, ...], as_json: bool) -> None:
       radarsim compile
       radarsim compile sonar_clutter
     """
-    from radarsim.app import shown
-    from radarsim.app.doctor import compiled
+    from radarsim.api import json_output
+    from radarsim.api.maintenance.precompile import compile_configs
 
-    done = []
-    for one in compiled(configs):
-        done.append(one._asdict())
+    timings = []
+    for timing in compile_configs(configs):
+        timings.append(timing._asdict())
         if not as_json:
-            click.echo(f"{one.config}  {one.seconds:.1f} s")
+            click.echo(f"{timing.config}  {timing.seconds:.1f} s")
     if as_json:
-        click.echo(shown.text(done))
+        click.echo(json_output.text(timings))
 
 
 @main.command()
@@ -95,29 +96,31 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     """
     if recompute and result is None:
         raise click.UsageError("--recompute needs a RESULT: a folder such as results/rls2")
-    from radarsim.app import doctor, run, shown
-    from radarsim.cli import console, outcomes
+    from radarsim.api import json_output, run_facts
+    from radarsim.api.maintenance import doctor as maintenance_doctor
+    from radarsim.api.maintenance import self_test
+    from radarsim.cli import console, print_results
 
     if result is None:
-        facts = doctor.machine()
+        facts = maintenance_doctor.machine()
         if not as_json:
             console.print_facts(facts)
-        verdicts = doctor.verdicts()
+        verdicts = self_test.verdicts()
         if as_json:
-            click.echo(shown.text({**facts, "self-test": [shown.fields(verdict) for verdict in verdicts]}))
+            click.echo(json_output.text({**facts, "self-test": [json_output.fields(verdict) for verdict in verdicts]}))
         else:
             console.print_facts({f"self-test {verdict.study}": verdict.words for verdict in verdicts})
-        console.print_warnings(run.cache_troubles())
-        bad = [f"self-test: {verdict.study}: {verdict.words}" for verdict in verdicts if not verdict.good]
+        console.print_warnings(run_facts.cache_troubles())
+        faults = [f"self-test: {verdict.study}: {verdict.words}" for verdict in verdicts if not verdict.good]
     else:
-        found = doctor.inspected(result, recompute)
+        inspection = maintenance_doctor.inspect_result(result, recompute)
         if as_json:
-            click.echo(shown.text(shown.fields(found)))
+            click.echo(json_output.text(json_output.fields(inspection)))
         else:
-            outcomes.print_inspection(found)
-        bad = found.faults
-    if bad:
-        raise StoreError(*bad)
+            print_results.print_inspection(inspection)
+        faults = inspection.faults
+    if faults:
+        raise StoreError(*faults)
 
 
 @main.command()
@@ -150,15 +153,19 @@ def clean(
       radarsim clean --other-sources
       radarsim clean mine.yaml --other-sources
     """
-    from radarsim.app import clean as cleaning
-    from radarsim.app import run, shown
-    from radarsim.cli import outcomes
+    from radarsim.api import json_output, load_experiments
+    from radarsim.api.maintenance import clean as maintenance_clean
+    from radarsim.cli import print_results
 
     if not configs and (overrides or seed is not None):
         raise click.UsageError("--set and --seed need a CONFIG")
-    chosen = run.load_all(configs, run.merged(overrides, None, seed)) if configs else None
-    cleaned = cleaning.clean(out, chosen, dry_run, other_sources)
+    chosen = (
+        load_experiments.load_all(configs, load_experiments.combine_overrides(overrides, None, seed))
+        if configs
+        else None
+    )
+    cleaned = maintenance_clean.clean(out, chosen, dry_run, other_sources)
     if as_json:
-        click.echo(shown.text(shown.fields(cleaned) | {"dry_run": dry_run}))
+        click.echo(json_output.text(json_output.fields(cleaned) | {"dry_run": dry_run}))
     else:
-        outcomes.print_cleaned(cleaned, dry_run)
+        print_results.print_removed_blocks(cleaned, dry_run)

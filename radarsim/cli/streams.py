@@ -48,8 +48,8 @@ def tolerant_output() -> Iterator[None]:
     code: str | int | None = None
     try:
         yield
-    except SystemExit as leaving:
-        code = leaving.code
+    except SystemExit as exit_request:
+        code = exit_request.code
     sys.stdout.flush()
     if output is not None and output.error is not None and output.error.errno != errno.EPIPE:
         sys.stderr.write(f"output: cannot be written: {output.error.strerror}\n")

@@ -4,8 +4,8 @@ import json
 import shlex
 from pathlib import Path
 
-from radarsim.config import document
-from radarsim.config.experiment import Experiment, in_name
+from radarsim.config import find_files
+from radarsim.config.experiment import Experiment, swept_value_text
 from radarsim.errors import argument
 
 MAX_NAMES = 12  # configs or values that a message lists
@@ -30,8 +30,12 @@ def _swept_choice(experiment: Experiment, command: str) -> str:
     for case in experiment.cases:
         for key, value in case.swept:
             values.setdefault(key, []).append(value)
-    distinct = {key: list({in_name(value): value for value in swept}.values()) for key, swept in values.items()}
-    lists = "; ".join(f"{key} = {list_names([in_name(value) for value in swept])}" for key, swept in distinct.items())
+    distinct = {
+        key: list({swept_value_text(value): value for value in swept}.values()) for key, swept in values.items()
+    }
+    lists = "; ".join(
+        f"{key} = {list_names([swept_value_text(value) for value in swept])}" for key, swept in distinct.items()
+    )
     settings = [f"sweep.{key}={json.dumps(swept[:1], ensure_ascii=False)}" for key, swept in distinct.items()]
     return f"choose of {lists}: {_command(command, experiment.path or experiment.stem, *settings)}"
 
@@ -39,7 +43,7 @@ def _swept_choice(experiment: Experiment, command: str) -> str:
 def _command(command: str, path: str, *settings: str) -> str:
     """A command on a config with settings, or the Python arguments; the config by its stem where that finds it."""
     file = Path(path)
-    shipped_file = document.config_file(file.stem)
+    shipped_file = find_files.config_file(file.stem)
     name = path if file.is_file() and not (shipped_file and shipped_file.samefile(file)) else file.stem
     options = "".join(f" --set {shlex.quote(setting)}" for setting in settings)
     overrides = f", overrides={list(settings)}" if settings else ""

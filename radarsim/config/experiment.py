@@ -1,97 +1,27 @@
-"""A checked config, an experiment of cases, and the parts of it that decide its numbers, as plain data."""
+"""A checked config: an experiment of cases."""
 
-import hashlib
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
-
-from radarsim.config.document import one_line, short
-from radarsim.config.fields import Added, DataFile, Design, Display, NameIn
+from radarsim.config.error_list import one_line, short_number
+from radarsim.config.identity import all_keys
 
 
-# ---- identity --------------------------------------------------------------------------------------------------------
-def digest(value: object) -> str:
-    """The SHA-256, in hexadecimal, of plain data: numbers in their shortest exact form, keys sorted."""
-    text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def canonical(spec: BaseModel) -> dict[str, Any]:
-    """All keys that change a number, with defaults, in SI units; without display names."""
-    return _plain_data(spec, (Display,))
-
-
-def world(spec: BaseModel) -> dict[str, Any]:
-    """The keys of the observed world, without filters and number of scans: cases of one world share their noise."""
-    return _plain_data(spec, (Display, Design))
-
-
-def complete(spec: BaseModel) -> dict[str, Any]:
-    """All keys with a value, including names: they can be read back as the same config."""
-    return _plain_data(spec, ())
-
-
-def _plain_data(value: object, excluded_marks: tuple[type, ...]) -> Any:
-    """A value as plain data, without the fields that have one of these marks. Without marks, all keys with a value."""
-    if isinstance(value, BaseModel):
-        return _plain_mapping(value, excluded_marks)
-    if isinstance(value, tuple | list):
-        return [_plain_data(item, excluded_marks) for item in value]
-    if isinstance(value, dict):
-        return {str(key): _plain_data(item, excluded_marks) for key, item in value.items()}
-    return value
-
-
-def _plain_mapping(model: BaseModel, excluded_marks: tuple[type, ...]) -> dict[str, Any]:
-    """The fields of a model as plain data, see `_plain_data`."""
-    data = {}
-    for name, info in type(model).model_fields.items():
-        if any(isinstance(mark, excluded_marks) for mark in info.metadata):
-            continue
-        if excluded_marks and not _is_added_default(model, name, info):
-            data[name] = _plain_data(_value_without_names(model, name, info), excluded_marks)
-        elif not excluded_marks and getattr(model, name) is not None:
-            data[name] = _plain_data(getattr(model, name), excluded_marks)
-    return data
-
-
-def _is_added_default(model: BaseModel, name: str, info: FieldInfo) -> bool:
-    """Whether a field that earlier versions lacked has its default, which keeps their behaviour."""
-    return any(isinstance(mark, Added) for mark in info.metadata) and getattr(model, name) == info.default
-
-
-def _value_without_names(model: BaseModel, name: str, info: FieldInfo) -> object:
-    """The value of a field, with the name of a list's member replaced by its index (0 if none is named), and a data
-    file by the hash of its content."""
-    value = getattr(model, name)
-    for mark in info.metadata:
-        if isinstance(mark, NameIn):
-            return 0 if value is None else [member.name for member in getattr(model, mark.field)].index(value)
-        if isinstance(mark, DataFile) and value is not None:
-            return hashlib.sha256(Path(value).read_bytes()).hexdigest()
-    return value
-
-
-# ---- experiment ------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Case:
     """One configuration to run: the checked keys of a study, the number of realisations, and the seed.
 
     name: the stem of its config, with ` key=value` for each swept key. spec: the keys of the study, an object of its
-    subclass of `radarsim.config.fields.Study`. noise_of: the keys of another case whose noise this one shares, although
-    its world differs (common random numbers); None for noise of its own.
+    subclass of `radarsim.config.study_keys.StudyKeys`. noise_of: the keys of another case whose noise this one shares,
+    although its world differs (common random numbers); None for noise of its own.
     against: further baselines, beside that of the spec. For each there is a companion: the same case with that
     baseline, computed on the same noise.
     asked_from_k: the scan, counted from 1, from which on exact σ and gains are needed; 0: all exact values. roughly:
     what takes long to compute may be wrong by a thousandth, as for the first steps of a search.
-    outside: user filters beside those of the study, see `radarsim.studies.outside`."""
+    outside: user filters beside those of the study, see `radarsim.studies.user_filters`."""
 
     name: str
     stem: str
@@ -126,7 +56,7 @@ class Case:
     @property
     def keys(self) -> dict[str, Any]:
         """The keys as plain data, including names, and all baselines if there are several."""
-        keys, members = complete(self.spec), self.spec.bare_keys
+        keys, members = all_keys(self.spec), self.spec.bare_keys
         user_baselines = (user_filter.name for user_filter in self.outside if user_filter.baseline)
         if further_baselines := [*self.against, *user_baselines]:
             keys["baseline"] = [*filter(None, [keys.get("baseline")]), *further_baselines]
@@ -175,32 +105,32 @@ class Experiment:
         """The cases in a figure: all, unless the config selects some."""
         if figure not in self.figures:
             return self.cases
-        return tuple(case for case in self.cases if any(matches(case.name, p) for p in self.figures[figure]))
+        return tuple(case for case in self.cases if any(matches_pattern(case.name, p) for p in self.figures[figure]))
 
     def drawn(self, figures: Iterable[str]) -> list[str]:
         """The figures that the config selects, in its order; all if it selects none."""
         figure_names = list(figures)
-        selected = [name for pattern in self.figures for name in figure_names if matches(name, pattern)]
+        selected = [name for pattern in self.figures for name in figure_names if matches_pattern(name, pattern)]
         return list(dict.fromkeys(selected)) if self.figures else figure_names
 
 
-DRAWN_FOR_ALL = ("sweep_*",)  # figures that no study names
+COMMON_FIGURES = ("sweep_*",)  # figures that no study names
 
 
-def matches(name: str, pattern: str) -> bool:
+def matches_pattern(name: str, pattern: str) -> bool:
     """Whether a pattern under `figures` matches a name: exactly, or with * and ?."""
     return name == pattern or fnmatchcase(name, pattern.replace("[", "[[]"))
 
 
-def in_name(value: object) -> str:
+def swept_value_text(value: object) -> str:
     """The text of a swept value in the name of a case: short numbers, plain text, lists without blanks."""
     match value:
         case bool():
             return str(value).lower()
         case int() | float():
-            return short(value)
+            return short_number(value)
         case list():
-            return "[" + ",".join(map(in_name, value)) + "]"
+            return "[" + ",".join(map(swept_value_text, value)) + "]"
         case dict():
-            return "{" + ",".join(f"{key}:{in_name(item)}" for key, item in value.items()) + "}"
+            return "{" + ",".join(f"{key}:{swept_value_text(item)}" for key, item in value.items()) + "}"
     return one_line(str(value))

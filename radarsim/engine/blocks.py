@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from radarsim.engine.results import Sums
+from radarsim.engine.sums import Sums
 from radarsim.errors import NonFiniteError
 
 REQUEST_DIGITS = 32  # of an identity, for the request; the others are for the sources that compute
@@ -113,7 +113,7 @@ class Total:
 Piece = Node | Partial | Total
 
 
-def widest(first: int, stop: int, highest: int) -> Node:
+def widest_node(first: int, stop: int, highest: int) -> Node:
     """The largest node of at most level `highest` that starts at block `first` and ends by block `stop`."""
     level = min(highest, (stop - first).bit_length() - 1)
     if first:
@@ -121,7 +121,7 @@ def widest(first: int, stop: int, highest: int) -> Node:
     return Node(level, first >> level)
 
 
-def maximal(nodes: Collection[Node], stop: int) -> list[Node]:
+def maximal_nodes(nodes: Collection[Node], stop: int) -> list[Node]:
     """Those of the nodes that end by block `stop` and are not contained in another such node, from left to right."""
     inside = {node for node in nodes if node.stop <= stop}
     highest = max((node.level for node in inside), default=0)
@@ -151,32 +151,32 @@ def share_bound(blocks: int, number: int, shares: int) -> int:
     return blocks * number // shares
 
 
-def added(left: Sums, right: Sums, first: int) -> Sums:
+def add_sums(first_sums: Sums, second_sums: Sums, first: int) -> Sums:
     """Sum of neighbouring sums; NonFiniteError if it overflows. `first`, the first realisation, is for the message."""
     with np.errstate(over="ignore", invalid="ignore"):
-        both = left + right
-    if not np.isfinite(both.values).all():
-        raise NonFiniteError(f"{_span(first, both.count)}: the sums overflow")
-    return both
+        total = first_sums + second_sums
+    if not np.isfinite(total.values).all():
+        raise NonFiniteError(f"{_span(first, total.count)}: the sums overflow")
+    return total
 
 
-def simulated(work: Work, piece: Node | Partial) -> Sums:
+def simulate_piece(work: Work, piece: Node | Partial) -> Sums:
     """The sums of a node or of a partial block. ValueError if the work gives a vector of another shape or type,
     NonFiniteError naming the realisations if it gives numbers that are not finite."""
     first, count = piece.realisations(work.block)
     with np.errstate(over="ignore", invalid="ignore"):
-        values = _merged(work, first, count)
+        values = _merge_blocks(work, first, count)
         # NaN and infinity survive addition, so one check at the end finds them all.
         if np.isfinite(values).all():
             return Sums(count, values)
         for start in range(first, first + count, work.block):
             size = min(work.block, first + count - start)
             if not np.isfinite(work.simulate(start, size)).all():
-                raise NonFiniteError(f"{_span(start, size)}: the sums are not finite", *_explained(work, start, size))
+                raise NonFiniteError(f"{_span(start, size)}: the sums are not finite", *_explain(work, start, size))
     raise NonFiniteError(f"{_span(first, count)}: the sums overflow")
 
 
-def _merged(work: Work, first: int, count: int) -> np.ndarray:
+def _merge_blocks(work: Work, first: int, count: int) -> np.ndarray:
     """Sums of one block or less, or of 2^q blocks, merging the odd one of each level with the pending even one."""
     block, shape = work.block, (work.size,)
     waiting: list[np.ndarray] = []
@@ -192,7 +192,7 @@ def _merged(work: Work, first: int, count: int) -> np.ndarray:
     return waiting[0]
 
 
-def _explained(work: Work, first: int, count: int) -> tuple[str, ...]:
+def _explain(work: Work, first: int, count: int) -> tuple[str, ...]:
     explain = getattr(work, "explain", None)
     return tuple(explain(first, count)) if explain else ()
 
@@ -212,7 +212,7 @@ class Forest:
         """Add a node that overlaps no other, and merge upwards as long as siblings exist."""
         while (sibling := self.nodes.pop(Node(node.level, node.index ^ 1), None)) is not None:
             node = Node(node.level + 1, node.index >> 1)
-            sums = added(sibling, sums, node.first * self._block)
+            sums = add_sums(sibling, sums, node.first * self._block)
         self.nodes[node] = sums
 
     def prefix(self) -> list[Node]:
@@ -236,5 +236,5 @@ class Forest:
             return Sums(0, np.zeros(self._size))
         sums = self.nodes[nodes[0]]
         for node in nodes[1:]:
-            sums = added(sums, self.nodes[node], 0)
+            sums = add_sums(sums, self.nodes[node], 0)
         return sums

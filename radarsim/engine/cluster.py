@@ -24,8 +24,8 @@ from types import ModuleType, TracebackType
 from typing import TYPE_CHECKING, Self
 
 from radarsim.engine.blocks import Node, Partial, Work
-from radarsim.engine.run import Outcome, attempted
-from radarsim.errors import ClusterError, ConfigError, Interrupted, argument
+from radarsim.engine.executors import Outcome, run_task
+from radarsim.errors import ClusterError, ConfigError, Interruption, argument
 from radarsim.private_files import distrust_reason
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 CONNECT_S = 10
 WORKERS_S = 30  # how long a scheduler may have no worker
-DEATHS = 20  # of workers running one task, after which it is taken as their cause
+MAX_WORKER_DEATHS = 20  # of workers running one task, after which it is taken as their cause
 RESULT_S = 60  # how long the sums of a block may take from a worker
 HOLDER_S = 5  # the same on this machine before checking whether the worker lives
 LOOK_S = 1.0
@@ -42,7 +42,10 @@ SCHEMES = ("tcp", "tls")
 LOOPBACK = "127.0.0.1"  # servers started on this machine listen only here
 HINT = "--workers and --scheduler need Dask: pip install 'radarsim[cluster]'"
 QUIET = ("distributed", "distributed.nanny", "distributed.worker", "distributed.scheduler", "distributed.comm")
-SETTINGS = {"distributed.scheduler.allowed-failures": DEATHS, "distributed.comm.timeouts.connect": f"{CONNECT_S}s"}
+SETTINGS = {
+    "distributed.scheduler.allowed-failures": MAX_WORKER_DEATHS,
+    "distributed.comm.timeouts.connect": f"{CONNECT_S}s",
+}
 TLS = "distributed.comm.tls"
 
 
@@ -54,7 +57,7 @@ def _dask() -> ModuleType:
     return distributed
 
 
-def trust(address: str) -> str | None:
+def scheduler_warning(address: str) -> str | None:
     """A note on the trust that the scheduler at an address requires, in one line; None for one of this machine."""
     host = address.partition("://")[2] or address
     host = host.rpartition(":")[0].strip("[]")
@@ -96,7 +99,7 @@ def _check_credentials(distributed: ModuleType) -> None:
     key = security.tls_client_key or security.tls_client_cert  # a key may stand in the file of its certificate
     try:
         for text in filter(None, {security.tls_ca_file, security.tls_client_cert, key}):
-            if "\n" not in text and (reason := distrust_reason(text) or (text == key and _exposed(text))):
+            if "\n" not in text and (reason := distrust_reason(text) or (text == key and _key_exposure(text))):
                 raise ConfigError(f"{argument('scheduler')}: {text}: {reason}")
         context = security.get_connection_args("client").get("ssl_context")
     except (OSError, ValueError, TypeError) as error:
@@ -105,7 +108,7 @@ def _check_credentials(distributed: ModuleType) -> None:
         raise ConfigError(f"{argument('scheduler')}: {hint}")
 
 
-def _exposed(key: str) -> str | None:
+def _key_exposure(key: str) -> str | None:
     """Why a file is no place for a private key, as a phrase that follows its name; None where it is one."""
     if not hasattr(os, "geteuid"):
         return None
@@ -145,17 +148,17 @@ class Cluster:
 
         for name in QUIET:
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        self._dead = distributed.scheduler.KilledWorker
+        self._killed_worker = distributed.scheduler.KilledWorker
         self._done: SimpleQueue[Future] = SimpleQueue()
         self._tasks: dict[str, tuple[Future, Work, Node | Partial]] = {}  # by key
         self._running: set[str] = set()  # after a cancel: those that may finish
         self._numbers = count()
-        self._looked = self._seen = time.monotonic()
+        self._last_look_s = self._last_worker_s = time.monotonic()
         self._time_of_day = time.time()
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._scheduler: LocalCluster | None = None
-        self._own: _Processes | None = None
-        self._place = scheduler or "this machine"
+        self._processes: _Processes | None = None
+        self._address = scheduler or "this machine"
         settings = SETTINGS
         if scheduler is None:
             # Dask imports from its scratch folders before all others; the usual one may be another user's.
@@ -178,7 +181,7 @@ class Cluster:
                     f"{argument('scheduler')}: no Dask scheduler answers at {scheduler}: {error}"
                 ) from error
         if workers is not None:
-            self._own = _Processes(workers, address, str(dask.config.serialize(settings)))
+            self._processes = _Processes(workers, address, str(dask.config.serialize(settings)))
         self._wait_for_workers(workers or 1)
 
     def _wait_for_workers(self, required: int) -> None:
@@ -187,7 +190,7 @@ class Cluster:
             if time.monotonic() > end:
                 self.close()
                 raise ConfigError(
-                    f"{argument('scheduler')}: no worker is connected to {self._place}; `dask worker` starts one"
+                    f"{argument('scheduler')}: no worker is connected to {self._address}; `dask worker` starts one"
                 )
             time.sleep(0.1)
 
@@ -200,15 +203,15 @@ class Cluster:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: BaseException | TracebackType | None) -> None:
-        if kind is Interrupted:  # whose process ends at once; an orderly end would take two seconds
+        if kind is Interruption:  # whose process ends at once; an orderly end would take two seconds
             self._kill()
         else:
             self.close()
 
     def _kill(self) -> None:
         """End the workers of this machine, with what they wrote."""
-        if self._own is not None:
-            self._own.kill()
+        if self._processes is not None:
+            self._processes.kill()
         if self._folder is not None:
             self._folder.cleanup()
 
@@ -217,7 +220,7 @@ class Cluster:
         number = next(self._numbers)
         key = f"radarsim-{work.identity[:16]}-{piece.name}-{number}"
         arguments = (pickle.dumps(work), work.identity, piece)
-        future = self._client.submit(_attempted, *arguments, key=key, pure=False, priority=-number)
+        future = self._client.submit(_run_task, *arguments, key=key, pure=False, priority=-number)
         self._tasks[key] = future, work, piece
         future.add_done_callback(self._done.put)
 
@@ -226,13 +229,13 @@ class Cluster:
         or all workers are gone, or a task cannot run there at all."""
         outcomes: list[Outcome] = []
         with contextlib.suppress(Empty):
-            outcomes += self._collected(self._done.get(timeout=timeout_s))
+            outcomes += self._outcomes_of(self._done.get(timeout=timeout_s))
             while True:
-                outcomes += self._collected(self._done.get_nowait())
+                outcomes += self._outcomes_of(self._done.get_nowait())
         self._look()
         return outcomes
 
-    def _collected(self, future: "Future") -> list[Outcome]:
+    def _outcomes_of(self, future: "Future") -> list[Outcome]:
         key = str(future.key)
         task = self._tasks.pop(key, None)
         if task is None:  # cancelled before
@@ -243,65 +246,65 @@ class Cluster:
                 return [self._sums(future)]
             except TimeoutError as late:
                 raise ClusterError(
-                    f"{self._place}: a worker does not send its sums within {RESULT_S} s; what was finished is stored"
+                    f"{self._address}: a worker does not send its sums within {RESULT_S} s; what was finished is stored"
                 ) from late
             except Exception:  # the worker died before it was reached: retry
                 pass
             self.submit(*task[1:])
             return []
         if future.status == "cancelled":
-            raise self._lost()
+            raise self._scheduler_lost_error()
         error = future.exception()
-        if isinstance(error, self._dead):
+        if isinstance(error, self._killed_worker):
             raise ClusterError(
-                f"{self._place}: {DEATHS} workers died under the same blocks; what was finished is stored"
+                f"{self._address}: {MAX_WORKER_DEATHS} workers died under the same blocks; what was finished is stored"
             )
         if isinstance(error, ConfigError):
             raise error
-        raise ClusterError(f"{self._place}: a worker cannot run the blocks: {type(error).__name__}: {error}")
+        raise ClusterError(f"{self._address}: a worker cannot run the blocks: {type(error).__name__}: {error}")
 
     def _sums(self, future: "Future") -> Outcome:
         """The result of a task. Raises TimeoutError after RESULT_S. If all its holders have died, others compute it
         again; on this machine these have to be started."""
         end = time.monotonic() + RESULT_S
-        while self._own is not None:
+        while self._processes is not None:
             try:
                 return future.result(timeout=HOLDER_S)
             except TimeoutError:
                 if time.monotonic() > end:
                     raise
-                self._own.replace()
+                self._processes.replace()
         return future.result(timeout=RESULT_S)
 
     def _look(self) -> None:
         """About once a second: check the clock, the scheduler and which workers are connected."""
-        now = time.monotonic()
-        if now < self._looked + LOOK_S:
+        now_s = time.monotonic()
+        if now_s < self._last_look_s + LOOK_S:
             return
         time_of_day = time.time()
-        set_back_s = now - self._looked - (time_of_day - self._time_of_day)
-        self._looked, self._time_of_day = now, time_of_day
+        set_back_s = now_s - self._last_look_s - (time_of_day - self._time_of_day)
+        self._last_look_s, self._time_of_day = now_s, time_of_day
         if set_back_s > STEP_S:  # Dask sends no message before the time of day at which it was due
             raise ClusterError(
-                f"{self._place}: its clock was set back by {set_back_s:.0f} s, for which Dask would wait; what was "
+                f"{self._address}: its clock was set back by {set_back_s:.0f} s, for which Dask would wait; what was "
                 "finished is stored, run again to continue"
             )
-        if self._own is not None:
-            self._own.replace()
+        if self._processes is not None:
+            self._processes.replace()
         if self._client.status != "running":
-            raise self._lost()
+            raise self._scheduler_lost_error()
         try:
             working = self._count()
         except Exception as error:
-            raise self._lost() from error
+            raise self._scheduler_lost_error() from error
         if working:
-            self._seen = now
-        elif now > self._seen + WORKERS_S:
-            raise ClusterError(f"{self._place}: no worker for {WORKERS_S} s; what was finished is stored")
+            self._last_worker_s = now_s
+        elif now_s > self._last_worker_s + WORKERS_S:
+            raise ClusterError(f"{self._address}: no worker for {WORKERS_S} s; what was finished is stored")
 
-    def _lost(self) -> ClusterError:
+    def _scheduler_lost_error(self) -> ClusterError:
         return ClusterError(
-            f"{self._place}: the scheduler went away; what was finished is stored, run again to continue"
+            f"{self._address}: the scheduler went away; what was finished is stored, run again to continue"
         )
 
     def cancel(self) -> int:
@@ -357,9 +360,9 @@ class _Processes:
         self._command = [sys.executable, "-P", "-m", "distributed.cli.dask_worker", address, *options, *closed]
         path = os.pathsep.join(filter(None, sys.path))
         self._environment = os.environ | {"PYTHONPATH": path, "DASK_INTERNAL_INHERIT_CONFIG": settings}
-        self._running = [self._started() for _ in range(workers)]
+        self._running = [self._start() for _ in range(workers)]
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _start(self) -> subprocess.Popen[bytes]:
         null = subprocess.DEVNULL
         return subprocess.Popen(
             self._command, env=self._environment, start_new_session=True, stdin=null, stdout=null, stderr=null
@@ -367,7 +370,7 @@ class _Processes:
 
     def replace(self) -> None:
         """Start a new process for each that has died."""
-        self._running = [process if process.poll() is None else self._started() for process in self._running]
+        self._running = [process if process.poll() is None else self._start() for process in self._running]
 
     def kill(self) -> None:
         """End them all at once."""
@@ -378,20 +381,20 @@ class _Processes:
         self._running = []
 
 
-_preparing = threading.Lock()
+_preparation_lock = threading.Lock()
 
 
 @lru_cache(maxsize=4)
-def _prepared(pickled: bytes) -> Work:
+def _prepare_work(pickled: bytes) -> Work:
     work = pickle.loads(pickled)
     work.block  # noqa: B018  (prepares it)
     return work
 
 
-def _attempted(pickled: bytes, identity: str, piece: Node | Partial) -> Outcome:
+def _run_task(pickled: bytes, identity: str, piece: Node | Partial) -> Outcome:
     """Run one task on a worker. ConfigError if the worker would compute other numbers than the run expects."""
-    with _preparing:
-        work = _prepared(pickled)
+    with _preparation_lock:
+        work = _prepare_work(pickled)
     if work.identity != identity:
         raise ConfigError("--scheduler: a worker has other sources than this machine; install the same radarsim there")
-    return attempted(work, piece)
+    return run_task(work, piece)

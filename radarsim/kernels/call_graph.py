@@ -12,7 +12,8 @@ from types import FunctionType, ModuleType
 
 import numpy as np
 
-from radarsim.module_sources import is_users_module, module_digest
+from radarsim.module_sources import module_digest
+from radarsim.user_files import is_user_module
 
 
 def source_hash(function: Callable) -> str:
@@ -36,7 +37,7 @@ def source_hash(function: Callable) -> str:
             continue
         top = name.partition(".")[0]
         if top not in counts:
-            counts[top] = is_users_module(top)
+            counts[top] = is_user_module(top)
         if not counts[top]:
             continue
         texts[name] = module_digest(name)
@@ -56,7 +57,7 @@ def value_text(value: object) -> str:
         return f"({', '.join(map(value_text, value))})"
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
-    if isinstance(digest := getattr(value, "made_of", None), str):  # what runs a program of `kernels.traced`
+    if isinstance(digest := getattr(value, "made_of", None), str):  # what runs a program of `kernels.tracing`
         return digest
     value = getattr(value, "__wrapped__", value)
     if isinstance(value, FunctionType):

@@ -1,12 +1,13 @@
 """A number that is eight: compiled code that reads like the textbook and runs eight realisations with one instruction.
 
-`lanes` is a Numba type that stands for LLVM's <8 x double>. `+ - * /` work on it lane by lane, also with plain
-floats, so the step of one realisation is the step of eight, with no loop over lanes and no dependence on the
-vectoriser (which refuses run-time alias checks in loops of fewer than 16 passes, and so leaves a loop over 8 lanes
-scalar, four times slower).
+`lanes` is a Numba type that stands for LLVM's <8 x double>. `+ - * /` work on it lane by lane, also with plain floats,
+so the step of one realisation is the step of eight, with no loop over lanes and no dependence on the vectoriser (which
+refuses run-time alias checks in loops of fewer than 16 passes, and so leaves a loop over 8 lanes scalar, four times
+slower).
 
 Small matrices are tuples of lanes, passed through functions that are inlined. What lives between steps lies in a flat
-float64 array: row r holds the eight lanes of one quantity, at r * WIDTH … r * WIDTH + 7; `rows` makes such an array."""
+float64 array: row r holds the eight lanes of one quantity, at r * WIDTH … r * WIDTH + 7; `rows` makes such an array.
+"""
 
 import functools
 import inspect
@@ -18,8 +19,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-from radarsim.kernels import traced
-from radarsim.kernels.compile import inline
+from radarsim.kernels import tracing
+from radarsim.kernels.compiler import inline
 
 WIDTH = 8
 ROOT_HALF = 0x3FE6A09E667F3BCD  # √½ as its bits: a number is m 2**e with m from there to √2
@@ -53,33 +54,38 @@ def rows(count: int) -> np.ndarray:
     return raw[skip : skip + count * WIDTH]
 
 
-def _spread(builder, number):
+def broadcast(builder, number):
+    """A float in every lane."""
     first = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
     everywhere = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
     return builder.shuffle_vector(first, ir.Constant(VECTOR, ir.Undefined), everywhere)
 
 
-def _everywhere(number):
+def constant_lanes(number):
+    """A whole number in every lane."""
     return ir.Constant(INTEGERS, [number] * WIDTH)
 
 
-def _power_of_two(builder, x):
-    exponent = builder.add(builder.fptosi(x, INTEGERS), _everywhere(1023))
-    return builder.bitcast(builder.shl(exponent, _everywhere(52)), VECTOR)
+def lanes_power_of_two(builder, x):
+    """2 to the power of each lane, a whole number, by its bits."""
+    exponent = builder.add(builder.fptosi(x, INTEGERS), constant_lanes(1023))
+    return builder.bitcast(builder.shl(exponent, constant_lanes(52)), VECTOR)
 
 
-def _called(builder, name, value):
+def call_llvm(builder, name, value):
+    """Call a function of LLVM on the lanes."""
     function = builder.module.globals.get(name) or ir.Function(builder.module, ir.FunctionType(VECTOR, [VECTOR]), name)
     return builder.call(function, [value])
 
 
-def _members(builder, pack):
+def members(builder, pack):
+    """The members of an LLVM aggregate."""
     return [builder.extract_value(pack, i) for i in range(len(pack.type.elements))]
 
 
 def _arithmetic(op, instruction):
     def generate(context, builder, sig, args):
-        values = (v if t == lanes else _spread(builder, v) for v, t in zip(args, sig.args, strict=True))
+        values = (v if t == lanes else broadcast(builder, v) for v, t in zip(args, sig.args, strict=True))
         return getattr(builder, instruction)(*values)
 
     for left_type, right_type in ((lanes, lanes), (lanes, types.float64), (types.float64, lanes)):
@@ -135,7 +141,7 @@ def lane_operation(plain: Callable, signature):
     return decorate
 
 
-@lane_operation(lambda x, y, yes, no: traced.where(x > y, yes, no), lanes(lanes, lanes, lanes, lanes))
+@lane_operation(lambda x, y, yes, no: tracing.where(x > y, yes, no), lanes(lanes, lanes, lanes, lanes))
 def where_greater(context, builder, sig, args):
     """Lane by lane: yes where x > y, else no. Every choice (maximum, minimum, a merging rule) is made of it."""
     return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
@@ -155,25 +161,25 @@ def any_greater(typingctx, x, y):
 @lane_operation(lambda number: number, lanes(types.float64))
 def full(context, builder, sig, args):
     """A number as lanes."""
-    return _spread(builder, args[0])
+    return broadcast(builder, args[0])
 
 
-@lane_operation(traced.sqrt, lanes(lanes))
-def root(context, builder, sig, args):
+@lane_operation(tracing.sqrt, lanes(lanes))
+def square_root(context, builder, sig, args):
     """Square root, lane by lane."""
-    return _called(builder, "llvm.sqrt.v8f64", args[0])
+    return call_llvm(builder, "llvm.sqrt.v8f64", args[0])
 
 
-@lane_operation(traced.nearest, lanes(lanes))
+@lane_operation(tracing.nearest, lanes(lanes))
 def nearest(context, builder, sig, args):
     """The nearest whole number, ties to even, lane by lane."""
-    return _called(builder, "llvm.rint.v8f64", args[0])
+    return call_llvm(builder, "llvm.rint.v8f64", args[0])
 
 
-@lane_operation(traced.power_of_two, lanes(lanes))
+@lane_operation(tracing.power_of_two, lanes(lanes))
 def power_of_two(context, builder, sig, args):
     """2**x for whole numbers x from -1022 to 1023, written into the exponent."""
-    return _power_of_two(builder, args[0])
+    return lanes_power_of_two(builder, args[0])
 
 
 @intrinsic
@@ -245,7 +251,8 @@ def row(typingctx, pointer, number):
     return pointer(pointer, types.intp), generate
 
 
-def _row_pointer(builder, pointer, row):
+def row_pointer(builder, pointer, row):
+    """The address of a row of lanes."""
     return builder.bitcast(builder.gep(pointer, [builder.mul(row, ir.Constant(row.type, WIDTH))]), VECTOR.as_pointer())
 
 
@@ -254,7 +261,7 @@ def get(typingctx, pointer, row):
     """The lanes in one row, counted from the address of a float64 array."""
 
     def generate(context, builder, sig, args):
-        value = builder.load(_row_pointer(builder, *args))
+        value = builder.load(row_pointer(builder, *args))
         value.align = 8
         return value
 
@@ -266,7 +273,7 @@ def put(typingctx, pointer, row, value):
     """Write the lanes of one row."""
 
     def generate(context, builder, sig, args):
-        store = builder.store(args[2], _row_pointer(builder, *args[:2]))
+        store = builder.store(args[2], row_pointer(builder, *args[:2]))
         store.align = 8
         return context.get_dummy_value()
 
@@ -293,166 +300,3 @@ def exponential(x):
     p = p * r + 1.0
     p = p * r + 1.0
     return p * power_of_two(n)
-
-
-# ---- small matrices in rows: each `stride` rows after the one before --------
-@inline
-def get3(pointer, first, stride=1):
-    """Three numbers, from row `first` on."""
-    return get(pointer, first), get(pointer, first + stride), get(pointer, first + 2 * stride)
-
-
-@inline
-def get4(pointer, first, stride=1):
-    """Four numbers, from row `first` on."""
-    return (*get3(pointer, first, stride), get(pointer, first + 3 * stride))
-
-
-@inline
-def get6(pointer, first, stride=1):
-    """Six numbers, from row `first` on."""
-    return get3(pointer, first, stride) + get3(pointer, first + 3 * stride, stride)
-
-
-@inline
-def put3(pointer, first, x, stride=1):
-    """Write three numbers, from row `first` on."""
-    put(pointer, first, x[0])
-    put(pointer, first + stride, x[1])
-    put(pointer, first + 2 * stride, x[2])
-
-
-@inline
-def put4(pointer, first, x, stride=1):
-    """Write four numbers, from row `first` on."""
-    put3(pointer, first, x, stride)
-    put(pointer, first + 3 * stride, x[3])
-
-
-@inline
-def put6(pointer, first, x, stride=1):
-    """Write six numbers, from row `first` on."""
-    put3(pointer, first, (x[0], x[1], x[2]), stride)
-    put3(pointer, first + 3 * stride, (x[3], x[4], x[5]), stride)
-
-
-@inline
-def choose3(x, y, yes, no):
-    """`where_greater` of three numbers."""
-    return where_greater(x, y, yes[0], no[0]), where_greater(x, y, yes[1], no[1]), where_greater(x, y, yes[2], no[2])
-
-
-@inline
-def choose6(x, y, yes, no):
-    """`where_greater` of six numbers."""
-    return choose3(x, y, yes[:3], no[:3]) + choose3(x, y, yes[3:], no[3:])
-
-
-@inline
-def lane3(pointer, first):
-    """Three plain numbers of one lane, whose address it is, from row `first` on."""
-    return pointer[first * WIDTH], pointer[(first + 1) * WIDTH], pointer[(first + 2) * WIDTH]
-
-
-@inline
-def put_lane3(pointer, first, x):
-    """Write three plain numbers of one lane."""
-    pointer[first * WIDTH], pointer[(first + 1) * WIDTH], pointer[(first + 2) * WIDTH] = x
-
-
-# ---- programs ------------------------------------------------------------------------------------------------------
-def emitted(program: traced.Program):
-    """An intrinsic that runs a program on eight realisations: its arrays are given by their addresses, as a tuple."""
-
-    @intrinsic
-    def run(typingctx, arrays):
-        def generate(context, builder, sig, args):
-            _run(program, builder, _members(builder, args[0]))
-            return context.get_dummy_value()
-
-        return types.none(arrays), generate
-
-    run.made_of = program.digest  # what a kernel with it in it is kept by
-    return run
-
-
-def emitted_sums(program: traced.Program):
-    """The same of a program with sums: to its arrays and a tuple of lanes it gives the tuple with these added."""
-    kind = types.UniTuple(lanes, len(program.sums))
-
-    @intrinsic
-    def run(typingctx, arrays, sums):
-        def generate(context, builder, sig, args):
-            results = _run(program, builder, _members(builder, args[0]))
-            sums_so_far = _members(builder, args[1])
-            added = [builder.fadd(a, results[index]) for a, index in zip(sums_so_far, program.sums, strict=True)]
-            return context.make_tuple(builder, kind, added)
-
-        return kind(arrays, kind), generate
-
-    run.made_of = program.digest
-    return run
-
-
-def zeros(count: int):
-    """An intrinsic that gives a tuple of so many lanes of zero."""
-    kind = types.UniTuple(lanes, count)
-
-    @intrinsic
-    def none(typingctx):
-        nothing = ir.Constant(VECTOR, [0.0] * WIDTH)
-        return kind(), lambda context, builder, sig, args: context.make_tuple(builder, kind, [nothing] * count)
-
-    none.made_of = f"zeros {count}"
-    return none
-
-
-def _run(program, builder, pointers):
-    """The results of all operations of a program, whose outputs are written."""
-    results = []
-    for op, *operands in program.ops:
-        if op in ("row", "plain"):
-            results.append(_read(builder, op, pointers[operands[0]], operands[1]))
-        elif op == "number":
-            results.append(ir.Constant(VECTOR, [operands[0]] * WIDTH))
-        else:
-            results.append(_operation(builder, op, [results[index] for index in operands]))
-    for array, number, index in program.outputs:
-        builder.store(
-            results[index], _row_pointer(builder, pointers[array], ir.Constant(ir.IntType(64), number))
-        ).align = 8
-    return results
-
-
-def _read(builder, op, pointer, number):
-    index = ir.Constant(ir.IntType(64), number)
-    if op == "plain":
-        return _spread(builder, builder.load(builder.gep(pointer, [index])))
-    value = builder.load(_row_pointer(builder, pointer, index))
-    value.align = 8
-    return value
-
-
-CALLED = {"sqrt": "llvm.sqrt.v8f64", "nearest": "llvm.rint.v8f64"}
-
-
-def _operation(builder, op, values):
-    if op in traced.ARITHMETIC.values():
-        return getattr(builder, op)(*values)
-    if op in traced.COMPARED.values():
-        return builder.fcmp_ordered(op, *values)
-    if op in CALLED:
-        return _called(builder, CALLED[op], *values)
-    if op == "where":
-        return builder.select(*values)
-    if op in ("and", "or"):
-        return getattr(builder, f"{op}_")(*values)
-    if op == "not":
-        return builder.not_(*values)
-    if op == "power_of_two":
-        return _power_of_two(builder, *values)
-    bits = builder.bitcast(values[0], INTEGERS)
-    power = builder.ashr(builder.sub(bits, _everywhere(ROOT_HALF)), _everywhere(52))
-    if op == "exponent":
-        return builder.sitofp(power, VECTOR)
-    return builder.bitcast(builder.sub(bits, builder.shl(power, _everywhere(52))), VECTOR)

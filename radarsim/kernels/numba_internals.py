@@ -1,6 +1,6 @@
 """How kernels are compiled and kept by the private half of Numba: in half the time, to the same bytes everywhere.
 
-No documentation describes most of what is used here; a release of Numba may change it. `radarsim.kernels.compile` then
+No documentation describes most of what is used here; a release of Numba may change it. `radarsim.kernels.compiler` then
 compiles with public options alone (`radarsim.kernels.numba_options`), which has the same three functions.
 
 The type of an operation is found once: half of what Numba takes to infer types. For each `a * b` Numba tries some ten
@@ -14,9 +14,9 @@ Cascade Lake: sums over samples 1.7 times faster, normals 1.3 times. Numba's CPU
 whole process, but only where no other user of Numba came first, and the order of sums would depend on who did.
 
 Numba optimises every function together with all that it calls and makes machine code of it, so that what is called at
-the fifth level is translated five times. What kernels call (`inline`, `part`) has no compiled entry from Python and is
-kept untranslated until the kernel is compiled: the nine-state filters take two thirds of the time, and run at the same
-speed. A kernel that another calls is compiled for it apart, without an entry and without machine code."""
+the fifth level is translated five times. What kernels call (`inline`, `kernel_part`) has no compiled entry from Python
+and is kept untranslated until the kernel is compiled: the nine-state filters take two thirds of the time, and run at
+the same speed. A kernel that another calls is compiled for it apart, without an entry and without machine code."""
 
 import ctypes
 import functools

@@ -4,6 +4,7 @@ Threefry2x64-13 (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy a
 transform with polynomials for log, sin and cos, because nothing vectorises the library's. The key is (seed, hash of the
 stream's name), the counter (realisation, call). Call c gives the words 2c and 2c + 1, of 64 bits. Pair p of normals is
 made of word p alone, pair p of uniform numbers of words 2p and 2p + 1.
+
 LAYOUT is the version of that layout: results carry it, and a change of it starts new results."""
 
 import hashlib
@@ -11,8 +12,9 @@ import math
 
 import numpy as np
 
-from radarsim.kernels.compile import inline, kernel
-from radarsim.kernels.lanes import ROOT_HALF, address, get, put
+from radarsim.kernels.compiler import inline, kernel
+from radarsim.kernels.lanes import address, get, put
+from radarsim.kernels.polynomials import log_polynomial, sine_cosine_polynomial
 
 LAYOUT = 2
 LANE_BITS = 3
@@ -27,7 +29,7 @@ def stream(seed: int, name: str) -> np.ndarray:
 
 
 @inline
-def rotated(x, n):
+def rotate_left(x, n):
     """A 64-bit word rotated to the left by n bits."""
     return (x << n) | (x >> (U(64) - n))
 
@@ -36,13 +38,13 @@ def rotated(x, n):
 def four_rounds(x0, x1, a, b, c, d):
     """Four rounds of Threefry2x64 with these rotations (Salmon et al. 2011)."""
     x0 += x1
-    x1 = rotated(x1, a) ^ x0
+    x1 = rotate_left(x1, a) ^ x0
     x0 += x1
-    x1 = rotated(x1, b) ^ x0
+    x1 = rotate_left(x1, b) ^ x0
     x0 += x1
-    x1 = rotated(x1, c) ^ x0
+    x1 = rotate_left(x1, c) ^ x0
     x0 += x1
-    x1 = rotated(x1, d) ^ x0
+    x1 = rotate_left(x1, d) ^ x0
     return x0, x1
 
 
@@ -58,49 +60,7 @@ def threefry(x0, x1, k0, k1):
     x0, x1 = four_rounds(x0, x1, U(16), U(42), U(12), U(31))
     x0, x1 = x0 + k0, x1 + k1 + U(3)
     x0 += x1
-    return x0, rotated(x1, U(16)) ^ x0
-
-
-@inline
-def log_polynomial(x):
-    """Natural logarithm of a positive normal number, to 3 units in the last place."""
-    b = np.float64(x).view(np.int64)
-    e = (b - np.int64(ROOT_HALF)) >> np.int64(52)
-    return log_series(np.int64(b - (e << np.int64(52))).view(np.float64), np.float64(e))
-
-
-@inline
-def log_series(m, e):
-    """Natural logarithm of m 2^e with m from √½ to √2.
-
-    log m = 2 atanh s = s (2 + q p(q)) with s = (m - 1) / (m + 1), q = s². p is the polynomial of least greatest error
-    (Remez's algorithm in 50 digits): 1.2e-18 of the logarithm."""
-    s = (m - 1.0) / (m + 1.0)
-    q = s * s
-    p = q * 0.1479594981044202 + 0.15314050542046614
-    p = p * q + 0.1818356432645527
-    p = p * q + 0.2222219857317996
-    p = p * q + 0.28571428742387633
-    p = p * q + 0.39999999999414676
-    p = p * q + 0.6666666666666734
-    return e * 0.69314718055994531 + s * (p * q + 2.0)
-
-
-@inline
-def sine_cosine_polynomial(x):
-    """sin x and cos x for |x| <= pi/4, to 1.5 units in the last place. The polynomials in q = x² of least greatest
-    error (Remez's algorithm in 50 digits), 4e-18 and 9e-17, for (sin x / x - 1) / q and (cos x - 1 + q/2) / q²."""
-    q = x * x
-    s = q * 1.589623019235577e-10 - 2.505074776349835e-08
-    s = s * q + 2.7557313621390157e-06
-    s = s * q - 0.00019841269829589552
-    s = s * q + 0.008333333333322118
-    s = s * q - 0.1666666666666663
-    c = q * 2.0645119015439733e-09 - 2.7555523111876013e-07
-    c = c * q + 2.48015807073305e-05
-    c = c * q - 0.0013888888877611812
-    c = c * q + 0.04166666666659654
-    return x * q * s + x, (c * q - 0.5) * q + 1.0
+    return x0, rotate_left(x1, U(16)) ^ x0
 
 
 @inline
@@ -204,33 +164,3 @@ def fill_uniform_strip(key, first, pair, a, b):
         x[i], y[i] = threefry(start + (U(i) & U(LANES - 1)), call + (U(i) >> U(LANE_BITS)), k0, k1)
     for i in range(a.size):
         a[i], b[i] = uniform(x[i]), uniform(y[i])
-
-
-# ---- mixtures of laws, from which rare events are drawn --------
-@inline
-def part_of(key, cumulative, realisation):
-    """The index of the law of a mixture that a realisation is drawn from, 0 for the plain law.
-
-    cumulative (M + 1,): cumulative shares of the laws, the last is 1."""
-    u, _ = uniforms(key[0], key[1], realisation, 0)
-    m = 0
-    while u > cumulative[m]:
-        m += 1
-    return m
-
-
-@inline
-def add_weight(w, sums, j):
-    """Add an event of weight w to row j of sums (n, 4): Σw, Σw², number and Σw⁴."""
-    sums[j, 0] += w
-    sums[j, 1] += w * w
-    sums[j, 2] += 1.0
-    sums[j, 3] += w**4
-
-
-@inline
-def add_drawn(w, plain, weight_sums):
-    """Add a realisation of weight w, drawn from the plain law or not, to weight_sums (3,): plain ones, Σw and Σw²."""
-    weight_sums[0] += plain
-    weight_sums[1] += w
-    weight_sums[2] += w * w

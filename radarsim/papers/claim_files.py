@@ -24,12 +24,15 @@ from string import Template
 from types import ModuleType, UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
-from radarsim import failures
-from radarsim.config.check import check
-from radarsim.config.document import Document, Faults, KeyPath, did_you_mean, shown
-from radarsim.config.fields import Anything, Flag, Model, Name, Stem
-from radarsim.config.load import parse, read
-from radarsim.errors import OF_AUTHORS, ConfigError, MeasureError, RadarsimError
+from radarsim import user_code_errors
+from radarsim.config.document import Document
+from radarsim.config.error_list import ErrorList, KeyPath, quoted_value
+from radarsim.config.find_files import did_you_mean
+from radarsim.config.key_types import Anything, Flag, Name, Stem
+from radarsim.config.model import Model
+from radarsim.config.validate import validate
+from radarsim.config.yaml_io import parse_yaml, read_document
+from radarsim.errors import AUTHOR_ERRORS, ConfigError, MeasureError, RadarsimError
 from radarsim.papers import expected_ranges
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownName, exact_number
@@ -131,35 +134,35 @@ class MeasureCall:
     arguments: Mapping[str, Any]
     source: str = field(default="", compare=False)  # where it is written, for messages
 
-    def __call__(self, seen: Any) -> Estimate:
+    def __call__(self, evidence: Any) -> Estimate:
         """The measured value; a plain number is without noise. Raises MeasureError where the function fails."""
         try:
             if self.function is None:
-                value = getattr(seen, self.name)(*self.cases, **self.arguments)
+                value = getattr(evidence, self.name)(*self.cases, **self.arguments)
             else:
-                value = self.function(seen, *self.cases, **self.arguments)
-        except OF_AUTHORS as error:
+                value = self.function(evidence, *self.cases, **self.arguments)
+        except AUTHOR_ERRORS as error:
             is_our_error = isinstance(error, RadarsimError) and not isinstance(error, ConfigError)
             if is_our_error or (
                 isinstance(error, MissingEvidence | ImpossibleInterpretation) and not self._misspelt(error)
             ):
                 raise
-            raise MeasureError(f"{self.source}: {self.name}: {failures.summary(error)}") from error
+            raise MeasureError(f"{self.source}: {self.name}: {user_code_errors.error_summary(error)}") from error
         if isinstance(value, Estimate):
             return value
         with suppress(TypeError, ValueError):
             if not isinstance(value, str | bytes):
                 return exact_number(value)
-        raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {shown(value)}")
+        raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {quoted_value(value)}")
 
     def _misspelt(self, error: Exception) -> bool:
         """Whether a function of a package asks for a name that the paper's own case does not have."""
         of_a_package = self.function is not None and not self.function.__module__.startswith("radarsim.")
         return of_a_package and isinstance(error, UnknownName)
 
-    def number(self, seen: Any) -> float:
+    def number(self, evidence: Any) -> float:
         """Its value alone."""
-        return float(self(seen).value)
+        return float(self(evidence).value)
 
 
 def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
@@ -175,35 +178,37 @@ def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
 @cache
 def load_claims(file: Path, *measures: ModuleType) -> tuple[Claim, ...]:
     """The claims of a file, measured by functions of these modules; raises ConfigError, one line for each fault."""
-    faults = Faults()
-    return _declarations(read(file, faults), faults, FileKeys, lambda keys, reader: reader.claims(keys), measures)
+    faults = ErrorList()
+    return _declarations(
+        read_document(file, faults), faults, FileKeys, lambda keys, reader: reader.claims(keys), measures
+    )
 
 
 @cache
 def parse_claims(text: str, source: str, *measures: ModuleType) -> tuple[tuple[Claim, ...], tuple[Choice, ...]]:
     """The claims, and the choices if any, of a text like claims.yaml; source: its file, for faults. Empty lines before
     the text align the line numbers of faults with that file."""
-    faults = Faults()
-    document = parse(text, source, faults)
+    faults = ErrorList()
+    document = parse_yaml(text, source, faults)
     claims = _declarations(document, faults, FileKeys, lambda keys, reader: reader.claims(keys), measures)
     return claims, _declarations(document, faults, FileKeys, lambda keys, reader: reader.choices(keys))
 
 
 def load_choices(file: Path) -> tuple[Choice, ...]:
     """The open points of a paper, from a file interpretations.yaml; raises ConfigError, one line for each fault."""
-    faults = Faults()
-    return _declarations(read(file, faults), faults, ChoicesKeys, lambda keys, reader: reader.choices(keys))
+    faults = ErrorList()
+    return _declarations(read_document(file, faults), faults, ChoicesKeys, lambda keys, reader: reader.choices(keys))
 
 
 def _declarations(
     document: Document | None,
-    faults: Faults,
+    faults: ErrorList,
     model: type[KeysModel],
     convert: "Callable[[KeysModel, _Reader], Iterator[Declaration]]",
     measures: Sequence[ModuleType] = (),
 ) -> tuple[Declaration, ...]:
     """The objects made of a checked document."""
-    keys = None if document is None else check(model, document, faults)
+    keys = None if document is None else validate(model, document, faults)
     declarations = () if document is None or keys is None else tuple(convert(keys, _Reader(document, faults, measures)))
     faults.raise_if_any()
     return declarations
@@ -228,7 +233,7 @@ class _UnknownNameError(Exception):
 class _Reader:
     """Makes claims of checked keys, and notes unknown names."""
 
-    def __init__(self, document: Document, faults: Faults, measures: Sequence[ModuleType]):
+    def __init__(self, document: Document, faults: ErrorList, measures: Sequence[ModuleType]):
         self.document, self.faults = document, faults
         self.functions: dict[str, Callable[..., Any]] = {}
         methods: dict[str, Callable[..., Any]] = {}
@@ -237,17 +242,17 @@ class _Reader:
             self.functions |= {
                 name: function
                 for name, function in functions.items()
-                if next(iter(_parameters_of(function)), "") == "seen"
+                if next(iter(_parameters_of(function)), "") == "evidence"
             }
             members = inspect.getmembers(getattr(module, "Evidence", Evidence), inspect.isfunction)
             methods |= {name: function for name, function in members if not hasattr(Evidence, name)}
-        named = methods | self.functions
-        self.measures = {name: function for name, function in named.items() if not name.startswith("_")}
+        measures_by_name = methods | self.functions
+        self.measures = {name: function for name, function in measures_by_name.items() if not name.startswith("_")}
         self.ranges: dict[str, Callable[..., Any]] = {name: getattr(expected_ranges, name) for name in RANGE_NAMES}
 
     def claims(self, keys: FileKeys) -> Iterator[Claim]:
         """The claims in their order."""
-        names = self._named(keys.names)
+        names = self._read_names(keys.names)
         parts: dict[str, list[Part]] = {}
         for i, claim_keys in enumerate(keys.claims):
             if f"{keys.paper}.{claim_keys.id}" in parts:
@@ -271,7 +276,7 @@ class _Reader:
 
     def choices(self, keys: ChoicesKeys | FileKeys) -> Iterator[Choice]:
         """The choices in their order."""
-        names = self._named(keys.names)
+        names = self._read_names(keys.names)
         for i, choice_keys in enumerate(keys.choices):
             claims = self._filled(choice_keys.claims, names, ("choices", i, "claims"))
             claim_ids = [
@@ -289,7 +294,7 @@ class _Reader:
                 choice_keys.contradicts,
             )
 
-    def _named(self, values: Mapping[str, Any]) -> dict[str, Any]:
+    def _read_names(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The values under `names`; each may use those before it."""
         names: dict[str, Any] = {}
         for name, value in values.items():

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from radarsim.language import numeral, plural, term, tr
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import plural, term, tr
 from radarsim.papers.claim_outcome import round_up
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN
 from radarsim.papers.reasons import translate_reason
@@ -51,22 +52,22 @@ def class_count(kind: str, count: int) -> str:
 
 def count_classes(rows: Sequence[Mapping]) -> tuple[dict[str, int], int]:
     """How many claims are in each class, in the order of the rule, and how many extensions there are besides."""
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     extensions = 0
     for parts in group_by_claim(rows):
         if is_extension(parts):
             extensions += 1
         else:
-            found[parts[0]["class"]] += 1
-    return {kind: found[kind] for kind in CLASS_ORDER if found[kind]}, extensions
+            counts[parts[0]["class"]] += 1
+    return {kind: counts[kind] for kind in CLASS_ORDER if counts[kind]}, extensions
 
 
 def group_by_claim(rows: Sequence[Mapping]) -> list[list[Mapping]]:
     """The rows of each claim."""
-    found: dict[tuple[str, str], list[Mapping]] = {}
+    groups: dict[tuple[str, str], list[Mapping]] = {}
     for row in rows:
-        found.setdefault((row["paper"], row["claim"]), []).append(row)
-    return list(found.values())
+        groups.setdefault((row["paper"], row["claim"]), []).append(row)
+    return list(groups.values())
 
 
 def is_extension(parts: Sequence[Mapping]) -> bool:
@@ -77,9 +78,11 @@ def is_extension(parts: Sequence[Mapping]) -> bool:
 def classes_in_words(rows: Sequence[Mapping]) -> str:
     """How many claims are in which class, in words."""
     classes, extensions = count_classes(rows)
-    said = ", ".join(class_count(kind, count) for kind, count in classes.items())
-    more = plural("{count} extension not counted", "{count} extensions not counted", extensions) if extensions else ""
-    return "; ".join(filter(None, (said, more)))
+    counts = ", ".join(class_count(kind, count) for kind, count in classes.items())
+    extension_count = (
+        plural("{count} extension not counted", "{count} extensions not counted", extensions) if extensions else ""
+    )
+    return "; ".join(filter(None, (counts, extension_count)))
 
 
 def verdict_sentence(parts: Sequence[Mapping]) -> str:
@@ -92,12 +95,12 @@ def verdict_sentence(parts: Sequence[Mapping]) -> str:
     needed = cell_number(first["needed"])
     if UNDECIDED in (first["class"], first["as_shipped"]) and needed is not None:
         notes.append(tr("{needed} realisations would decide", needed=f"{round_up(needed):,}"))
-    if of := cell_number(first["of"]):
+    if interpretations := cell_number(first["of"]):
         holds = cell_number(first["holds"])
         notes.append(
-            tr("true under all {of:.0f} interpretations", of=of)
-            if holds == of
-            else tr("true under {holds:.0f} of {of:.0f} interpretations", holds=holds, of=of)
+            tr("true under all {of:.0f} interpretations", of=interpretations)
+            if holds == interpretations
+            else tr("true under {holds:.0f} of {of:.0f} interpretations", holds=holds, of=interpretations)
         )
     if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
         notes.append(translate_reason(first["why"]))
@@ -144,7 +147,7 @@ def _decisive_value(row: Mapping) -> float:
 
 def part_name(row: Mapping, parts: Sequence[Mapping]) -> str:
     """Description of a part, with its case where another part has the same words."""
-    alike = sum(other["what"] == row["what"] for other in parts)
+    alike = sum(part["what"] == row["what"] for part in parts)
     return row["what"] if alike == 1 else f"`{row['case']}`: {row['what']}"
 
 
@@ -170,9 +173,9 @@ def unit_after(value: float, unit: str) -> str:
 
 def expected_words(words: str, unit: str = "") -> str:
     """The expected range, in the current language: `about 20 to 30 ± 10`; with the unit if given."""
-    said = " ".join(tr(one) if one.isalpha() else numeral(one) for one in words.split())
+    text = " ".join(tr(word) if word.isalpha() else numeral(word) for word in words.split())
     last = re.findall(r"\d[\d.]*", words)[-1:]
-    return f"{said} {unit_after(float(last[0]), unit) if last else tr(unit)}".rstrip() if unit else said
+    return f"{text} {unit_after(float(last[0]), unit) if last else tr(unit)}".rstrip() if unit else text
 
 
 EXPECTED_WORDS = (term("about"), term("to"), term("few"))  # the words in it
@@ -190,9 +193,9 @@ def measured_words(row: Mapping) -> str:
     if not 0 < half < math.inf:
         text = numeral(f"{value:.4g}").replace("inf", "∞")
     else:
-        whole = all(one == round(one) for one in (value, lo, hi))
-        place = 0 if whole else max(0, 1 - math.floor(math.log10(half)))
-        middle, low, high = (numeral(f"{round(one, place) + 0.0:.{place}f}") for one in (value, lo, hi))
+        is_whole = all(number == round(number) for number in (value, lo, hi))
+        digits = 0 if is_whole else max(0, 1 - math.floor(math.log10(half)))
+        middle, low, high = (numeral(f"{round(number, digits) + 0.0:.{digits}f}") for number in (value, lo, hi))
         text = f"{middle} {interval(low, high)}"
     return f"{text} {unit_after(value, row['unit'])}".rstrip().replace("-", "\N{MINUS SIGN}")
 

@@ -47,14 +47,17 @@ def claims_page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool =
     parts: whether a folded table of all measured parts follows."""
     text = [TITLE, "", INTRODUCTION, *_class_lines(rows), ""]
     for paper in dict.fromkeys(row["paper"] for row in rows):
-        own = [row for row in rows if row["paper"] == paper]
-        key = own[0]["claim"].partition(".")[0]
+        paper_rows = [row for row in rows if row["paper"] == paper]
+        key = paper_rows[0]["claim"].partition(".")[0]
         link = f" Equations and decisions: [{key}]({pages[paper]}.md)." if pages.get(paper) else ""
-        claims = [[row for row in own if row["claim"] == claim] for claim in dict.fromkeys(row["claim"] for row in own)]
-        text += [f"## {key} {paper}", "", f"{classes_in_words(own)}.{link}", ""]
+        claims = [
+            [row for row in paper_rows if row["claim"] == claim]
+            for claim in dict.fromkeys(row["claim"] for row in paper_rows)
+        ]
+        text += [f"## {key} {paper}", "", f"{classes_in_words(paper_rows)}.{link}", ""]
         text += ["| claim | statement | verdict | config |", "|---|---|---|---|"]
         text += [*map(_claim_line, claims), ""]
-        lines = [line for every in claims for line in _part_lines(every)] if parts else []
+        lines = [line for claim_parts in claims for line in _part_lines(claim_parts)] if parts else []
         if lines:
             text += ["<details>", f"<summary>{key} part by part</summary>", ""]
             text += ["| claim | part | measured | exact | expected | miss, margins | verdict | rule of 0.1 |"]
@@ -64,13 +67,13 @@ def claims_page(rows: Sequence[Mapping], pages: Mapping[str, str], parts: bool =
 
 def _class_lines(rows: Sequence[Mapping]) -> list[str]:
     """The classes with their counts, meanings and claims, a line each."""
-    found, extensions = count_classes(rows)
-    own = [parts[0] for parts in group_by_claim(rows) if not is_extension(parts)]
-    lines = [f"In all {sum(found.values())} claims, and {extensions} extensions that are not counted:", ""]
-    for kind, count in found.items():
-        names = claim_ranges([row["claim"] for row in own if row["class"] == kind])
-        meant = f", {CLASS_MEANINGS[kind]}" if kind in CLASS_MEANINGS else ""
-        lines.append(f"* **{class_count(kind, count)}**{meant}: {names}")
+    counts, extensions = count_classes(rows)
+    first_parts = [parts[0] for parts in group_by_claim(rows) if not is_extension(parts)]
+    lines = [f"In all {sum(counts.values())} claims, and {extensions} extensions that are not counted:", ""]
+    for kind, count in counts.items():
+        names = claim_ranges([row["claim"] for row in first_parts if row["class"] == kind])
+        meaning = f", {CLASS_MEANINGS[kind]}" if kind in CLASS_MEANINGS else ""
+        lines.append(f"* **{class_count(kind, count)}**{meaning}: {names}")
     return lines
 
 

@@ -13,7 +13,7 @@ from radarsim.papers.evidence import Evidence, ExactNumber, MissingEvidence
 from radarsim.papers.paper_cases import CaseKeys, ShippedCases, case_keys, key_differences, paper_members
 from radarsim.papers.verdict_rule import CONFIRMED, REFUTED, JudgedPart, judged_interval, miss_in_margins, part_verdict
 from radarsim.report import tables
-from radarsim.report.statistics import ERROR_OF_PROGRAM, FEW, Estimate, standard_errors
+from radarsim.report.statistics import ERROR_OF_PROGRAM, MIN_REALISATIONS, Estimate, standard_errors
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,13 +26,13 @@ MAX_REASON_ITEMS, MAX_KEYS_OF_ONE_CASE = 3, 8  # keys and cases in a reason; key
 ANOTHER_EXPERIMENT = "not the paper's experiment: {changed}"
 
 
-def old_verdict(of: Estimate, strict: tuple[float, float]) -> str:
+def old_verdict(measured: Estimate, strict: tuple[float, float]) -> str:
     """Whether an interval lies inside a range, outside, or neither: the rule of version 0.1."""
-    if not (of.lo <= of.hi):
+    if not (measured.lo <= measured.hi):
         return UNCLEAR
-    if strict[0] <= of.lo and of.hi <= strict[1]:
+    if strict[0] <= measured.lo and measured.hi <= strict[1]:
         return CONFIRMED
-    if of.hi < strict[0] or of.lo > strict[1]:
+    if measured.hi < strict[0] or measured.lo > strict[1]:
         return REFUTED
     return UNCLEAR
 
@@ -90,31 +90,35 @@ class _PaperEvidence:
     def __init__(
         self, paper_claims: PaperClaims, results: Sequence[CaseResult], tables_by_name: Mapping, shipped: ShippedCases
     ):
-        self._of, self._results, self._made, self._shipped = paper_claims, results, tables_by_name, shipped
-        self._seen: dict[str, tuple[Evidence | None, str]] = {}
+        self._paper_claims, self._results, self._tables, self._shipped = paper_claims, results, tables_by_name, shipped
+        self._evidence_by_config: dict[str, tuple[Evidence | None, str]] = {}
 
     def evidence(self, config: str) -> tuple[Evidence | None, str]:
         """The evidence for claims of a config, None where no case is the paper's; differences of the other cases."""
-        if config not in self._seen:
-            paper_claims = self._of
+        if config not in self._evidence_by_config:
+            paper_claims = self._paper_claims
             specs = _paper_cases(paper_claims, config, self._shipped)
-            self._seen[config] = self._evidence(specs), _differences_in_words(paper_claims, self._results, specs)
-        return self._seen[config]
+            self._evidence_by_config[config] = (
+                self._evidence(specs),
+                _differences_in_words(paper_claims, self._results, specs),
+            )
+        return self._evidence_by_config[config]
 
     def _evidence(self, shipped: Sequence[CaseKeys]) -> Evidence | None:
-        may_grow = self._of.may_grow
+        may_grow = self._paper_claims.may_grow
         members = {
-            result.name: paper_members(_case_keys(self._of, result), shipped, may_grow) for result in self._results
+            result.name: paper_members(_case_keys(self._paper_claims, result), shipped, may_grow)
+            for result in self._results
         }
         paper_members_of = {name: indices for name, indices in members.items() if indices is not None}
         if not paper_members_of:
             return None
-        tables_by_name = self._made
+        tables_by_name = self._tables
         if len(paper_members_of) < len(members):
             tables_by_name = {
                 name: _rows_of_cases(table, set(paper_members_of)) for name, table in tables_by_name.items()
             }
-        return self._of.evidence(
+        return self._paper_claims.evidence(
             [result for result in self._results if result.name in paper_members_of], tables_by_name, paper_members_of
         )
 
@@ -163,10 +167,10 @@ class _MeasuredPart:
 
 
 def _claim_rows(claim: Claim, paper: str, papers: _PaperEvidence, of_config: bool) -> list[dict[str, Any]]:
-    seen, changed = papers.evidence(claim.config)
-    if seen is None and not (of_config and changed):
+    evidence, changed = papers.evidence(claim.config)
+    if evidence is None and not (of_config and changed):
         return []
-    measured_parts = [_measure_part(part, seen, changed) for part in claim.parts]
+    measured_parts = [_measure_part(part, evidence, changed) for part in claim.parts]
     if not of_config and any(measured_part.judged is None for measured_part in measured_parts):
         return []
     judged_parts = [
@@ -186,48 +190,50 @@ def _claim_rows(claim: Claim, paper: str, papers: _PaperEvidence, of_config: boo
     ]
 
 
-def _measure_part(part: Part, seen: Evidence | None, changed: str) -> _MeasuredPart:
+def _measure_part(part: Part, evidence: Evidence | None, changed: str) -> _MeasuredPart:
     """Measure a part, or give the reason why not."""
-    if seen is None:
+    if evidence is None:
         return _MeasuredPart(part, why=ANOTHER_EXPERIMENT.format(changed=changed))
-    seen.tables_read.clear()
+    evidence.tables_read.clear()
     try:
-        measured = part.measure(seen)
-        cases = [seen.case(key) for key in part.cases]
-        judged = judged_part(part, seen, measured, min((case.count for case in cases), default=0))
+        measured = part.measure(evidence)
+        cases = [evidence.case(key) for key in part.cases]
+        judged = judged_part(part, evidence, measured, min((case.count for case in cases), default=0))
     except MissingEvidence as missing:
         default_reason = ANOTHER_EXPERIMENT.format(changed=changed) if changed else "a required case is missing"
         reason = missing.why or default_reason
         return _MeasuredPart(part, why=reason)
     except MeasureError as error:
         return _MeasuredPart(part, why=f"{MEASURE_FAILED}: {error.lines[0]}")
-    tables_with_components = {table for table, component in seen.tables_read if component}
-    tables_read = tuple(sorted(read for read in seen.tables_read if read[1] or read[0] not in tables_with_components))
-    judged = replace(judged, exact=exact_value(part, seen, measured))
+    tables_with_components = {table for table, component in evidence.tables_read if component}
+    tables_read = tuple(
+        sorted(read for read in evidence.tables_read if read[1] or read[0] not in tables_with_components)
+    )
+    judged = replace(judged, exact=exact_value(part, evidence, measured))
     names = ", ".join(dict.fromkeys(case.name for case in cases))
     old = old_verdict(measured, part.expected.strict)
     return _MeasuredPart(part, names, judged, old, disagreement_message(part, judged), tables_read)
 
 
-def judged_part(part: Part, seen: Evidence, measured: Estimate, n: int) -> JudgedPart:
+def judged_part(part: Part, evidence: Evidence, measured: Estimate, n: int) -> JudgedPart:
     """A part with its numbers, before its exact value is known; n: realisations."""
     value, lo, hi = (float(number) for number in measured)
     return JudgedPart(
         *(value, lo, hi, part.expected.lo, part.expected.hi),
-        margin=part.expected.margin * (part.scale(seen) if part.scale else 1.0),
+        margin=part.expected.margin * (part.scale(evidence) if part.scale else 1.0),
         kind=part.expected.kind,
-        ceiling=part.ceiling(seen) if part.ceiling else math.nan,
+        ceiling=part.ceiling(evidence) if part.ceiling else math.nan,
         n=n,
         **{name: getattr(part, name) for name in ("statement", "number", "variant", "against_print", "asserted")},
     )
 
 
-def exact_value(part: Part, seen: Evidence, measured: Estimate) -> float:
+def exact_value(part: Part, evidence: Evidence, measured: Estimate) -> float:
     """The exact value of a part, NaN where unknown."""
     try:
         if part.exact:
-            return float(part.exact(seen))
-        return float(part.measure(seen.exactly()).value)
+            return float(part.exact(evidence))
+        return float(part.measure(evidence.exactly()).value)
     except MissingEvidence:
         return float(measured.value) if isinstance(measured, ExactNumber) else math.nan
 
@@ -235,7 +241,7 @@ def exact_value(part: Part, seen: Evidence, measured: Estimate) -> float:
 def disagreement_message(part: Part, judged: JudgedPart) -> str:
     """A message where a part has an exact value of its own, further off than chance explains; else nothing. All other
     values follow from tables, which `agreement` compares with their exact columns."""
-    if part.exact is None or not judged.known or judged.n < FEW:
+    if part.exact is None or not judged.known or judged.n < MIN_REALISATIONS:
         return ""
     slack = max(1e-9 * abs(judged.exact), ROUNDING * judged.margin)
     distance = standard_errors(Estimate(judged.measured, judged.lo, judged.hi), judged.exact)

@@ -4,13 +4,13 @@ from typing import Any
 
 import click
 
-from radarsim.cli import group
+from radarsim.cli import command_group, options
 
 
-@group.main.command()
-@click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=group.completed)
-@group.out_option
-@group.json_option
+@command_group.main.command()
+@click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=options.complete_config)
+@options.out_option
+@options.json_option
 @click.option("--markdown", is_flag=True, help="Print the page of claims in Markdown instead of text.")
 @click.option("--parts", is_flag=True, help="Also print what was measured for each claim.")
 @click.option(
@@ -37,14 +37,14 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
-    from radarsim.app import shown
+    from radarsim.api import json_output
     from radarsim.papers import list_claims, print_claims
 
     listed = list_claims.claims(*names, out=out)
     if figure is not None:
         listed.draw(figure)
     if as_json:
-        click.echo(shown.text(listed.rows))
+        click.echo(json_output.text(listed.rows))
     elif markdown:
         from radarsim.papers.claims_page import claims_page
         from radarsim.papers.study_claims import paper_claims
@@ -55,20 +55,20 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
         print_claims.print_claims(listed.in_words, detailed, out, names)
 
 
-@group.main.command()
+@command_group.main.command()
 @click.argument("names", nargs=-1, metavar="[CLAIM | PAPER …]")
-@group.realisations_option
+@options.realisations_option
 @click.option(
     "--decide",
     is_flag=True,
     help="Extend the runs, up to N realisations, until each claim is decided over all interpretations.",
 )
-@group.threads_option
-@group.time_limit_option
-@group.out_option
-@group.figures_option
+@options.threads_option
+@options.time_limit_option
+@options.out_option
+@options.figures_option
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
-@group.json_option
+@options.json_option
 @click.option(
     "--markdown", is_flag=True, help="Print the pages docs/interpretations_….md of these papers instead of text."
 )
@@ -97,20 +97,20 @@ def interpretations(
       radarsim interpretations P2 --decide -n 3.2e4          up to 32 000 realisations; undecided claims: exit code 3
       radarsim interpretations P1 --json | jq '.[] | select(.depends_on != [])'
     """
-    from radarsim.engine import run
+    from radarsim.engine import stopping
     from radarsim.errors import TargetUnmet
 
-    limit = run.TimeLimit(time_limit) if time_limit else None
-    with run.Signals() as stop:
-        from radarsim.app import shown
-        from radarsim.cli import console
+    limit = stopping.TimeLimit(time_limit) if time_limit else None
+    with stopping.Signals() as stop:
+        from radarsim.api import json_output
+        from radarsim.cli import progress as cli_progress
         from radarsim.papers import interpretation_files, judge_interpretations, print_claims
 
         options |= {"time_limit": limit, "figures": not no_figures, "stop": stop}
-        with console.Foretold("interpretations", quiet=quiet or as_json or markdown) as progress:
+        with cli_progress.TimedProgress("interpretations", quiet=quiet or as_json or markdown) as progress:
             verdicts = judge_interpretations.interpretations(*names, progress=progress.update, **options)
         if as_json:
-            click.echo(shown.text(interpretation_files.json_documents(verdicts)))
+            click.echo(json_output.text(interpretation_files.json_documents(verdicts)))
         elif markdown:
             click.echo(interpretation_files.markdown_pages(verdicts), nl=False)
         elif not quiet:

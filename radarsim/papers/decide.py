@@ -10,16 +10,16 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-from radarsim.app import configs, result, run
-from radarsim.app.ahead import Progress
-from radarsim.app.run import RunOptions, SimulatedCases
+from radarsim.api import configs, result_content, simulate_cases
+from radarsim.api.progress import Progress
+from radarsim.api.simulate_cases import RunOptions, SimulatedCases
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
 from radarsim.papers.claim_outcome import round_up
 from radarsim.papers.claim_rows import cell_number, group_by_claim, is_extension
 from radarsim.papers.study_claims import claims_of
 from radarsim.papers.verdict_rule import UNDECIDED
-from radarsim.report.precision import looks
+from radarsim.report.precision import look_counts
 from radarsim.studies import registry
 
 
@@ -38,7 +38,7 @@ def simulate_until_decided(
     """The cases at the first look at which every claim is decided, or at the last permitted look; progress is towards
     that one."""
     max_realisations = max(case.realisations for case in experiment.cases)
-    case_realisations = [realisations for _, realisations in dict(run.keyed(experiment))]
+    case_realisations = [realisations for _, realisations in dict(simulate_cases.works_by_identity(experiment))]
     done_before = 0  # realisations of the looks before
 
     def report(done: int, _: int, stored: int) -> None:
@@ -49,11 +49,11 @@ def simulate_until_decided(
         if options.out is None:
             options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
         latest: SimulatedCases | None = None
-        for n in dict.fromkeys((*looks(max_realisations), max_realisations)):
+        for n in dict.fromkeys((*look_counts(max_realisations), max_realisations)):
             cases = tuple(replace(case, realisations=min(n, case.realisations)) for case in experiment.cases)
             if done_before:
                 report(0, 0, 0)  # judging is not in the rate
-            simulated = run.simulate(replace(experiment, cases=cases), options, progress=progress and report)
+            simulated = simulate_cases.simulate(replace(experiment, cases=cases), options, progress=progress and report)
             done_before = sum(min(n, realisations) for realisations in case_realisations)
             if simulated.stopped and latest is not None and len(simulated.cases) < len(latest.cases):
                 return replace(latest, stopped=simulated.stopped)
@@ -66,10 +66,10 @@ def simulate_until_decided(
 
 def _claim_rows(experiment: Experiment, simulated: SimulatedCases) -> list[dict[str, Any]]:
     """The rows of claims.csv so far."""
-    results = run.finished(simulated)
+    results = simulate_cases.collected_results(simulated)
     if len(results) < len(experiment.cases):
         return []
-    table = result.case_tables(results, configs.shipped_stem(experiment))["claims"]
+    table = result_content.case_tables(results, configs.shipped_stem(experiment))["claims"]
     return list(table.to_dict("records"))
 
 

@@ -67,7 +67,7 @@ class Curve:
         return Estimate(float(self.value[i]), float(self.lo[i]), float(self.hi[i]))
 
     def where(self, mask: np.ndarray | slice) -> "Curve":
-        """The points selected by a mask or indices; raises Missing where there is none."""
+        """The points selected by a mask or indices; raises MissingEvidence where there is none."""
         if not np.asarray(self.k)[mask].size:
             there = f"there are {self.k[0]} to {self.k[-1]}" if len(self.k) else "there are none"
             raise UnknownScans("no such scans", there)
@@ -79,7 +79,7 @@ class Curve:
         part = self.where(self.k <= k)
         return replace(part, short="") if self.k[-1] >= k else part
 
-    def _whole(self) -> None:
+    def _check_complete(self) -> None:
         if self.short:
             raise MissingEvidence(self.short)
 
@@ -97,23 +97,24 @@ class Curve:
 
     def last(self) -> Estimate:
         """The last point."""
-        self._whole()
+        self._check_complete()
         return self.point(-1)
 
     def largest(self) -> Estimate:
         """The largest value, with the interval of its own scan."""
-        self._whole()
+        self._check_complete()
         return self.point(int(np.nanargmax(self.value)))
 
     def least(self) -> Estimate:
         """The least value, with the interval of its own scan."""
-        self._whole()
+        self._check_complete()
         return self.point(int(np.nanargmin(self.value)))
 
-    def when_largest(self, of: str = "t") -> Estimate:
-        """Time (or scan, of="k") of the largest value; the interval spans all points not significantly below it."""
-        self._whole()
-        axis = getattr(self, of)
+    def when_largest(self, axis_name: str = "t") -> Estimate:
+        """Time (axis_name="k": scan) of the largest value; the interval spans all points not significantly below
+        it."""
+        self._check_complete()
+        axis = getattr(self, axis_name)
         top = int(np.nanargmax(self.value))
         near = axis[self.hi >= self.lo[top]]
         return Estimate(float(axis[top]), float(near.min()), float(near.max()))
@@ -138,7 +139,9 @@ def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
         value = np.divide(scale * a.value, b.value)
         down = np.hypot(1 - np.divide(a.lo, a.value), np.divide(b.hi, b.value) - 1)
         up = np.hypot(np.divide(a.hi, a.value) - 1, 1 - np.divide(b.lo, b.value))
-    return Estimate(*(one if np.ndim(one) else float(one) for one in (value, value * (1 - down), value * (1 + up))))
+    return Estimate(
+        *(number if np.ndim(number) else float(number) for number in (value, value * (1 - down), value * (1 + up)))
+    )
 
 
 def exact_number(value: float) -> ExactNumber:
@@ -149,9 +152,9 @@ def exact_number(value: float) -> ExactNumber:
 class _WatchedTables(dict):
     """Tables that record which of them are read."""
 
-    def __init__(self, made: Mapping, looked: set[tuple[str, str]]):
-        super().__init__(made)
-        self._looked = looked
+    def __init__(self, tables: Mapping, tables_read: set[tuple[str, str]]):
+        super().__init__(tables)
+        self._looked = tables_read
 
     def __getitem__(self, name: str) -> Any:
         self._looked.add((name, ""))
@@ -163,13 +166,15 @@ class Evidence:
 
     results: only the paper's cases; `members` gives the paper's members of their lists that may grow."""
 
-    def __init__(self, results: Sequence[CaseResult], made: Mapping, places: Mapping[str, Mapping[str, set[int]]]):
+    def __init__(
+        self, results: Sequence[CaseResult], tables_by_name: Mapping, places: Mapping[str, Mapping[str, set[int]]]
+    ):
         """places: by case name and list key, the indices of the paper's members."""
         self.results: list[CaseResult] = list(results)
         self.tables_read: set[tuple[str, str]] = (
             set()
         )  # tables read, with or without a component, since it was last emptied
-        self.tables: Mapping = _WatchedTables(made, self.tables_read)
+        self.tables: Mapping = _WatchedTables(tables_by_name, self.tables_read)
         self._places = places
         self._exact = False
         self._groups: dict[str, Mapping] = {}
@@ -179,24 +184,26 @@ class Evidence:
         and gains are those of their exact columns; other tables, and sums, cannot be read."""
         for name in ("curves", "gains"):
             self._grouped(name)
-        other = copy.copy(self)
-        other._exact, other.tables = True, HiddenTables()
-        other.results = [replace(result, sums=HiddenTables()) for result in self.results]
-        return other
+        exact_evidence = copy.copy(self)
+        exact_evidence._exact, exact_evidence.tables = True, HiddenTables()
+        exact_evidence.results = [replace(result, sums=HiddenTables()) for result in self.results]
+        return exact_evidence
 
     def _grouped(self, table: str) -> Mapping:
         """The rows of curves by case, filter and component; of gains also by baseline."""
         if table not in self._groups:
             columns = ("case", "filter", "component", *(("baseline",) if table == "gains" else ()))
-            self._groups[table] = tables.groups(self.tables[table], *columns)
+            self._groups[table] = tables.group_by(self.tables[table], *columns)
         return self._groups[table]
 
     def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
         """The paper's members of a list of a case, each with its number; not the added ones."""
-        return [(i, one) for i, one in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]]
+        return [
+            (i, member) for i, member in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]
+        ]
 
     def case(self, key: Any) -> CaseResult:
-        """The case for a key; raises Missing where the experiment does not hold it. Here: by name."""
+        """The case for a key; raises MissingEvidence where the experiment does not hold it. Here: by name."""
         for result in self.results:
             if result.name == key:
                 return result
@@ -206,9 +213,9 @@ class Evidence:
         """Which name an existing case lacks; if it has all names, that it has no such curve."""
         filters = *result.axes.filters, *(result.outside.axes.filters if result.outside else ())
         components = tuple(name for name, _ in result.axes.components)
-        for kind, name, known in (("filter", filter_name, filters), ("component", component, components)):
-            if name not in known:
-                return UnknownName(f"no {kind} {name!r}; there are {', '.join(known)}")
+        for kind, name, existing in (("filter", filter_name, filters), ("component", component, components)):
+            if name not in existing:
+                return UnknownName(f"no {kind} {name!r}; there are {', '.join(existing)}")
         if filter_name in base:
             return UnknownName(f"filter {filter_name!r} is the baseline: it has no gain")
         return MissingEvidence((result.name, filter_name, component, *base))
@@ -240,33 +247,34 @@ class Evidence:
             value = lo = hi = exact
         return Curve(rows["k"].to_numpy(), rows["t_s"].to_numpy(), value, lo, hi)
 
-    def ratio(self, key: Any, filter_name: str, over: str, component: str) -> Curve:
+    def ratio(self, key: Any, filter_name: str, base_name: str, component: str) -> Curve:
         """σ of a filter over that of another one of the case: paired where one of the two is a baseline of it, or
         is from outside.
 
         Otherwise as of independent estimates, with an interval wider than under common noise."""
         case = self.case(key)
         gains = self._grouped("gains")
-        if (case.name, filter_name, component, over) in gains:
-            gain = self._gain(key, filter_name, component, over)
+        if (case.name, filter_name, component, base_name) in gains:
+            gain = self._gain(key, filter_name, component, base_name)
             value, lo, hi = (1 - part / 100 for part in (gain.value, gain.hi, gain.lo))
             return Curve(gain.k, gain.t, value, lo, hi)
-        if (case.name, over, component, filter_name) in gains:
-            gain = self._gain(key, over, component, filter_name)
+        if (case.name, base_name, component, filter_name) in gains:
+            gain = self._gain(key, base_name, component, filter_name)
             value, lo, hi = (1 / (1 - part / 100) for part in (gain.value, gain.lo, gain.hi))
             return Curve(gain.k, gain.t, value, lo, hi)
-        curve, other_curve = (self.curve(key, name, component) for name in (filter_name, over))
-        curve, other_curve = (
-            curve.where(np.isin(curve.k, other_curve.k)),
-            other_curve.where(np.isin(other_curve.k, curve.k)),
+        curve, base_curve = (self.curve(key, name, component) for name in (filter_name, base_name))
+        curve, base_curve = (
+            curve.where(np.isin(curve.k, base_curve.k)),
+            base_curve.where(np.isin(base_curve.k, curve.k)),
         )
         ratios = ratio(
-            Estimate(curve.value, curve.lo, curve.hi), Estimate(other_curve.value, other_curve.lo, other_curve.hi)
+            Estimate(curve.value, curve.lo, curve.hi), Estimate(base_curve.value, base_curve.lo, base_curve.hi)
         )
         return Curve(curve.k, curve.t, ratios.value, ratios.lo, ratios.hi)
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:
-        """The one row of a table with these values; raises Missing, ConfigError where there is no such table."""
+        """The one row of a table with these values; raises MissingEvidence, or ConfigError where there is no such
+        table."""
         if not isinstance(self.tables, HiddenTables) and table not in self.tables:
             raise ConfigError(f"this study has no table {table!r}; there are {', '.join(self.tables)}")
         rows = self.tables[table]

@@ -9,12 +9,12 @@ from radarsim.extensions import Extension, IndexEntry, ReportSection
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.app.result import Result
-    from radarsim.app.run import RunOptions, SimulatedCases
+    from radarsim.api.result import Result
+    from radarsim.api.simulate_cases import RunOptions, SimulatedCases
     from radarsim.config.experiment import Experiment
     from radarsim.engine.results import CaseResult
     from radarsim.extensions import Tables
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
 
 CLAIMS = "claims"  # the table, and the figure
 MAX_CLAIMS_WITHOUT_FIGURE = 3  # their verdicts are clearer than a figure

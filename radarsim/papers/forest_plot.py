@@ -8,7 +8,7 @@ from textwrap import shorten
 
 import numpy as np
 
-from radarsim.language import plural, tr
+from radarsim.language.translate import plural, tr
 from radarsim.papers.claim_rows import (
     CLASS_ORDER,
     cell_number,
@@ -22,8 +22,8 @@ from radarsim.papers.claim_rows import (
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN
 from radarsim.papers.specification_curve import AXIS_MM, ROW_MM
 from radarsim.papers.verdict_rule import CLASSES
-from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
-from radarsim.report.wording import formulas
+from radarsim.report.drawing.model import GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.report.math_text import with_formulas
 
 MAX_DRAWN_MARGINS = 4.0  # margins: larger distances are drawn there
 MAX_STATEMENT_CHARACTERS = 56  # letters of a claim beside its row
@@ -79,7 +79,7 @@ def _paper_panel(paper: str, claims: Sequence[tuple[Sequence[Mapping], Mapping]]
         statement = shorten(
             tr(parts[0]["statement"]), MAX_STATEMENT_CHARACTERS, placeholder=" …", break_on_hyphens=False
         )
-        ticks.append((float(y), f"{formulas(statement)}  {parts[0]['claim'].partition('.')[2]}"))
+        ticks.append((float(y), f"{with_formulas(statement)}  {parts[0]['claim'].partition('.')[2]}"))
         values.append(Note(RIM, float(y), decisive_value_words(worst), "e"))
     for kind, style in CLASS_STYLES.items():
         of_class = [(y, worst) for y, (parts, worst) in enumerate(claims) if parts[0]["class"] == kind]
@@ -103,9 +103,12 @@ def _forest_lines(kind: str, style: Style, claims: Sequence[tuple[int, Mapping]]
     value = np.array([_drawn_distance(float(row["measured"]), row) for row in rows])
     ends = np.array([sorted(_drawn_distance(end, row) for end in shown_interval(row)) for row in rows])
     lo, hi = np.fmin(ends[:, 0], value), np.fmax(ends[:, 1], value)
-    known = [cell_number(row["exact"]) for row in rows]
+    exact_values = [cell_number(row["exact"]) for row in rows]
     exact = np.array(
-        [math.nan if one is None else _drawn_distance(one, row) for one, row in zip(known, rows, strict=True)]
+        [
+            math.nan if number is None else _drawn_distance(number, row)
+            for number, row in zip(exact_values, rows, strict=True)
+        ]
     )
     gap = np.full(len(y), math.nan)
     marks = [

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
-from radarsim.app import configs
-from radarsim.app.ahead import Ahead
+from radarsim.api import configs
+from radarsim.api.progress import TimedProgress
 from radarsim.errors import StoreError
 from radarsim.papers.claims_table import NOT_JUDGED
 from radarsim.papers.interpretation_verdicts import InterpretationVerdicts
@@ -15,19 +15,19 @@ from radarsim.papers.open_papers import open_papers
 from radarsim.papers.stored_verdicts import CLASSES, TABLE, stored_claims, stored_classes, stored_interpretations
 from radarsim.papers.verdict_classes import CLASS_FILE_COLUMNS, verdict_class
 from radarsim.papers.verdicts_by_interpretation import InterpretationVerdict, verdict_columns, verdict_rows
-from radarsim.report import files
+from radarsim.report import atomic_files, provenance
 
 
-def write_files(verdicts: InterpretationVerdicts, figures: bool, forecast: Ahead) -> tuple[str, ...]:
+def write_files(verdicts: InterpretationVerdicts, figures: bool, forecast: TimedProgress) -> tuple[str, ...]:
     """Write the table, with the stored rows of other claims, and a curve for each claim."""
     contents = {TABLE.name: _interpretations_csv(verdicts).encode(), CLASSES.name: _classes_csv(verdicts).encode()}
-    figures_by_name = verdicts._described if figures else {}
+    figures_by_name = verdicts._figures_by_name if figures else {}
     for name, figure in figures_by_name.items():
-        from radarsim.report.figures import save  # Matplotlib
+        from radarsim.report.drawing.canvas import save  # Matplotlib
 
         with forecast.doing("figure"):
             contents[f"{name}.svg"] = save(figure, ("svg",))["svg"]
-    files.replace_all(verdicts.folder, contents)
+    atomic_files.replace_all(verdicts.folder, contents)
     return tuple(sorted(contents))
 
 
@@ -57,7 +57,7 @@ def outdated_configs(verdicts: InterpretationVerdicts) -> tuple[str, ...]:
     judged = {claim.claim.id: claim for claim in verdicts.claims if claim.outcome}
     stems = []
     for config in dict.fromkeys(claim.claim.config for claim in judged.values()):
-        if not files.is_of(verdicts.folder.parent / config, configs.load(config)):
+        if not provenance.holds_results_of(verdicts.folder.parent / config, configs.load(config)):
             continue
         with suppress(StoreError):  # `radarsim claims` reports a damaged one
             for row in stored_claims(verdicts.folder.parent / config / "claims.csv") or ():

@@ -5,20 +5,20 @@ from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 
-from radarsim.app import configs, result, run
-from radarsim.app.ahead import Ahead, Progress, estimated
-from radarsim.app.case_work import CaseWork
-from radarsim.app.run import RunOptions, SimulatedCases
+from radarsim.api import configs, result_content, simulate_cases
+from radarsim.api.case_work import CaseWork
+from radarsim.api.progress import Progress, TimedProgress, estimate_seconds
+from radarsim.api.simulate_cases import RunOptions, SimulatedCases
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores
-from radarsim.engine.run import Signals
+from radarsim.engine.stopping import Signals
 from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.papers.claim import Claim
 from radarsim.papers.interpretations import ChangedResults, ImpossibleInterpretation, Interpretation
 from radarsim.papers.open_papers import JudgingRequest
 from radarsim.papers.verdict_rule import UNDECIDED
 from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts, InterpretationVerdict, judge_claim
-from radarsim.report.precision import looks
+from radarsim.report.precision import look_counts
 
 # Expected seconds of judging a run, of an exact verdict and of a figure, until some are measured.
 RUN_JUDGED_S, VERDICT_S, FIGURE_S = 0.05, 0.001, 0.13
@@ -64,9 +64,9 @@ class InterpretationRuns:
             self._experiments[config] = configs.load(configs.shipped_file(config) or config)
         return self._experiments[config]
 
-    def forecast_runs(self, forecast: Ahead, max_realisations: int) -> None:
+    def forecast_runs(self, forecast: TimedProgress, max_realisations: int) -> None:
         """Add the runs, verdicts, and looks up to so many realisations that are ahead."""
-        self._later_looks = sum(n > self._realisations for n in looks(max_realisations))
+        self._later_looks = sum(n > self._realisations for n in look_counts(max_realisations))
         self._expect_runs(forecast, self._case_pairs)
         for claim in self._request.claims:
             interpretations = self._paper.interpretations.for_claim(claim.id)
@@ -76,17 +76,17 @@ class InterpretationRuns:
                 sum((claim.id, interpretation) not in self._run_of for interpretation in interpretations),
             )
 
-    def _expect_runs(self, forecast: Ahead, keys: Iterable[tuple[str, ...]]) -> None:
+    def _expect_runs(self, forecast: TimedProgress, keys: Iterable[tuple[str, ...]]) -> None:
         self._pending = dict.fromkeys(keys)
         for key in self._pending:
             forecast.add(f"judging of {key[0]}", RUN_JUDGED_S)
             forecast.add(self._forecast_name(key), 1.0, self._expected_seconds(key))
 
-    def estimate(self, forecast: Ahead, threads: int | None) -> None:
+    def estimate(self, forecast: TimedProgress, threads: int | None) -> None:
         """Measure a few realisations of every case as shipped, and add the seconds of the runs ahead."""
         cases = {(key[0], case.name): case for key in self._pending for case, _ in self._case_pairs[key]}
         realisations = self._realisations * (available_cores() if threads is None else max(threads, 1))
-        seconds_of_case = estimated(
+        seconds_of_case = estimate_seconds(
             {case_key: (CaseWork(case), self._realisations) for case_key, case in cases.items()}
         )
         self._seconds = {case_key: seconds / realisations for case_key, seconds in seconds_of_case.items()}
@@ -95,7 +95,7 @@ class InterpretationRuns:
         self._look_seconds = LATER_LOOK_SHARE * sum(map(self._expected_seconds, self._case_pairs))
         self._expect_looks(forecast, self._later_looks)
 
-    def _expect_looks(self, forecast: Ahead, count: int) -> None:
+    def _expect_looks(self, forecast: TimedProgress, count: int) -> None:
         forecast.add("later looks", 1.0, self._look_seconds * count)
 
     def _forecast_name(self, key: tuple[str, ...]) -> str:
@@ -109,7 +109,7 @@ class InterpretationRuns:
             sum(self._seconds.get((key[0], case.name), 0.0) for case, _ in self._case_pairs[key]) * self._realisations
         )
 
-    def judge(self, options: RunOptions, forecast: Ahead, stop: Signals | None) -> list[ClaimVerdicts]:
+    def judge(self, options: RunOptions, forecast: TimedProgress, stop: Signals | None) -> list[ClaimVerdicts]:
         """Every claim under every interpretation."""
         for key, pairs in self._case_pairs.items():
             try:
@@ -132,13 +132,13 @@ class InterpretationRuns:
         claims: list[ClaimVerdicts],
         max_realisations: int,
         options: RunOptions,
-        forecast: Ahead,
+        forecast: TimedProgress,
         stop: Signals | None,
     ) -> list[ClaimVerdicts]:
         """The claims again, undecided ones after longer runs of the interpretations that leave them undecided. Looks
         are at declared numbers only, as in `run --decide`; each claim is judged at its own last look, so that other
         requests change nothing."""
-        for n in (n for n in looks(max_realisations) if n > self._realisations):
+        for n in (n for n in look_counts(max_realisations) if n > self._realisations):
             undecided = {
                 (claim.claim.id, verdict.interpretation)
                 for claim in claims
@@ -171,11 +171,12 @@ class InterpretationRuns:
         key: tuple[str, ...],
         pairs: Sequence[tuple[Case, Case]],
         options: RunOptions,
-        forecast: Ahead,
+        forecast: TimedProgress,
         stop: Signals | None,
-        only: Collection[tuple[str, Interpretation]] | None = None,
+        judged_only: Collection[tuple[str, Interpretation]] | None = None,
     ) -> None:
-        """Run or continue the cases of a key, and judge what they show; `only`: for these places."""
+        """Run or continue the cases of a key, and judge what they show; judged_only: for these claims and
+        interpretations."""
         progress = forecast.running(self._forecast_name(key), partial(self._expected_seconds, key))
         try:
             simulated = self._run(key, pairs, options, progress)
@@ -193,7 +194,7 @@ class InterpretationRuns:
             for subject in (
                 subject
                 for subject, run_key in self._run_of.items()
-                if run_key == key and (only is None or subject in only)
+                if run_key == key and (judged_only is None or subject in judged_only)
             ):
                 self._verdicts[subject] = self._judge(self._claims[subject[0]], subject[1], results)
 
@@ -202,14 +203,14 @@ class InterpretationRuns:
     ) -> SimulatedCases:
         changed_cases = tuple(changed_case for _, changed_case in pairs)
         experiment = replace(self._experiment(key[0]), cases=changed_cases, realisations=self._realisations)
-        simulated = run.simulate(experiment, options, progress=progress)
+        simulated = simulate_cases.simulate(experiment, options, progress=progress)
         if simulated.stopped:
             raise TargetUnmet(f"interpretations: {simulated.stopped}: the same command continues")
         return simulated
 
     def _changed_results(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> ChangedResults:
-        results = run.finished(simulated)
-        tables = result.measured(results)
+        results = simulate_cases.collected_results(simulated)
+        tables = result_content.measured_tables(results)
         originals = [replace(changed, spec=case.spec) for changed, (case, _) in zip(results, pairs, strict=True)]
         may_grow = self._paper.claims.may_grow
         places = {

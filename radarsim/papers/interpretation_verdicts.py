@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from radarsim.app.shown import Shown
-from radarsim.language import tr
+from radarsim.api.display import Displayable
+from radarsim.language.translate import tr
 from radarsim.papers.open_papers import OpenPaper
 from radarsim.papers.specification_curve import specification_curve
 from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts, verdict_columns, verdict_rows
-from radarsim.report.drawing import Figure
-from radarsim.report.tables import read_rows
+from radarsim.report.csv_text import read_rows
+from radarsim.report.drawing.model import Figure
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +25,7 @@ class PaperVerdicts:
 
 
 @dataclass(repr=False)
-class InterpretationVerdicts(Shown):
+class InterpretationVerdicts(Displayable):
     """Result of `interpretations`: for each paper, and the files written, by their path under `folder`.
 
     undecided_messages: a line for each claim that stayed undecided although `decide` was set. outdated: configs whose
@@ -55,11 +55,11 @@ class InterpretationVerdicts(Shown):
         return read_rows(rows, columns)
 
     @property
-    def _described(self) -> dict[str, Figure]:
+    def _figures_by_name(self) -> dict[str, Figure]:
         claims = (claim for claim in self.claims if len(claim.verdicts) > 1 and claim.outcome is not None)
         return {claim.claim.id: specification_curve(claim) for claim in claims}
 
-    def _said(self) -> list[str]:
+    def _answer_lines(self) -> list[str]:
         return [
             f"{claim.claim.id} {tr(claim.outcome.kind)}: {claim.sentence()}" for claim in self.claims if claim.outcome
         ]

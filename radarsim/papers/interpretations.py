@@ -13,7 +13,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import listed, numeral, tr
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import join_names, tr
 from radarsim.papers.claim import Claim, PaperClaims, Part
 from radarsim.papers.evidence import Evidence
 from radarsim.papers.verdict_rule import AGAINST, EQUIVALENT, UNSTATED
@@ -64,7 +65,7 @@ class Choice:
         return self.alternatives[0].name
 
     def __getitem__(self, name: str) -> Alternative:
-        return next(one for one in self.alternatives if one.name == name)
+        return next(alternative for alternative in self.alternatives if alternative.name == name)
 
     def bears_on(self, claim: str) -> bool:
         """Whether this choice may change the verdict on a claim."""
@@ -102,16 +103,19 @@ class PaperInterpretations(ABC):
     def combined(self, choices: Iterable[Choice]) -> Iterator[Interpretation]:
         """All combinations of the E and U alternatives of these choices, all others at their default."""
         varied = list(choices)
-        allowed = [[one.name for one in choice.alternatives if one.kind != AGAINST] for choice in varied]
+        allowed = [
+            [alternative.name for alternative in choice.alternatives if alternative.kind != AGAINST]
+            for choice in varied
+        ]
         for names in itertools.product(*allowed):
             yield self.interpretation(**dict(zip((choice.key for choice in varied), names, strict=True)))
 
     def against_print(self) -> Iterator[Interpretation]:
         """Each alternative against the print, all else at its default."""
         for choice in self.choices:
-            for one in choice.alternatives:
-                if one.kind == AGAINST:
-                    yield self.interpretation(**{choice.key: one.name})
+            for alternative in choice.alternatives:
+                if alternative.kind == AGAINST:
+                    yield self.interpretation(**{choice.key: alternative.name})
 
     def interpretation(self, **taken: str) -> Interpretation:
         """The interpretation of these alternatives, the others at their default."""
@@ -121,9 +125,9 @@ class PaperInterpretations(ABC):
         """The declared interpretations that differ for a claim: choices that do not affect it stay at their default."""
         bears = [choice.bears_on(claim) for choice in self.choices]
         firsts: dict[tuple[tuple[str, str], ...], Interpretation] = {}
-        for one in self._declared:
-            firsts.setdefault(tuple(itertools.compress(one.taken, bears)), one)
-        return [self.restricted_to(one, claim) for one in firsts.values()]
+        for interpretation in self._declared:
+            firsts.setdefault(tuple(itertools.compress(interpretation.taken, bears)), interpretation)
+        return [self.restricted_to(interpretation, claim) for interpretation in firsts.values()]
 
     @cached_property
     def _declared(self) -> Sequence[Interpretation]:
@@ -132,22 +136,25 @@ class PaperInterpretations(ABC):
     def restricted_to(self, interpretation: Interpretation, claim: str) -> Interpretation:
         """An interpretation with the choices that do not affect a claim at their default."""
         pairs = zip(interpretation.taken, self.choices, strict=True)
-        return Interpretation(tuple((key, name if one.bears_on(claim) else one.default) for (key, name), one in pairs))
+        return Interpretation(
+            tuple((key, name if choice.bears_on(claim) else choice.default) for (key, name), choice in pairs)
+        )
 
     def kind(self, interpretation: Interpretation) -> str:
         """E, U or N: the last of the kinds of its alternatives that are not the default; E for the default itself."""
-        kinds = [choice[interpretation[choice.key]].kind for choice in self._other(interpretation)]
+        kinds = [choice[interpretation[choice.key]].kind for choice in self._changed_choices(interpretation)]
         return max(kinds, key=KINDS.index, default=EQUIVALENT)
 
     def name(self, interpretation: Interpretation) -> str:
         """How an interpretation differs from the shipped configs."""
-        words = [f"{choice.key}: {interpretation[choice.key]}" for choice in self._other(interpretation)]
+        words = [f"{choice.key}: {interpretation[choice.key]}" for choice in self._changed_choices(interpretation)]
         return "; ".join(words) or DEFAULT
 
     def describe(self, interpretation: Interpretation) -> str:
         """How an interpretation differs from the shipped configs, for people."""
         return describe_choices(
-            {choice.key: interpretation[choice.key] for choice in self._other(interpretation)}, self.choice_words
+            {choice.key: interpretation[choice.key] for choice in self._changed_choices(interpretation)},
+            self.choice_words,
         )
 
     @cached_property
@@ -157,13 +164,13 @@ class PaperInterpretations(ABC):
 
     def list_choices(self, keys: Iterable[str]) -> str:
         """Choices within a sentence."""
-        return listed([tr(self.choice_words[key]) for key in keys])
+        return join_names([tr(self.choice_words[key]) for key in keys])
 
     def settings(self, interpretation: Interpretation) -> dict[str, Any]:
         """The settings of an interpretation's alternatives."""
-        return {key: value for one in self.choices for key, value in one[interpretation[one.key]].sets.items()}
+        return {key: value for choice in self.choices for key, value in choice[interpretation[choice.key]].sets.items()}
 
-    def _other(self, interpretation: Interpretation) -> list[Choice]:
+    def _changed_choices(self, interpretation: Interpretation) -> list[Choice]:
         return [choice for choice in self.choices if interpretation[choice.key] != choice.default]
 
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
@@ -172,26 +179,31 @@ class PaperInterpretations(ABC):
 
     def changed_case(self, claim: Claim, case: "Case", interpretation: Interpretation) -> "Case | None":
         """A case of a claim's config changed for an interpretation; None where the claim does not need it. Raises
-        Unreadable where it is impossible to fly or design."""
+        ImpossibleInterpretation where it is impossible to fly or design."""
         return None
 
     def evidence(
-        self, claim: Claim, interpretation: Interpretation, seen: "ChangedResults | None", of: PaperClaims
+        self,
+        claim: Claim,
+        interpretation: Interpretation,
+        changed_results: "ChangedResults | None",
+        paper_claims: PaperClaims,
     ) -> "Evidence":
-        """The evidence for a claim under an interpretation; seen: the results of its cases, None where all is exact.
+        """The evidence for a claim under an interpretation; changed_results: the results of its cases, None where
+        all is exact.
 
-        of: the paper's claims. Default: their evidence, over `seen`."""
-        assert seen is not None  # a paper with exact values gives its own evidence
-        return of.evidence(seen.results, seen.tables, seen.places)
+        paper_claims: the claims of the paper. Default: their evidence, over the changed results."""
+        assert changed_results is not None  # a paper with exact values gives its own evidence
+        return paper_claims.evidence(changed_results.results, changed_results.tables, changed_results.places)
 
     def is_exact(self, claim: Claim, interpretation: Interpretation) -> bool:
         """Whether the evidence for a claim is exact under an interpretation, so that nothing is run. Default: no."""
         return False
 
 
-def describe_choices(taken: Mapping[str, str], asks: Mapping[str, str]) -> str:
-    """What is taken of choices in place of the default, for people."""
-    words = [f"{tr(asks.get(key, key))}: {alternative_words(name)}" for key, name in taken.items()]
+def describe_choices(alternatives: Mapping[str, str], asks: Mapping[str, str]) -> str:
+    """The alternatives in place of the default, by the key of the choice, for people."""
+    words = [f"{tr(asks.get(key, key))}: {alternative_words(name)}" for key, name in alternatives.items()]
     return "; ".join(words) or tr(DEFAULT)
 
 

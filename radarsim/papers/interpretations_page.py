@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from radarsim.language import Term, current, term, tr
+from radarsim.language.current import current_language
+from radarsim.language.translate import Term, term, tr
 from radarsim.papers.interpretations import Choice, PaperInterpretations
 from radarsim.papers.reasons import translate_reason
 from radarsim.papers.verdict_classes import class_words
@@ -43,10 +44,10 @@ def open_choices(interpretations: PaperInterpretations) -> list[str]:
 def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A Markdown table; terms among the columns are translated."""
     lines = [
-        "| " + " | ".join(tr(one) if isinstance(one, Term) else one for one in columns) + " |",
+        "| " + " | ".join(tr(cell) if isinstance(cell, Term) else cell for cell in columns) + " |",
         "|" + "---|" * len(columns),
     ]
-    return "\n".join(lines + ["| " + " | ".join(_cell(one) for one in row) + " |" for row in rows])
+    return "\n".join(lines + ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows])
 
 
 def _cell(text: str) -> str:
@@ -95,7 +96,7 @@ def _choice_section(choice: Choice) -> str:
     rows = [(alternative.name, alternative.kind, tr(alternative.reason)) for alternative in choice.alternatives]
     quoted = (
         choice.original
-        if current() == QUOTATION_LANGUAGE or choice.original == choice.english
+        if current_language() == QUOTATION_LANGUAGE or choice.original == choice.english
         else f"{choice.original}\n>\n> {choice.english}"
     )
     return "\n\n".join(

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from radarsim.app import configs
-from radarsim.app.ahead import Ahead, Progress
-from radarsim.app.run import RunOptions
-from radarsim.engine.run import Either, Signals, Stop, TimeLimit
+from radarsim.api import arguments
+from radarsim.api.progress import Progress, TimedProgress
+from radarsim.api.simulate_cases import RunOptions
+from radarsim.engine.stopping import AnyStop, Signals, Stop, TimeLimit
 from radarsim.errors import ConfigError, argument
 from radarsim.papers.claim_outcome import round_up
 from radarsim.papers.interpretation_files import outdated_configs, write_files
@@ -56,7 +56,7 @@ def judge_requests(
         for runs in all_runs:
             runs.estimate(forecast, options.threads)
 
-    forecast = Ahead(progress, estimate)
+    forecast = TimedProgress(progress, estimate)
     for runs, request in zip(all_runs, requests, strict=True):
         runs.forecast_runs(forecast, realisations or request.paper.interpretations.max_realisations if decide else 0)
     if write and figures:
@@ -107,14 +107,14 @@ def interpretations(
     >>> interpretations("P1.4")
     P1.4 depends on: holds in 4 of 6 interpretations; depends on how the filter starts
     """
-    configs.check(threads=threads, time_limit=time_limit, out=out, figures=figures)
-    configs.texts(names)
+    arguments.check_arguments(threads=threads, time_limit=time_limit, out=out, figures=figures)
+    arguments.check_texts(names)
     requests = judging_requests(names)
     limit = time_limit if time_limit is None or callable(time_limit) else TimeLimit(time_limit)
-    options: dict[str, Any] = {"realisations": configs.whole(realisations), "decide": decide}
+    options: dict[str, Any] = {"realisations": arguments.whole_number(realisations), "decide": decide}
     options |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}
     with tempfile.TemporaryDirectory(prefix="radarsim-") as folder, limited(threads):
-        run_options = RunOptions(None, threads, Either(stop, limit))
+        run_options = RunOptions(None, threads, AnyStop(stop, limit))
         return judge_requests(requests, out=Path(folder if out is None else out), options=run_options, **options)
 
 

@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.app import configs
-from radarsim.app.run import load_all
-from radarsim.app.shown import Shown
+from radarsim.api import arguments, configs, repeat_command
+from radarsim.api.display import Displayable
+from radarsim.api.load_experiments import load_all
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
-from radarsim.language import tr
+from radarsim.language.translate import tr
 from radarsim.papers.claim import PaperClaims
 from radarsim.papers.claim_rows import classes_in_words, group_by_claim, verdict_sentence
 from radarsim.papers.claims_table import claim_rows, rows_without_results
@@ -21,20 +21,21 @@ from radarsim.papers.paper_keys import paper_key
 from radarsim.papers.stored_verdicts import known_classes, stored_claims
 from radarsim.papers.study_claims import claims_of, paper_claims
 from radarsim.papers.verdict_classes import add_classes, rows_in_words
-from radarsim.report import files
-from radarsim.report.tables import read_rows
+from radarsim.report import atomic_files
+from radarsim.report.csv_text import read_rows
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
+
 
 # P1.3 and P4, known or not; lower case and names joined by commas are understood.
 CLAIM_PATTERN = re.compile(r"P\d+(\.\w*)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
 
 
-class Claims(Shown):
+class Claims(Displayable):
     """Claims of papers and their verdicts; one row for each measured part of a claim."""
 
     def __init__(self, rows: Sequence[dict[str, Any]], interpretations: Iterable[PaperInterpretations] = ()):
@@ -51,13 +52,13 @@ class Claims(Shown):
         return read_rows(self.rows, self.rows[0] if self.rows else ())
 
     @property
-    def _described(self) -> "Mapping[str, Figure]":
+    def _figures_by_name(self) -> "Mapping[str, Figure]":
         from radarsim.papers.forest_plot import forest_plot
 
         figure = forest_plot(self.rows)
         return {} if figure is None else {"claims": figure}
 
-    def _said(self) -> list[str]:
+    def _answer_lines(self) -> list[str]:
         lines = [classes_in_words(self.rows)] if self.rows else []
         for parts in group_by_claim(self.in_words):
             verdict = verdict_sentence(parts).replace("*", "")
@@ -66,17 +67,17 @@ class Claims(Shown):
 
     def draw(self, path: str | os.PathLike[str]) -> None:
         """Write the figure to a file. Raises ConfigError if the name has no known format or no claim is judged."""
-        from radarsim.report.figures import save
+        from radarsim.report.drawing.canvas import save
 
-        kind, figures = Path(path).suffix[1:].lower(), self._described
-        if kind not in configs.FORMATS:
-            raise ConfigError(f"{path}: must end in {', '.join(f'.{name}' for name in configs.FORMATS)}")
+        kind, figures = Path(path).suffix[1:].lower(), self._figures_by_name
+        if kind not in arguments.FORMATS:
+            raise ConfigError(f"{path}: must end in {', '.join(f'.{name}' for name in arguments.FORMATS)}")
         if not figures:
             raise ConfigError(f"{path}: no claim is judged here, so there is nothing to draw")
-        files.replace_all(Path(path).parent, {Path(path).name: save(figures["claims"], (kind,))[kind]})
+        atomic_files.replace_all(Path(path).parent, {Path(path).name: save(figures["claims"], (kind,))[kind]})
 
 
-def claims(*names: str, out: str | os.PathLike[str] = configs.RESULTS) -> Claims:
+def claims(*names: str, out: str | os.PathLike[str] = repeat_command.RESULTS) -> Claims:
     """List the papers' claims with verdicts from the results stored in `out`; computes nothing.
 
     names are claims (P1.3), papers (P1) or configs; default: all claims of all papers. `table` has a row for each
@@ -88,18 +89,20 @@ def claims(*names: str, out: str | os.PathLike[str] = configs.RESULTS) -> Claims
     >>> listed.table["verdict"].tolist()
     ['not run']
     """
-    configs.check(out=out)
-    configs.texts(names)
+    arguments.check_arguments(out=out)
+    arguments.check_texts(names)
     claim_names = [name for name in names if _is_meant_as_claim(name)]
     _check_claim_names(claim_names)
     experiments = load_all([name for name in names if name not in claim_names])
-    keys = _paper_keys(claim_names) + [paper_key(registry.study(one.study)) for one in experiments]
+    keys = _paper_keys(claim_names) + [paper_key(registry.study(experiment.study)) for experiment in experiments]
     papers = paper_claims(keys)
     config_of = {claim.id: claim.config for paper in papers for claim in paper.claims}
     requested = [
         claim for claim in config_of if not names or claim in claim_names or claim.partition(".")[0] in claim_names
     ]
-    stems = dict.fromkeys([*(one.stem for one in experiments), *(config_of[claim] for claim in requested)])
+    stems = dict.fromkeys(
+        [*(experiment.stem for experiment in experiments), *(config_of[claim] for claim in requested)]
+    )
     stored = {stem: rows for stem in stems if (rows := stored_claims(Path(out) / stem / "claims.csv")) is not None}
     rows = [row for experiment in experiments for row in _experiment_rows(experiment, papers, stored)]
     listed = {(row["claim"], row["config"]) for row in rows}
@@ -129,29 +132,29 @@ def _is_meant_as_claim(name: str) -> bool:
     if Path(name).is_file():
         return False
     paper, _, number = name.partition(".")
-    is_known_paper = paper and number and paper in registry.parts(paper_key).values()
+    is_known_paper = paper and number and paper in registry.call_studies(paper_key).values()
     return bool(is_known_paper or CLAIM_PATTERN.fullmatch(name))
 
 
 def _check_claim_names(names: Sequence[str]) -> None:
     """Raise ConfigError, with the claims or papers that there are, for names that are none."""
-    known = [claim.id for paper in paper_claims(_paper_keys(names)) for claim in paper.claims] if names else []
-    if _unknown_claims(names, known):
-        every = [claim.id for paper in paper_claims() for claim in paper.claims]
-        raise ConfigError(*_unknown_claims(names, every))
+    existing = [claim.id for paper in paper_claims(_paper_keys(names)) for claim in paper.claims] if names else []
+    if _unknown_claims(names, existing):
+        all_claims = [claim.id for paper in paper_claims() for claim in paper.claims]
+        raise ConfigError(*_unknown_claims(names, all_claims))
 
 
-def _unknown_claims(names: Sequence[str], known: Collection[str]) -> list[str]:
+def _unknown_claims(names: Sequence[str], existing: Collection[str]) -> list[str]:
     """A line for each name that has the form of a claim or a paper, but is unknown."""
-    lines, papers = [], _paper_keys(known)
+    lines, papers = [], _paper_keys(existing)
     for name in names:
         paper = name.partition(".")[0]
-        if name in known or name in papers:
+        if name in existing or name in papers:
             continue
-        if (meant := name.rstrip(".").upper()) in (*known, *papers):
-            lines.append(f"claims: {name} is no claim and no paper; did you mean {meant}?")
+        if (suggestion := name.rstrip(".").upper()) in (*existing, *papers):
+            lines.append(f"claims: {name} is no claim and no paper; did you mean {suggestion}?")
         elif paper in papers:
-            allowed = [claim for claim in known if claim.startswith(f"{paper}.")]
+            allowed = [claim for claim in existing if claim.startswith(f"{paper}.")]
             lines.append(f"claims: {name} is no claim of {paper}; its claims: {', '.join(allowed)}")
         else:
             lines.append(f"claims: {name} is no claim and no paper; papers: {', '.join(papers)}")

@@ -6,10 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from radarsim.config.check import check
-from radarsim.config.document import Document, Faults, Origin
+from radarsim.config.document import Document
+from radarsim.config.error_list import ErrorList, Origin
 from radarsim.config.experiment import Case
-from radarsim.config.fields import Model, from_python
+from radarsim.config.model import Model
+from radarsim.config.scalars import from_python
+from radarsim.config.validate import validate
 from radarsim.errors import ConfigError
 from radarsim.papers import one_file_measures
 from radarsim.papers.claim import Claim, PaperClaims
@@ -123,11 +125,11 @@ def _faults_of_measure(measure: MeasureCall, cases: Sequence[Any], components: S
 
 def _missing_number(measure: MeasureCall, spec: Any) -> Iterator[str]:
     """Why a case has no number for a measure of the functions here: no gain of its baseline, no scan after its last."""
-    name, at = measure.arguments.get("filter"), measure.arguments.get("at")
+    name, scan = measure.arguments.get("filter"), measure.arguments.get("at")
     if measure.function in (gain, gain_change) and name == (spec.baseline or spec.filters[0].name):
         yield f"filter {name!r} is the baseline: it has no gain"
-    if at is not None and not 1 <= at <= spec.scans:
-        yield f"no scan {at}; there are 1 to {spec.scans}"
+    if scan is not None and not 1 <= scan <= spec.scans:
+        yield f"no scan {scan}; there are 1 to {spec.scans}"
 
 
 def _setting_fault(spec: Model, values: Mapping[str, Any]) -> str:
@@ -141,7 +143,7 @@ def _setting_fault(spec: Model, values: Mapping[str, Any]) -> str:
 
 def _with_settings(spec: Any, values: Mapping[str, Any]) -> Any:
     """A config's keys with some values changed; raises ImpossibleInterpretation where they are incompatible."""
-    origin, faults = Origin("interpretation"), Faults()
+    origin, faults = Origin("interpretation"), ErrorList()
     data: Any = from_python(spec.model_dump(exclude_none=True), (), origin, faults)
     for path, value in values.items():
         *above, last = path.split(".")
@@ -155,7 +157,7 @@ def _with_settings(spec: Any, values: Mapping[str, Any]) -> Any:
                 place[last] = value
         except (LookupError, TypeError, ValueError, AttributeError):
             raise ImpossibleInterpretation(f"{path}: there is no such key") from None
-    changed = check(type(spec), Document(data, "interpretation", None, {(): origin}), faults)
+    changed = validate(type(spec), Document(data, "interpretation", None, {(): origin}), faults)
     try:
         faults.raise_if_any()
     except ConfigError as error:

@@ -1,7 +1,7 @@
 """Measures of claims of a study in one file, whose evidence finds a case by its keys.
 
 A claim says `of: [{radar.scan_period_s: 2}]`: the case with these keys, or properties, by their dotted names; `of:
-[{}]` is the first one. The functions here whose first argument is `seen` may be its `measure`; `at` is a scan, by
+[{}]` is the first one. The functions here whose first argument is `evidence` may be its `measure`; `at` is a scan, by
 default the last one."""
 
 import math
@@ -13,16 +13,16 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.papers import evidence
 from radarsim.papers.evidence import Curve, MissingEvidence
+from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.report.statistics import Estimate, difference, mean
-from radarsim.report.tables import realisations
+from radarsim.report.tables import realisation_counts
 
-NOWHERE = object()
-CLOSE = 1e-9  # relative difference of one number written in two ways
+NO_SUCH_KEY = object()
+RELATIVE_TOLERANCE = 1e-9  # relative difference of one number written in two ways
 
 
-class Evidence(evidence.Evidence):
+class Evidence(GeneralEvidence):
     """Results of the paper's experiment; a case is identified by a mapping of its keys, or by its name."""
 
     def case(self, key: Any) -> CaseResult:
@@ -41,12 +41,12 @@ def _value(spec: Any, path: str) -> Any:
     try:
         return attrgetter(path)(spec)
     except AttributeError:
-        return NOWHERE
+        return NO_SUCH_KEY
 
 
 def unknown_key(key: Mapping[str, Any], specs: Sequence[Any]) -> str:
     """The first dotted name that no case has."""
-    return next((path for path in key if all(_value(spec, path) is NOWHERE for spec in specs)), "")
+    return next((path for path in key if all(_value(spec, path) is NO_SUCH_KEY for spec in specs)), "")
 
 
 def has_values(spec: Any, key: Mapping[str, Any]) -> bool:
@@ -54,63 +54,65 @@ def has_values(spec: Any, key: Mapping[str, Any]) -> bool:
     return all(_equal(_value(spec, path), value) for path, value in key.items())
 
 
-def _equal(one: Any, other: Any) -> bool:
-    if isinstance(one, float | int) and isinstance(other, float | int):
-        return math.isclose(one, other, rel_tol=CLOSE)
-    return bool(one == other)
+def _equal(value: Any, wanted_value: Any) -> bool:
+    if isinstance(value, float | int) and isinstance(wanted_value, float | int):
+        return math.isclose(value, wanted_value, rel_tol=RELATIVE_TOLERANCE)
+    return bool(value == wanted_value)
 
 
-def sigma(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+def sigma(evidence: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
     """σ of a filter."""
-    return _at(seen.curve(case, filter, component), at)
+    return _point(evidence.curve(case, filter, component), at)
 
 
-def gain(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+def gain(evidence: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
     """The gain of a filter against the case's baseline, %."""
-    return _at(seen.gain(case, filter, component), at)
+    return _point(evidence.gain(case, filter, component), at)
 
 
 def gain_change(
-    seen: Evidence, first: Any, second: Any, filter: str, component: str, at: int | None = None
+    evidence: Evidence, first: Any, second: Any, filter: str, component: str, at: int | None = None
 ) -> Estimate:
     """By how many points the gain in the second case exceeds that in the first."""
-    return difference(*(gain(seen, case, filter, component, at) for case in (second, first)))
+    return difference(*(gain(evidence, case, filter, component, at) for case in (second, first)))
 
 
-def ratio(seen: Evidence, case: Any, filter: str, over: str, component: str, at: int | None = None) -> Estimate:
+def ratio(evidence: Evidence, case: Any, filter: str, over: str, component: str, at: int | None = None) -> Estimate:
     """σ of a filter over that of another one: paired where one of the two is a baseline."""
-    return _at(seen.ratio(case, filter, over, component), at)
+    return _point(evidence.ratio(case, filter, over, component), at)
 
 
-def bias(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+def bias(evidence: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
     """The mean error of a filter about the truth."""
-    found = seen.case(case)
-    place = _place(found, filter, component, at)
-    total, square = np.asarray(found.sums["error"])[place][:2]
-    return mean(total, square, realisations(found)[place])
+    result = evidence.case(case)
+    index = _error_index(result, filter, component, at)
+    total, square = np.asarray(result.sums["error"])[index][:2]
+    return mean(total, square, realisation_counts(result)[index])
 
 
-def over_believed(seen: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
+def over_believed(evidence: Evidence, case: Any, filter: str, component: str, at: int | None = None) -> Estimate:
     """σ of a filter over the σ that it predicts; of a filter with a covariance."""
-    found = seen.case(case)
-    k = int(found.axes.k[_place(found, filter, component, at)[1]])
-    row = seen.row("curves", case=found.name, filter=filter, component=component, k=k)
+    result = evidence.case(case)
+    k = int(result.axes.k[_error_index(result, filter, component, at)[1]])
+    row = evidence.row("curves", case=result.name, filter=filter, component=component, k=k)
     if np.isnan(row["believed_sigma"]):
         raise ConfigError(f"filter {filter!r} predicts no σ: it gives no covariance")
     return Estimate(*(row[end] / row["believed_sigma"] for end in ("sigma", "sigma_lo", "sigma_hi")))
 
 
-def _place(found: CaseResult, filter: str, component: str, at: int | None) -> tuple[int, int, int]:
-    """The index of an error in the sums."""
-    axes = found.axes
-    k = list(axes.k).index(at) if at is not None else -1
+def _error_index(result: CaseResult, filter: str, component: str, scan: int | None) -> tuple[int, int, int]:
+    """The index of an error of a filter, at a scan, in a component, in the sums."""
+    axes = result.axes
+    k = list(axes.k).index(scan) if scan is not None else -1
     return axes.filters.index(filter), k, [name for name, _ in axes.components].index(component)
 
 
-def limit(seen: Evidence, case: Any, filter: str, component: str) -> float:
+def limit(evidence: Evidence, case: Any, filter: str, component: str) -> float:
     """The limit of a filter's σ, by the study's own limits."""
-    return float(seen.row("last", case=seen.case(case).name, filter=filter, component=component)["steady_sigma"])
+    return float(
+        evidence.row("last", case=evidence.case(case).name, filter=filter, component=component)["steady_sigma"]
+    )
 
 
-def _at(series: Curve, at: int | None) -> Estimate:
-    return series.last() if at is None else series.at(at)
+def _point(series: Curve, scan: int | None) -> Estimate:
+    return series.last() if scan is None else series.at(scan)

@@ -62,9 +62,9 @@ def judging_requests(names: Sequence[str] = ()) -> list[JudgingRequest]:
 def _claims_without_choices(paper: OpenPaper, names: Sequence[str]) -> list[str]:
     """Faults of requested claims that depend on nothing that the paper leaves open."""
     open_claims = [claim.id for claim in paper.claims.claims if paper.interpretations.leaves_open(claim)]
-    others = ", ".join(open_claims)
+    alternatives = ", ".join(open_claims)
     return [
-        f"interpretations: {claim.id} depends on nothing that its paper leaves open; claims that do: {others}"
+        f"interpretations: {claim.id} depends on nothing that its paper leaves open; claims that do: {alternatives}"
         for claim in paper.claims.claims
         if claim.id in names and claim.id not in open_claims
     ]

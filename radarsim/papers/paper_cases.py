@@ -2,7 +2,7 @@
 
 A claim names the shipped config that holds its experiment. A case is the paper's when its checked keys equal those of a
 case of that config. These may differ: the number of realisations, the seed and the options of a run, which are not keys
-of a study; display names (`config.fields.Display`); and members added to a list that the study declares in
+of a study; display names (`config.marks.DisplayMark`); and members added to a list that the study declares in
 `PaperClaims.may_grow`, or user filters (`python:`) beside the paper's own."""
 
 import math
@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from radarsim.config.experiment import Case, canonical
-from radarsim.config.fields import NameIn
+from radarsim.config.experiment import Case
+from radarsim.config.identity import identity_keys
+from radarsim.config.marks import NameIn
 from radarsim.engine.results import CaseResult
 
 RELATIVE_TOLERANCE = 1e-12  # relative: one number in radians and in degrees
@@ -34,14 +35,14 @@ class CaseKeys:
 def case_keys(case: CaseResult | Case, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> CaseKeys:
     """The keys of a case for comparison: all but may_shorten."""
     spec = case.spec
-    keys = {key: value for key, value in canonical(spec).items() if key not in may_shorten}
+    keys = {key: value for key, value in identity_keys(spec).items() if key not in may_shorten}
     members = {key: keys.pop(key) for key in may_grow}
-    named = {}
+    named_members = {}
     for name, info in type(spec).model_fields.items():
         for mark in info.metadata:
             if isinstance(mark, NameIn) and mark.field in members:
-                named[name] = members[mark.field][keys.pop(name)]
-    return CaseKeys(keys, members, named, _user_filters(case))
+                named_members[name] = members[mark.field][keys.pop(name)]
+    return CaseKeys(keys, members, named_members, _user_filters(case))
 
 
 def _user_filters(case: CaseResult | Case) -> dict[str, str]:

@@ -7,9 +7,9 @@ from collections.abc import Collection, Mapping, Sequence
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
-from radarsim.app import configs
-from radarsim.cli.console import PIPED_WIDTH, field, say
-from radarsim.language import listed, plural, term, tr
+from radarsim.api import repeat_command
+from radarsim.cli.console import PIPED_WIDTH, print_field, print_line
+from radarsim.language.translate import join_names, plural, term, tr
 from radarsim.papers.claim_rows import (
     NOT_COUNTED,
     cell_number,
@@ -28,10 +28,10 @@ from radarsim.papers.reasons import translate_reason
 from radarsim.papers.result_claims import claims_by_class, claims_judged_only_as_shipped, unjudged_claims
 from radarsim.papers.verdict_classes import is_judged_only_as_shipped
 from radarsim.papers.verdict_rule import DEPENDS
-from radarsim.report.wording import known
+from radarsim.report.wording import format_if_known
 
 if TYPE_CHECKING:
-    from radarsim.app.result import Result
+    from radarsim.api.result import Result
     from radarsim.papers.interpretation_verdicts import InterpretationVerdicts
     from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts
 
@@ -53,7 +53,10 @@ def verdict_lines(result: "Result") -> list[tuple[str, str]]:
     lines = []
     for kind, names in by_class.items():
         lines.append(("claims", f"{class_count(kind, len(names))}: {claim_ranges(names)}"))
-        if differing := _shipped_classes_of(names, {own: of for own, of in as_shipped.items() if own != kind}):
+        if differing := _shipped_classes_of(
+            names,
+            {shipped_kind: claim_names for shipped_kind, claim_names in as_shipped.items() if shipped_kind != kind},
+        ):
             lines.append(("", tr("as shipped {claims}", claims=differing)))
     for reason, names in unjudged_claims(result).items():
         text = tr("not judged: {names}: {reason}", names=", ".join(names), reason=translate_reason(reason))
@@ -66,7 +69,7 @@ def verdict_lines(result: "Result") -> list[tuple[str, str]]:
         )
         lines.append(("", text))
     if by_class and result.written is not None:
-        command = configs.command(result.experiment, (), result.written.folder.parent, verb="claims")
+        command = repeat_command.command(result.experiment, (), result.written.folder.parent, verb="claims")
         lines.append(("", tr("`{command}` describes each of them", command=command)))
     return lines
 
@@ -80,7 +83,7 @@ def _shipped_classes_of(names: Sequence[str], as_shipped: Mapping[str, Sequence[
 def print_claims(
     rows: Sequence[dict[str, Any]],
     detailed: Collection[str] = (),
-    out: str = configs.RESULTS,
+    out: str = repeat_command.RESULTS,
     names: Sequence[str] = (),
 ) -> None:
     """Print a line for each claim: number, class, first words; for detailed ones all of it with measured values.
@@ -96,18 +99,20 @@ def print_claims(
             _print_claim(parts)
         else:
             statement = shorten(_opening_words(parts[0]), room, placeholder=" …", break_on_hyphens=False)
-            say(f"{parts[0]['claim']:<6} {_class_words(parts):<{width}}  {statement}")
+            print_line(f"{parts[0]['claim']:<6} {_class_words(parts):<{width}}  {statement}")
     for (stem, why), claim_names in _claims_of_other_experiments(rows).items():
         values = {"stem": stem, "names": claim_ranges(claim_names), "reason": translate_reason(why)}
-        say(tr("{stem}: not judged: {names}: {reason}", **values))
+        print_line(tr("{stem}: not judged: {names}: {reason}", **values))
     missing = _claims_not_run(judged_rows)
     for stem, claim_names in missing.items():
-        command = f"radarsim run {shlex.quote(stem)}{configs.into(out)}"
-        say(tr("`{command}` judges {names}", command=command, names=claim_ranges(claim_names)))
+        command = f"radarsim run {shlex.quote(stem)}{repeat_command.out_option(out)}"
+        print_line(tr("`{command}` judges {names}", command=command, names=claim_ranges(claim_names)))
     bracketed = any(is_extension(parts) and parts[0]["claim"] not in detailed for parts in claims)
-    say((classes_in_words(judged_rows) or tr("this experiment judges no claims")) + bracketed * tr(" (in brackets)"))
+    print_line(
+        (classes_in_words(judged_rows) or tr("this experiment judges no claims")) + bracketed * tr(" (in brackets)")
+    )
     if len(missing) > MAX_NAMED_CONFIGS and all(row["class"] == NOT_RUN for row in judged_rows):
-        say(tr(NOTHING_IS_RUN))
+        print_line(tr(NOTHING_IS_RUN))
     elif any(row["class"] != NOT_RUN and row["claim"] not in detailed for row in judged_rows):
         _print_command_for_details(judged_rows[0]["claim"], names, out)
 
@@ -137,11 +142,11 @@ def _claims_not_run(rows: Sequence[Row]) -> dict[str, list[str]]:
 
 def _print_command_for_details(claim: str, names: Sequence[str], out: str) -> None:
     if names:
-        command = f"radarsim claims {shlex.join(names)} --parts{configs.into(out)}"
-        say(tr("`{command}` shows what was measured", command=command))
+        command = f"radarsim claims {shlex.join(names)} --parts{repeat_command.out_option(out)}"
+        print_line(tr("`{command}` shows what was measured", command=command))
     else:
-        command = f"radarsim claims {claim}{configs.into(out)}"
-        say(tr("`{command}` shows what was measured; --parts shows it for all of them", command=command))
+        command = f"radarsim claims {claim}{repeat_command.out_option(out)}"
+        print_line(tr("`{command}` shows what was measured; --parts shows it for all of them", command=command))
 
 
 def _opening_words(row: Row) -> str:
@@ -160,11 +165,11 @@ def _print_claim(parts: Sequence[Row]) -> None:
     """Print a claim with its place, config, original sentence and a line for each part."""
     first = parts[0]
     verdict, place = verdict_sentence(parts).replace("*", ""), f"{tr(first['paper'])}, {tr(first['place'])}"
-    say(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
+    print_line(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
     if first["original"]:
-        say(f"       «{first['original']}»")
+        print_line(f"       «{first['original']}»")
     for row in parts if first["class"] != NOT_RUN else ():
-        say(f"       {tr(row['verdict']):<20} {'; '.join(_part_words(row, parts))}")
+        print_line(f"       {tr(row['verdict']):<20} {'; '.join(_part_words(row, parts))}")
 
 
 def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
@@ -173,7 +178,9 @@ def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
     if cell_number(row["measured"]) is not None:
         words.append(measured_words(row) + tr("; expected {words}", words=expected_words(row["expected"])))
     if (exact := cell_number(row["exact"])) is not None:
-        words.append(tr("exactly {value}", value=four_digits(exact) if exact == round(exact) else known(exact)))
+        words.append(
+            tr("exactly {value}", value=four_digits(exact) if exact == round(exact) else format_if_known(exact))
+        )
     if miss := cell_number(row["miss"]):
         words.append(tr("off by {miss:.3g} margins", miss=miss))
     if row["verdict"] == NOT_JUDGED:
@@ -189,20 +196,20 @@ def print_interpretations(verdicts: "InterpretationVerdicts", detailed: bool) ->
         if detailed:
             _print_each_interpretation(claim)
         kind = tr(claim.outcome.kind) if claim.outcome else tr("not judged")  # the sentence says on what it depends
-        say(f"{claim.claim.id:<6} {kind:<28} {claim.sentence()}")
+        print_line(f"{claim.claim.id:<6} {kind:<28} {claim.sentence()}")
     if verdicts.files:
         curves = sum(name.endswith(".svg") for name in verdicts.files)
         file = str(verdicts.folder / "interpretations.csv")
         curve_count = plural("{count} curve", "{count} curves", curves)
-        field("table", tr("{file}, {curves} beside it", file=file, curves=curve_count) if curves else file)
+        print_field("table", tr("{file}, {curves} beside it", file=file, curves=curve_count) if curves else file)
     if verdicts.outdated:
-        command = f"radarsim report {shlex.join(verdicts.outdated)}{configs.into(verdicts.folder.parent)}"
+        command = f"radarsim report {shlex.join(verdicts.outdated)}{repeat_command.out_option(verdicts.folder.parent)}"
         text = tr(
             "claims.csv and report.html of {configs} hold older verdicts: `{command}` updates them",
-            configs=listed(verdicts.outdated),
+            configs=join_names(verdicts.outdated),
             command=command,
         )
-        field("note", text)
+        print_field("note", text)
 
 
 def _print_each_interpretation(claim: "ClaimVerdicts") -> None:
@@ -210,4 +217,6 @@ def _print_each_interpretation(claim: "ClaimVerdicts") -> None:
     width = max(map(len, kinds))
     for verdict, kind in zip(claim.verdicts, kinds, strict=True):
         why = f" ({translate_reason(verdict.why)})" if verdict.why else ""
-        say(f"       {verdict.kind}  {kind:<{width}}  {claim.interpretations.describe(verdict.interpretation)}{why}")
+        print_line(
+            f"       {verdict.kind}  {kind:<{width}}  {claim.interpretations.describe(verdict.interpretation)}{why}"
+        )

@@ -1,10 +1,12 @@
-"""Reasons why a claim is not judged, in the current language: claims.csv and interpretations.csv have them in
-English."""
+"""Reasons why a claim is not judged, in the current language.
+
+claims.csv and interpretations.csv have them in English."""
 
 import re
 from collections.abc import Iterator
 
-from radarsim.language import numeral, term, tr
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import term, tr
 
 NUMBER_PATTERN = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")
 PLACEHOLDER_PATTERN = re.compile(r"\{(\w+)\}")
@@ -51,9 +53,9 @@ def _differences_by_case(changed: str) -> Iterator[str]:
     """Differences by case: `rls2: radar.sigma_range_m is 30, the paper's 25; and 2 more`."""
     for part in changed.split("; "):
         case, _, differences = part.rpartition(": ")
-        found = _message_pattern(AND_MORE).fullmatch(part)
-        if found:
-            yield tr(AND_MORE, **_placeholder_values(found))
+        match = _message_pattern(AND_MORE).fullmatch(part)
+        if match:
+            yield tr(AND_MORE, **_placeholder_values(match))
         else:
             yield (f"{case}: " if case else "") + ", ".join(map(_translate_difference, _split_differences(differences)))
 
@@ -65,18 +67,18 @@ def _split_differences(differences: str) -> list[str]:
 
 def _translate_difference(text: str) -> str:
     for message in DIFFERENCES:
-        found = _message_pattern(message).fullmatch(text.removesuffix(" …"))
-        if found:
-            return tr(message, **_placeholder_values(found)) + (" …" if text.endswith(" …") else "")
+        match = _message_pattern(message).fullmatch(text.removesuffix(" …"))
+        if match:
+            return tr(message, **_placeholder_values(match)) + (" …" if text.endswith(" …") else "")
     return tr(text)
 
 
-def _placeholder_values(found: re.Match[str]) -> dict[str, str]:
+def _placeholder_values(match: re.Match[str]) -> dict[str, str]:
     """The values in the placeholders, numbers as the language writes them."""
-    return {name: numeral(text) if NUMBER_PATTERN.fullmatch(text) else text for name, text in found.groupdict().items()}
+    return {name: numeral(text) if NUMBER_PATTERN.fullmatch(text) else text for name, text in match.groupdict().items()}
 
 
 def _message_pattern(message: str) -> re.Pattern[str]:
     """The pattern of a message with its placeholders filled."""
     parts = PLACEHOLDER_PATTERN.split(message)
-    return re.compile("".join(f"(?P<{one}>.+?)" if i % 2 else re.escape(one) for i, one in enumerate(parts)))
+    return re.compile("".join(f"(?P<{text}>.+?)" if i % 2 else re.escape(text) for i, text in enumerate(parts)))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.extensions import IndexEntry, ReportSection
-from radarsim.language import term, tr
+from radarsim.language.translate import term, tr
 from radarsim.papers.claim_rows import (
     classes_in_words,
     expected_words,
@@ -20,7 +20,7 @@ from radarsim.papers.claims_table import TABLES_READ
 from radarsim.papers.reasons import translate_reason
 from radarsim.papers.study_claims import interpretations_of
 from radarsim.papers.verdict_classes import rows_in_words
-from radarsim.report import files, html
+from radarsim.report import atomic_files, page_tables, render_page, typeset
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _fragment(template: str, **content: object) -> "Markup":
         "bounds": _interval,
         "css": _css_class,
     }
-    return html.fragment("radarsim.papers", template, filters, **content)
+    return render_page.fragment("radarsim.papers", template, filters, **content)
 
 
 def _claims(
@@ -73,7 +73,7 @@ def _claims(
     """Claims with their parts, from claims.csv's rows, with the figures and tables behind each."""
     tables_read = table.attrs.get(TABLES_READ, [()] * len(table))
     records: Any = table.to_dict("records")
-    rows = [row | {TABLES_READ: own} for row, own in zip(records, tables_read, strict=True)]
+    rows = [row | {TABLES_READ: part_tables} for row, part_tables in zip(records, tables_read, strict=True)]
     claims = []
     for parts in group_by_claim(rows_in_words(rows, [interpretations_of(study(study_name))])):
         read = list(dict.fromkeys(table for part in parts for table in part[TABLES_READ]))
@@ -104,7 +104,7 @@ def linked_figures(tables_read: TablesRead, sources: Mapping[str, Sequence[str]]
 def index_entry(path: Path) -> IndexEntry | None:
     """From a table of claims: how many are of which class in words and as styled marks, and the paper of the first."""
     try:
-        rows = list(csv.DictReader(io.StringIO(files.read(path).decode("utf-8"), newline="")))
+        rows = list(csv.DictReader(io.StringIO(atomic_files.read(path).decode("utf-8"), newline="")))
         looks = [_css_class(parts[0]["class"]) for parts in group_by_claim(rows)]
         marks = {look: looks.count(look) for look in (*MARKED_CLASSES, "unclear") if look in looks}
         paper = rows[0]["paper"].partition(",")[0] if rows else ""
@@ -116,14 +116,14 @@ def index_entry(path: Path) -> IndexEntry | None:
 def _measured_value(part: Mapping[str, Any]) -> str:
     """The measured value of a part of a claim; an infinite settling time as text."""
     if math.isinf(part["measured"]) and "settling" in part["what"]:
-        return tr(html.NOT_SETTLED)
-    return html.cell_text(part["measured"])
+        return tr(page_tables.NOT_SETTLED)
+    return typeset.cell_text(part["measured"])
 
 
 def _interval(part: Mapping[str, Any]) -> str:
     """The interval of a part of a claim; a dash without a sampling error."""
     lo, hi = shown_interval(part)
-    return "–" if lo == hi else f"{html.cell_text(lo)} … {html.cell_text(hi)}"
+    return "–" if lo == hi else f"{typeset.cell_text(lo)} … {typeset.cell_text(hi)}"
 
 
 def _css_class(verdict: str) -> str:

@@ -4,20 +4,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.app import configs
+from radarsim.api import configs
 from radarsim.engine.results import CaseResult
 from radarsim.papers.claim_rows import CLASS_ORDER, group_by_claim, is_extension
 from radarsim.papers.claims_table import NOT_JUDGED, claims_table, first_rows
 from radarsim.papers.stored_verdicts import known_classes
 from radarsim.papers.study_claims import claims_of, interpretations_of
 from radarsim.papers.verdict_classes import CLASS_COLUMNS, add_classes, is_judged_only_as_shipped
-from radarsim.report import outside
+from radarsim.report.user_filters import tables as user_filters_tables
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.app.result import Result
+    from radarsim.api.result import Result
     from radarsim.extensions import Tables
 
 
@@ -25,7 +25,7 @@ def claims_of_results(
     results: Sequence[CaseResult], measured: "Tables", user_filters: "Tables", stem: str
 ) -> "pd.DataFrame":
     """claims.csv of results, with the shipped classes; see `Extension.tables`."""
-    tables = outside.for_claims(measured, user_filters)
+    tables = user_filters_tables.tables_for_claims(measured, user_filters)
     verdicts = claims_table(claims_of(study(results[0].study)), results, tables, configs.shipped, stem)
     return with_stored_classes(verdicts, results[0].study)
 

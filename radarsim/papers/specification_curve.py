@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from radarsim.language import plural, term, tr
+from radarsim.language.translate import plural, term, tr
 from radarsim.papers.interpretations import DEFAULT, Choice, alternative_words
 from radarsim.papers.verdict_rule import AGAINST, EQUIVALENT, UNSTATED
 from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts, InterpretationVerdict, worst_distance
-from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
-from radarsim.report.wording import formulas
+from radarsim.report.drawing.model import GREY, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
+from radarsim.report.math_text import with_formulas
 
 MAX_DRAWN_MARGINS = 5.0  # margins: larger distances are drawn there
 MAX_LABEL_CHARACTERS = 44  # of an alternative beside the panel
@@ -90,19 +90,19 @@ def _choices_panel(choices: list[Choice], verdicts: list[InterpretationVerdict],
     ticks, marks, height = [], [], HEADING_LINES - 1.0
     for choice in choices:
         height -= HEADING_LINES
-        ticks.append((float(height), formulas(_shortened(f"{tr(choice.asks)}:"))))
+        ticks.append((float(height), with_formulas(_shortened(f"{tr(choice.asks)}:"))))
         for alternative in choice.alternatives:
             height -= 1
             ticks.append((float(height), _shortened(alternative_words(alternative.name))))
-            taken = np.array([verdict.interpretation[choice.key] == alternative.name for verdict in verdicts])
-            if taken.any():
+            has_alternative = np.array([verdict.interpretation[choice.key] == alternative.name for verdict in verdicts])
+            if has_alternative.any():
                 style = Style(
                     colour=KIND_STYLES[alternative.kind][1].colour,
                     dash=None,
                     marker=KIND_STYLES[alternative.kind][1].marker,
                     size_pt=2.6,
                 )
-                marks.append(Line(places[taken], np.full(taken.sum(), float(height)), "", style))
+                marks.append(Line(places[has_alternative], np.full(has_alternative.sum(), float(height)), "", style))
     return Panel(
         Axis(tr("interpretation, sorted"), limits=(-LEFT_SPACE * len(verdicts), len(verdicts) + 1)),
         Axis("", limits=(height - 1.0, 0.0), ticks=tuple(reversed(ticks))),

@@ -11,8 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from radarsim.app import stored
-from radarsim.app.stored import AGAIN
+from radarsim.api import stored_tables
+from radarsim.api.stored_tables import HOW_TO_REMAKE
 from radarsim.errors import StoreError
 from radarsim.papers.claim import PaperClaims
 from radarsim.papers.claims_table import COLUMNS, NUMBER_COLUMNS
@@ -37,15 +37,17 @@ def stored_claims(path: Path) -> list[dict[str, Any]] | None:
     """The rows of a stored claims.csv, numbers as such; None if there is none. Raises StoreError where it cannot be
     read, is no such table, or differs from the record in run.json."""
     for attempt in range(1, MAX_ATTEMPTS + 1):
-        text = stored.content(path)
+        text = stored_tables.read_content(path)
         if text is None:
             return None
         recorded = _recorded_digest(path)
         if recorded is None or hashlib.sha256(text).hexdigest() == recorded:
-            return stored.rows(path, text, COLUMNS, _with_numbers, f"table of claims; {AGAIN}", OLD_COLUMNS)
+            return stored_tables.read_rows(
+                path, text, COLUMNS, _with_numbers, f"table of claims; {HOW_TO_REMAKE}", OLD_COLUMNS
+            )
         if attempt < MAX_ATTEMPTS:
             time.sleep(PAUSE_S)
-    raise StoreError(f"{path}: altered since it was written; {AGAIN}")
+    raise StoreError(f"{path}: altered since it was written; {HOW_TO_REMAKE}")
 
 
 def _with_numbers(row: dict[str, Any]) -> dict[str, Any]:
@@ -55,11 +57,11 @@ def _with_numbers(row: dict[str, Any]) -> dict[str, Any]:
 def _recorded_digest(path: Path) -> str | None:
     """The SHA-256 of the file in run.json beside it; None where there is no run.json or it does not name the file."""
     record = path.with_name("run.json")
-    text = stored.content(record)
+    text = stored_tables.read_content(record)
     try:
         return None if text is None else json.loads(text)["outputs"].get(path.name)
     except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise StoreError(f"{record}: is no record of a run; {AGAIN}") from error
+        raise StoreError(f"{record}: is no record of a run; {HOW_TO_REMAKE}") from error
 
 
 def stored_interpretations(out: Path) -> list[dict[str, Any]]:
@@ -84,7 +86,7 @@ def known_classes(papers: Iterable[tuple[PaperInterpretations, PaperClaims]], ou
     not known.
 
     A class from other words, numbers or choices than the claim has now does not count."""
-    classes = {(one.claim, one.declared): one for one in (*shipped_classes(), *stored_classes(out))}
+    classes = {(verdict.claim, verdict.declared): verdict for verdict in (*shipped_classes(), *stored_classes(out))}
     return {
         claim.id: classes.get((claim.id, declaration_digest(interpretations, claim)))
         for interpretations, paper in papers
@@ -100,6 +102,6 @@ def _existing_file(out: Path, file: Path) -> Path:
 
 
 def _rows(path: Path, columns: set[str], convert: Callable[[dict[str, Any]], Row]) -> list[Row]:
-    text = stored.content(path)
+    text = stored_tables.read_content(path)
     kind = "table of interpretations; remove it, `radarsim interpretations` makes it again"
-    return [] if text is None else stored.rows(path, text, columns, convert, kind, OLD_COLUMNS)
+    return [] if text is None else stored_tables.read_rows(path, text, columns, convert, kind, OLD_COLUMNS)

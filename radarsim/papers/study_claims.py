@@ -68,7 +68,7 @@ def claim_faults(study: Study, shipped: ShippedCases) -> Sequence[str]:
 
 def by_study(take: Callable[[Study], Declared], keys: Collection[str] = ()) -> dict[str, Declared | None]:
     """What `take` gives for each study whose paper has one of these keys (P1), or a key that is not known."""
-    return registry.parts(lambda study: take(study) if not keys or paper_key(study) in ("", *keys) else None)
+    return registry.call_studies(lambda study: take(study) if not keys or paper_key(study) in ("", *keys) else None)
 
 
 def paper_claims(keys: Collection[str] = ()) -> list[PaperClaims]:

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from radarsim.config.experiment import digest
-from radarsim.language import term, tr
+from radarsim.config.identity import digest
+from radarsim.language.translate import term, tr
 from radarsim.papers.claim import Claim
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN
 from radarsim.papers.interpretations import PaperInterpretations
@@ -93,20 +93,20 @@ def verdict_class(verdicts: ClaimVerdicts) -> VerdictClass | None:
     )
 
 
-def add_classes(rows: Sequence[Mapping[str, Any]], known: KnownClasses) -> list[dict[str, Any]]:
+def add_classes(rows: Sequence[Mapping[str, Any]], classes: KnownClasses) -> list[dict[str, Any]]:
     """Rows of claims.csv with the class over all interpretations in place of that as shipped, which moves to
     `as_shipped`. Rows that were not judged stay as they are."""
-    return [dict(row) | _class_columns(row, known) for row in rows]
+    return [dict(row) | _class_columns(row, classes) for row in rows]
 
 
-def _class_columns(row: Mapping[str, Any], known: KnownClasses) -> dict[str, Any]:
+def _class_columns(row: Mapping[str, Any], classes: KnownClasses) -> dict[str, Any]:
     as_shipped = row["as_shipped"]
     if as_shipped in (NOT_RUN, NOT_JUDGED):
         return {}
-    overall = known.get(str(row["claim"]))
+    overall = classes.get(str(row["claim"]))
     if overall is None:
         columns: dict[str, Any] = {"class": as_shipped, "holds": math.nan, "of": math.nan, "depends_on": ""}
-        is_unknown = str(row["claim"]) in known and as_shipped not in FIXED_CLASSES
+        is_unknown = str(row["claim"]) in classes and as_shipped not in FIXED_CLASSES
         return columns | {"overall": ONLY_SHIPPED.format(own=as_shipped) if is_unknown else as_shipped}
     needed = {} if as_shipped == UNDECIDED else {"needed": overall.needed}
     columns_of_class = {
@@ -145,7 +145,7 @@ def verdict_words(row: Mapping[str, Any]) -> str:
 def class_words(kind: str, as_shipped: str, depends_on: str = "", fill: Callable[..., str] = str.format) -> str:
     """The verdict on a claim as a phrase: its class, and the one as shipped if it differs.
 
-    say: puts values into a message, as `language.tr` does; default: in English."""
+    say: puts values into a message, as `translate.tr` does; default: in English."""
     overall: str = fill(DEPENDS_ON, choices=depends_on) if kind == DEPENDS and depends_on else fill(kind)
     if as_shipped == kind:
         return overall

@@ -17,14 +17,14 @@ FIXED_CLASSES = (CONTRADICTORY, UNJUDGEABLE)
 PRINT, ABOUT, GRID, SAME = "print", "about", "grid", "same"
 LIMIT = "limit"  # "more than 50 %": just outside, within the margin, is no material difference
 MATERIAL = "material"  # "better": within the margin of equality, on either side, is no material difference
-INCLUSIVE = (PRINT, ABOUT, GRID, SAME)
+INCLUSIVE_MARGINS = (PRINT, ABOUT, GRID, SAME)
 EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of interpretations; the last contradicts the print
 Z95 = NormalDist().inv_cdf(0.975)
 ROUNDING = 1e-12  # of a margin
 # A verdict is the same however its number of realisations came about: by one run, by `--decide`, or by a person who
 # extends undecided runs. So each counts as one of all looks that may be taken, one for each doubling: at fewer than
 # 2000 realisations, at 2000·2^m, and at the most that a run may have, 10¹². report.precision.looks makes them.
-LOOKS = 31
+MAX_LOOKS = 31
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def widening_factor(parts: int) -> float:
     One factor at every look (Pocock, Biometrika 64, 1977, 191-199), by the union bound over looks and parts: whatever
     their correlation, at most 5 % of runs err. For one part the exact recursion over looks gives 4.0 %; a factor for
     exactly 5 % would save 4 % of the realisations."""
-    return NormalDist().inv_cdf(1 - 0.025 / LOOKS / max(parts, 1)) / Z95
+    return NormalDist().inv_cdf(1 - 0.025 / MAX_LOOKS / max(parts, 1)) / Z95
 
 
 def judged_interval(part: JudgedPart, parts: int = 1) -> tuple[float, float]:
@@ -126,7 +126,7 @@ def part_verdict(part: JudgedPart, parts: int = 1) -> str:
     if part.expected_lo <= lo and hi <= part.expected_hi:
         return CONFIRMED
     if low <= lo and hi <= high:
-        if part.kind in INCLUSIVE:
+        if part.kind in INCLUSIVE_MARGINS:
             return CONFIRMED
         if part.kind == LIMIT:
             return IMMATERIAL
@@ -167,7 +167,9 @@ def _verdict_borders(part: JudgedPart) -> list[float]:
     offsets = (-part.margin, part.margin) if part.kind == MATERIAL else (0.0,)
     outer = (part.expected_lo - part.margin, part.expected_hi + part.margin)
     inner = [end + offset for end in (part.expected_lo, part.expected_hi) for offset in offsets]
-    return sorted({border for border in (*outer, *(() if part.kind in INCLUSIVE else inner)) if math.isfinite(border)})
+    return sorted(
+        {border for border in (*outer, *(() if part.kind in INCLUSIVE_MARGINS else inner)) if math.isfinite(border)}
+    )
 
 
 def _realisations_clear_of(part: JudgedPart, parts: int, border: float) -> int | None:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from radarsim.errors import MeasureError
-from radarsim.language import term, tr
+from radarsim.language.translate import term, tr
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.claim_outcome import ClaimOutcome, claim_outcome, largest_needed, round_up
 from radarsim.papers.claims_table import exact_value as known
@@ -63,14 +63,14 @@ class InterpretationVerdict:
 
 
 def judge_claim(
-    of: PaperInterpretations, claim: Claim, interpretation: Interpretation, evidence: Evidence, n: int = 0
+    interpretations: PaperInterpretations, claim: Claim, interpretation: Interpretation, evidence: Evidence, n: int = 0
 ) -> InterpretationVerdict:
     """Judge a claim by the evidence of an interpretation with n realisations; 0 where nothing was run."""
-    name, kind = of.name(interpretation), of.kind(interpretation)
+    name, kind = interpretations.name(interpretation), interpretations.kind(interpretation)
     try:
         parts = tuple(
-            (part, _judge_part(part, evidence, of.is_exact(claim, interpretation), n, name == DEFAULT))
-            for part in of.parts(claim, interpretation)
+            (part, _judge_part(part, evidence, interpretations.is_exact(claim, interpretation), n, name == DEFAULT))
+            for part in interpretations.parts(claim, interpretation)
         )
     except MissingEvidence as missing:
         return InterpretationVerdict(claim, interpretation, name, kind, why=missing.why or NOTHING_TO_MEASURE)
@@ -82,15 +82,15 @@ def judge_claim(
     return InterpretationVerdict(claim, interpretation, name, kind, parts, outcome)
 
 
-def _judge_part(part: Part, seen: Evidence, exact: bool, n: int, shipped: bool) -> JudgedPart:
+def _judge_part(part: Part, evidence: Evidence, exact: bool, n: int, shipped: bool) -> JudgedPart:
     """A part with its numbers; the interpretation gives its variant and whether that is against the print.
 
     exact: whether all evidence is exact. Otherwise the exact value is known where the run knows it; a part's own
     formula is of the shipped interpretation."""
-    found, nothing = part.measure(seen), Estimate(*(math.nan,) * 3)
-    own = replace(part, variant="", against_print=False)
-    value = found.value if exact else known(part if shipped else replace(part, exact=None), seen, found)
-    return replace(judged_part(own, seen, nothing if exact else found, n), exact=float(value))
+    measured, nothing = part.measure(evidence), Estimate(*(math.nan,) * 3)
+    default_part = replace(part, variant="", against_print=False)
+    value = measured.value if exact else known(part if shipped else replace(part, exact=None), evidence, measured)
+    return replace(judged_part(default_part, evidence, nothing if exact else measured, n), exact=float(value))
 
 
 @dataclass(frozen=True)

@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     import pandas
 
 Table = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # of a study: the table of the quantity
-FIRST = 2000
-FLOOR = 64_000  # with errors of probability 10⁻⁴, all but two samples in 1000 have one
-FLOOR_OF_TAILS = 512_000  # of these 51 are expected: the interval then covers 92 %
-TAILED = 3  # realisations for each effective one, from which on errors are large: κ = 4; Gaussian ones have two
+FIRST_LOOK = 2000
+MIN_REALISATIONS = 64_000  # with errors of probability 10⁻⁴, all but two samples in 1000 have one
+MIN_REALISATIONS_WITH_TAILS = 512_000  # of these 51 are expected: the interval then covers 92 %
+TAIL_RATIO = 3  # realisations for each effective one, from which on errors are large: κ = 4; Gaussian ones have two
 EQUAL = 1e-9  # relative difference of widths that is rounding
-MOST = 10**12  # realisations, as in a config
+MAX_REALISATIONS = 10**12  # realisations, as in a config
 
 
 @dataclass(frozen=True)
-class Cell:
+class WidestInterval:
     """The 95 % half-width of a quantity, in its `half_width_unit` (infinite where unknown), and the quantity's place.
 
     component is empty and k zero where the quantity has none. below bounds a rate of events that never occurred.
@@ -64,94 +64,99 @@ class Cell:
         return ", ".join(filter(None, (name, self.component, f"k = {self.k}" if self.k else "")))
 
 
-def looks(most: int, first: int = FIRST) -> Iterator[int]:
-    """The numbers of realisations, from `first` on, at which a precision is checked: from 2000 on, ending with `most`.
+def look_counts(max_realisations: int, first: int = FIRST_LOOK) -> Iterator[int]:
+    """The numbers of realisations, from `first` on, at which a precision is checked: 2000, 4000, …, and
+    `max_realisations` last.
 
-    >>> list(looks(10_000))
+    >>> list(look_counts(10_000))
     [2000, 4000, 8000, 10000]
     """
-    n = FIRST
-    while n < most:
+    n = FIRST_LOOK
+    while n < max_realisations:
         if n >= first:
             yield n
         n *= 2
-    if most >= FIRST:
-        yield most
+    if max_realisations >= FIRST_LOOK:
+        yield max_realisations
 
 
-def least(result: CaseResult, curves: Table | None) -> int:
+def minimum_realisations(result: CaseResult, curves: Table | None) -> int:
     """Realisations below which a precision ends no run, unless its N is less; curves None: there are no tails to
     expect.
 
     Large errors have occurred where the effective realisations of any σ are under a third of all."""
     if curves is None:
-        return FIRST
+        return FIRST_LOOK
     rows = curves([result])
-    return FLOOR_OF_TAILS if (TAILED * rows["n_eff"] < rows["n"]).any() else FLOOR
+    return MIN_REALISATIONS_WITH_TAILS if (TAIL_RATIO * rows["n_eff"] < rows["n"]).any() else MIN_REALISATIONS
 
 
-def worst(result: CaseResult, table: Table, of: Quantity = SIGMA) -> Cell | None:
+def widest_cell(result: CaseResult, table: Table, quantity: Quantity = SIGMA) -> WidestInterval | None:
     """The quantity of a case with the widest interval; None where the case has none. Where the case samples rare events
     of one filter, only its rate of them counts: other events stay rare."""
     rows = table([result])
     aimed_at = getattr(getattr(result.spec, "rare", None), "aimed_at", None)
-    if of.last and aimed_at is not None:
+    if quantity.last and aimed_at is not None:
         rows = rows[rows["filter"] == aimed_at]
-    if of.last and len(rows):
-        rows = rows.groupby(["case", "filter", *filter(None, [of.per])], sort=False).tail(1)
+    if quantity.last and len(rows):
+        rows = rows.groupby(["case", "filter", *filter(None, [quantity.per])], sort=False).tail(1)
     if not len(rows):
         return None
-    (value, lo, hi), _ = of.read(rows)
+    (value, lo, hi), _ = quantity.read(rows)
     with np.errstate(divide="ignore", invalid="ignore"):
-        percent = np.where(hi == lo, 0.0, 0.5 * (hi - lo) if of.kind == "signed" else 50 * (hi - lo) / value)
+        percent = np.where(hi == lo, 0.0, 0.5 * (hi - lo) if quantity.kind == "signed" else 50 * (hi - lo) / value)
     percent = np.where(np.isnan(percent) | np.isnan(value), np.inf, percent)
     # Of equal ones the first: Gaussian errors without bias are all known equally well, up to rounding.
     first = int(np.flatnonzero(percent >= percent.max() * (1 - EQUAL))[0])
     row = rows.iloc[first]
-    component, k = str(row.get(of.per, "")), int(row.get("k", 0))
+    component, k = str(row.get(quantity.per, "")), int(row.get("k", 0))
     below = float(hi[first]) if value[first] == 0 and math.isinf(percent[first]) else None
     against = str(row.get("baseline", "")) if result.against else ""
     names = str(row["case"]), str(row["filter"]), component
-    return Cell(float(percent.max()), *names, k, result.count, of, below, against)
+    return WidestInterval(float(percent.max()), *names, k, result.count, quantity, below, against)
 
 
-def needed(
+def needed_realisations(
     result: CaseResult,
     percent: float,
     table: Table,
-    of: Quantity = SIGMA,
-    most: int = MOST,
+    quantity: Quantity = SIGMA,
+    max_realisations: int = MAX_REALISATIONS,
     curves: Table | None = None,
 ) -> int | None:
-    """The look at which a run of at most `most` likely ends, or the larger number that it would need; None if
-    unattainable.
+    """The number of realisations at which a run of at most `max_realisations` likely ends, or the larger number that it
+    would need; None if unattainable.
 
-    From the sums of a pilot, scaled to more realisations. curves as of `least`."""
-    cell = worst(result, table, of)
+    From the sums of a pilot, scaled to more realisations. curves: as in `minimum_realisations`."""
+    cell = widest_cell(result, table, quantity)
     if cell is None:
-        return FIRST
+        return FIRST_LOOK
     if not math.isfinite(cell.percent):
         return None
-    for n in sorted({*looks(MOST), most}):
+    for n in sorted({*look_counts(MAX_REALISATIONS), max_realisations}):
         # Half-widths go with 1/√n: looks far from enough are skipped.
         if cell.percent * math.sqrt(result.count / n) >= 2 * percent:
             continue
-        scaled = grown(result, n)
-        widest = worst(scaled, table, of)
-        if widest is not None and widest.percent < percent and n >= min(least(scaled, curves), most):
+        scaled = scale_sums(result, n)
+        widest = widest_cell(scaled, table, quantity)
+        if (
+            widest is not None
+            and widest.percent < percent
+            and n >= min(minimum_realisations(scaled, curves), max_realisations)
+        ):
             return n
     return None
 
 
-def grown(result: CaseResult, n: int) -> CaseResult:
+def scale_sums(result: CaseResult, n: int) -> CaseResult:
     """A case with its sums scaled to n realisations."""
     sums = {name: sums * (n / result.count) for name, sums in result.sums.items()}
-    outside = None if result.outside is None else grown(result.outside, n)
-    against = tuple(grown(baseline, n) for baseline in result.against)
+    outside = None if result.outside is None else scale_sums(result.outside, n)
+    against = tuple(scale_sums(baseline, n) for baseline in result.against)
     return replace(result, count=n, sums=sums, against=against, outside=outside)
 
 
-def gaussian(result: CaseResult) -> CaseResult:
+def with_gaussian_sums(result: CaseResult) -> CaseResult:
     """A case with the expected sums of Gaussian errors, of the exact bias and σ, in place of the sampled ones. For
     linear filters under Gaussian noise, where the exact values are σ and bias themselves."""
     bias, square = result.axes.exact_bias, result.axes.exact_sigma**2

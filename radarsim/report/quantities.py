@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from radarsim.errors import ConfigError
-from radarsim.language import term
+from radarsim.language.translate import term
 
 if TYPE_CHECKING:
     import numpy as np
@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from radarsim.report.statistics import Estimate
 
 Kind = Literal["size", "share", "signed"]
-OTHERS = "at", "at-k", "between", "case", "equals", "filter", "help", "json", "language", "no-code"
-TAKEN = frozenset(f"--{name}" for name in (*OTHERS, "realisations", "seed", "set", "threads"))  # options of `solve`
+COMMON_OPTIONS = "at", "at-k", "between", "case", "equals", "filter", "help", "json", "language", "no-code"
+RESERVED_OPTIONS = frozenset(
+    f"--{name}" for name in (*COMMON_OPTIONS, "realisations", "seed", "set", "threads")
+)  # options of `solve`
 
 
 class Component(NamedTuple):
@@ -77,7 +79,7 @@ class Quantity:
         """Raises ConfigError for a name that is impossible as an option."""
         if not re.fullmatch("[a-z][a-z0-9_]*", self.name):
             raise ConfigError(f"quantity {self.name!r}: its name must be of small letters, digits and _")
-        if self.option in TAKEN:
+        if self.option in RESERVED_OPTIONS:
             raise ConfigError(f"quantity {self.name!r}: {self.option} is another option of `radarsim solve`; rename it")
 
     @property
@@ -126,9 +128,9 @@ class Quantity:
         """The unit in text for people, for a component with a unit."""
         return "%" if self.kind == "share" else self.unit or of_component
 
-    def place(self, part: str, say: Callable[[str], str] = str) -> str:
+    def place(self, part: str, translate: Callable[[str], str] = str) -> str:
         """One of several values of a filter in sentences: `r`, `model 2`."""
-        return part if self.per == "component" or not part else f"{say(self.per)} {part}"
+        return part if self.per == "component" or not part else f"{translate(self.per)} {part}"
 
     def complement(self, name: str, words: str) -> "Quantity":
         """1 minus a share."""
@@ -168,16 +170,16 @@ GAIN = Quantity(
     paired=True,
 )
 COMMON = (SIGMA, GAIN)
-SMOOTHED = {  # scans waited, and what σ is called then
+SMOOTHED_TERMS = {  # scans waited, and what σ is called then
     1: term("least σ one scan later"),
     2: term("least σ two scans later"),
     5: term("least σ five scans later"),
     10: term("least σ ten scans later"),
 }
-FLOOR = Quantity("floor", term("floor under σ"), "floor", "floor", per="component")  # see `radarsim.studies.floor`
+FLOOR = Quantity("floor", term("floor under σ"), "floor", "floor", per="component")  # see `radarsim.studies.floors`
 FLOORS = (
     FLOOR,
-    *(Quantity(f"lag_{lag}", words, "floor", f"lag_{lag}", per="component") for lag, words in SMOOTHED.items()),
+    *(Quantity(f"lag_{lag}", words, "floor", f"lag_{lag}", per="component") for lag, words in SMOOTHED_TERMS.items()),
     Quantity("smoothed", term("least σ after the last scan"), "floor", "smoothed", per="component"),
 )
 LOCK = Quantity("lock", term("lock rate"), "locks", "lock_rate|lock", kind="share", more_is_better=True, last=True)

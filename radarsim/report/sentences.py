@@ -1,8 +1,9 @@
 """Sentences of an answer, each with the measured intervals that it rests on.
 
 A sentence rests on the intervals that it gives, and on those by which it calls something larger or good enough if a
-wider interval would change that. `report.notes` warns where one of them is too narrow. Of a plain text, which the
-`answer` of a user study may return, nothing is known: it is taken to rest on σ and gain of every filter at the end."""
+wider interval would change that. `report.answer_warnings` warns where one of them is too narrow. Of a plain text, which
+the `answer` of a user study may return, nothing is known: it is taken to rest on σ and gain of every filter at the
+end."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

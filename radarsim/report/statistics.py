@@ -8,14 +8,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-ALIKE = 1e-9  # of κ − 1: errors that differ by no more are the same but for rounding
+EQUAL_KURTOSIS = 1e-9  # of κ − 1: errors that differ by no more are the same but for rounding
 
 Values = Any  # a number or an array of numbers: NumPy computes with both alike, which its types cannot express
 Z95 = 1.959963984540054
 # Where less than this stands behind a 95 % interval, its coverage was measured to leave 93.6 … 96.4 %
 # (tests/trust/test_statistics.py).
-FEW = 200  # realisations of a run: of Gaussian errors paired gains cover 93.6 % at 30, means of products 93.2 at 100
-FEW_EVENTS = 20  # rare errors, or weighted events, behind an interval that they decide
+MIN_REALISATIONS = (
+    200  # realisations of a run: of Gaussian errors paired gains cover 93.6 % at 30, means of products 93.2 at 100
+)
+MIN_EVENTS = 20  # rare errors, or weighted events, behind an interval that they decide
 
 
 class Estimate(NamedTuple):
@@ -81,8 +83,10 @@ def _root(m2: Values, relative: Values, n: Values, looks: Values = 1) -> Estimat
         lo = root * np.maximum(1 - ninth + step, 0) ** -1.5
         base = 1 - ninth - step
         hi = np.where(base > 0, root * np.maximum(base, 1e-100) ** -1.5, np.inf)
-    known = n > 0
-    return Estimate(root, np.where(known, lo, np.nan), np.where(known & (m2 > 0), hi, np.where(known, root, np.nan)))
+    has_values = n > 0
+    return Estimate(
+        root, np.where(has_values, lo, np.nan), np.where(has_values & (m2 > 0), hi, np.where(has_values, root, np.nan))
+    )
 
 
 def effective(square: Values, fourth: Values, n: Values) -> Values:
@@ -92,18 +96,18 @@ def effective(square: Values, fourth: Values, n: Values) -> Values:
     m2, m4 = _per_one(square, n), _per_one(fourth, n)
     with np.errstate(divide="ignore", invalid="ignore"):
         excess = m4 / np.square(m2) - 1
-        return np.where(excess > ALIKE, n / np.abs(excess), np.where(np.isnan(excess), np.nan, np.inf))
+        return np.where(excess > EQUAL_KURTOSIS, n / np.abs(excess), np.where(np.isnan(excess), np.nan, np.inf))
 
 
-TOGETHER = 0.0027  # chance of a number beyond three standard errors
+CHANCE_BEYOND_THREE = 0.0027  # chance of a number beyond three standard errors
 
 
-def furthest(looks: Values) -> float:
+def largest_by_chance(looks: Values) -> float:
     """A bound on the largest of so many differences, in standard errors, that correct programs exceed in 0.27 % of
     runs.
 
     For one difference 3; for several by Bonferroni, however dependent they are."""
-    return NormalDist().inv_cdf(1 - TOGETHER / 2 / max(int(looks), 1))
+    return NormalDist().inv_cdf(1 - CHANCE_BEYOND_THREE / 2 / max(int(looks), 1))
 
 
 ERROR_OF_PROGRAM = 5.85  # standard errors between a measured and an exact value: by chance once in 2·10⁸

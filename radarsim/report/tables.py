@@ -1,10 +1,8 @@
-"""Tables with the contract's columns, from finished cases; and their bytes as CSV.
+"""Tables with the contract's columns, from finished cases.
 
-Rows stand in the order case, filter, component, k, and only where the filter has an estimate. pandas is imported
-when the first table is made."""
+Rows stand in the order case, filter, component, k, and only where the filter has an estimate. pandas is imported when
+the first table is made."""
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,16 +18,6 @@ if TYPE_CHECKING:
 
 Columns = Mapping[str, Any]  # of one length: arrays, or estimates of such
 Maker = TypeVar("Maker", bound=Callable[..., Any])
-LABEL_COLUMNS = (
-    "case",
-    "filter",
-    "component",
-    "unit",
-    "baseline",
-    "model",
-    "floor_kind",
-    "note",
-)  # columns of text, whatever they hold
 
 
 def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
@@ -39,17 +27,17 @@ def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
     return pd.DataFrame(dict(columns))
 
 
-def joined(parts: Iterable[Columns], columns: Sequence[str] = ()) -> "pd.DataFrame":
+def join_columns(parts: Iterable[Columns], columns: Sequence[str] = ()) -> "pd.DataFrame":
     """One DataFrame of cases' columns set one below the other, in the order of the first, or as named by `columns`. An
     `Estimate` makes three columns, see `spread`. Cases without rows do not count where others have some."""
-    spread_parts = [spread(part) for part in parts]
+    spread_parts = [spread_estimates(part) for part in parts]
     with_rows = [part for part in spread_parts if any(map(len, part.values()))] or spread_parts[:1]
     if not with_rows:
         return frame({name: [] for name in columns})
     return frame({name: np.concatenate([part[name] for part in with_rows]) for name in columns or with_rows[0]})
 
 
-def spread(columns: Columns) -> dict[str, Any]:
+def spread_estimates(columns: Columns) -> dict[str, Any]:
     """Columns in which an estimate `x` is `x`, `x_lo` and `x_hi`; of `x|y` the ends are `y_lo` and `y_hi`."""
     spread_columns: dict[str, Any] = {}
     for name, values in columns.items():
@@ -61,23 +49,23 @@ def spread(columns: Columns) -> dict[str, Any]:
     return spread_columns
 
 
-def stacked(parts: Sequence[Columns]) -> dict[str, Any]:
+def stack_columns(parts: Sequence[Columns]) -> dict[str, Any]:
     """Columns of several parts of one case, concatenated."""
-    spread_parts = [spread(part) for part in parts]
+    spread_parts = [spread_estimates(part) for part in parts]
     if not spread_parts:
         return {}
     return {name: np.concatenate([part[name] for part in spread_parts]) for name in spread_parts[0]}
 
 
-def of_rows(rows: Sequence[Columns]) -> dict[str, np.ndarray]:
+def columns_from_rows(rows: Sequence[Columns]) -> dict[str, np.ndarray]:
     """Columns of rows, each of single values by the column's name."""
-    spread_rows = [spread(row) for row in rows]
+    spread_rows = [spread_estimates(row) for row in rows]
     if not spread_rows:
         return {}
     return {name: np.array([row[name] for row in spread_rows]) for name in spread_rows[0]}
 
 
-class Tables:
+class TableMakers:
     """The tables of a study, declared by functions that make the columns of one case, or the whole table of all cases.
 
     Their docstrings are the reference page: what a row is, then a paragraph of columns, a line each, except those
@@ -89,17 +77,17 @@ class Tables:
     def __init__(self) -> None:
         self.declared: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bool] | None]] = {}
 
-    def __call__(self, name: str, of: Callable[[Any], bool] = lambda result: True) -> Callable[[Maker], Maker]:
-        """Declares the table of a name, made separately for each of the cases that `of` holds for."""
-        return self._declare(name, of)
+    def __call__(self, name: str, applies: Callable[[Any], bool] = lambda result: True) -> Callable[[Maker], Maker]:
+        """Declares the table of a name, made separately for each of the cases that `applies` is true for."""
+        return self._declare(name, applies)
 
     def whole(self, name: str) -> Callable[[Maker], Maker]:
         """Declares the table of a name, made of all cases at once; absent where the function returns None."""
         return self._declare(name, None)
 
-    def _declare(self, name: str, of: Callable[[Any], bool] | None) -> Callable[[Maker], Maker]:
+    def _declare(self, name: str, applies: Callable[[Any], bool] | None) -> Callable[[Maker], Maker]:
         def declare(make: Maker) -> Maker:
-            self.declared[name] = make, of
+            self.declared[name] = make, applies
             return make
 
         return declare
@@ -107,18 +95,20 @@ class Tables:
     def made(self, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
         """All of them, with the rows of all cases."""
         tables = {
-            name: make(results) if applies is None else joined(make(result) for result in results if applies(result))
+            name: make(results)
+            if applies is None
+            else join_columns(make(result) for result in results if applies(result))
             for name, (make, applies) in self.declared.items()
         }
         return {name: table for name, table in tables.items() if table is not None}
 
 
-def names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
+def pick_names(values: Sequence[str], index: np.ndarray) -> np.ndarray:
     """The names for an index array (n,)."""
     return np.array(list(values), dtype=object)[index]
 
 
-def shown(result: CaseResult, mask: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def row_index(result: CaseResult, mask: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which rows of a case are written: indices (filter, scan, component), each (n,), ordered filter, component, scan.
 
     mask (F, K, C) narrows what is available."""
@@ -127,7 +117,7 @@ def shown(result: CaseResult, mask: np.ndarray | None = None) -> tuple[np.ndarra
     return f, k, c
 
 
-def leading(
+def label_columns(
     result: CaseResult, f: np.ndarray, k: np.ndarray | None = None, **labels: np.ndarray
 ) -> dict[str, np.ndarray]:
     """The first columns of n rows: case, filter, further labels and, for scans k (n,), their number and time.
@@ -136,28 +126,28 @@ def leading(
     filter: the filter's name
     k: the scan, from 1
     t_s: time from the first plot"""
-    columns = {"case": np.full(f.size, result.name, dtype=object), "filter": names(result.axes.filters, f)}
+    columns = {"case": np.full(f.size, result.name, dtype=object), "filter": pick_names(result.axes.filters, f)}
     columns |= labels
     if k is not None:
         columns |= {"k": np.asarray(result.axes.k)[k], "t_s": np.asarray(result.axes.t_s, dtype=float)[k]}
     return columns
 
 
-def interval_columns(name: str, of: statistics.Estimate, ends: str | None = None) -> dict[str, Any]:
+def interval_columns(name: str, estimate: statistics.Estimate, ends: str | None = None) -> dict[str, Any]:
     """An estimate as columns `name`, `…_lo` and `…_hi`; ends: what stands before `_lo`, by default the name.
 
     lo, hi: ends of the 95 % interval of the measured column before them; `…_lo`, `…_hi` where a table has several"""
     prefix = f"{name}_" if ends is None else ends and f"{ends}_"
-    return {name: of.value, f"{prefix}lo": of.lo, f"{prefix}hi": of.hi}
+    return {name: estimate.value, f"{prefix}lo": estimate.lo, f"{prefix}hi": estimate.hi}
 
 
-def components(result: CaseResult, c: np.ndarray) -> dict[str, np.ndarray]:
+def component_columns(result: CaseResult, c: np.ndarray) -> dict[str, np.ndarray]:
     """The labels of components c (n,).
 
     component: what is estimated: `r`, `Vr`, `x`, `f0`, …
     unit: its unit"""
     labels, units = zip(*result.axes.components, strict=True)
-    return {"component": names(labels, c), "unit": names(units, c)}
+    return {"component": pick_names(labels, c), "unit": pick_names(units, c)}
 
 
 def exact_first(rows: "pd.DataFrame", value: str, exact: str) -> np.ndarray:
@@ -166,7 +156,7 @@ def exact_first(rows: "pd.DataFrame", value: str, exact: str) -> np.ndarray:
     return np.where(np.isnan(exact_values), rows[value].to_numpy(dtype=float), exact_values)
 
 
-def realisations(result: CaseResult) -> np.ndarray:
+def realisation_counts(result: CaseResult) -> np.ndarray:
     """How many realisations stand behind each sum (F, K, C): all, or `estimates` where not all have an estimate.
 
     n: number of realisations behind the row"""
@@ -185,18 +175,18 @@ def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     believed_sigma [unit]: root of the mean variance that the filter believes; with sigma above it a filter is
         optimistic, with sigma below it pessimistic. A sampled mean where a filter adapts, or learns which plots are
         missed"""
-    return joined(map(curve_columns, results))
+    return join_columns(map(curve_columns, results))
 
 
 def curve_columns(result: CaseResult, believed_sigma: np.ndarray | None = None) -> Columns:
     """The columns of `curves` for one case. believed_sigma (F, K, C): what its filters believe, NaN where unknown."""
-    axes, index = result.axes, shown(result)
+    axes, index = result.axes, row_index(result)
     f, k, c = index
-    n = realisations(result)[index]
+    n = realisation_counts(result)[index]
     moments = np.asarray(result.sums["error"])[index]
     errors = statistics.errors(moments, n)
     return {
-        **leading(result, f, k, **components(result, c)),
+        **label_columns(result, f, k, **component_columns(result, c)),
         "n": n.astype(np.int64),
         "sigma": errors.sigma,
         "bias": errors.bias,
@@ -217,7 +207,7 @@ def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
 
     baseline: the filter compared with
     gain_percent ± gain: by how much σ is less than the baseline's, of the same realisations"""
-    return joined(map(_gains, results), GAINS)
+    return join_columns(map(_gains, results), GAINS)
 
 
 def _gains(result: CaseResult) -> Columns:
@@ -225,103 +215,42 @@ def _gains(result: CaseResult) -> Columns:
     both = np.array(axes.available[b : b + 1] & axes.available)
     both[b] = False
     both &= "paired" in result.sums  # trackers keep tracks in realisations of their own
-    index = f, k, c = shown(result, both)
+    index = f, k, c = row_index(result, both)
     error = np.asarray(result.sums["error"])
     square, fourth = error[index][:, 1], error[index][:, 3]
     base_square, base_fourth = error[b, k, c][:, 1], error[b, k, c][:, 3]
     cross = np.asarray(result.sums["paired"])[index] if f.size else np.zeros(0)  # a lone filter pairs with none
-    gain = statistics.gain(square, fourth, base_square, base_fourth, cross, realisations(result)[index])
+    gain = statistics.gain(square, fourth, base_square, base_fourth, cross, realisation_counts(result)[index])
     return {
-        **leading(result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **components(result, c)),
+        **label_columns(
+            result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **component_columns(result, c)
+        ),
         "gain_percent|gain": gain,
         "exact_percent": axes.exact_gains[index],
     }
 
 
-def against_own(gains: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
+def gains_against_baselines(gains: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
     """The rows of gains against the baselines of these results, not against further ones of their cases."""
     own_pairs = {(result.name, result.baseline) for result in results}
     pairs = zip(gains["case"].tolist(), gains["baseline"].tolist(), strict=True)
     return gains[np.array([pair in own_pairs for pair in pairs], dtype=bool)]
 
 
-def below(parts: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
+def stack_tables(parts: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
     """Tables of the same columns concatenated; a note is empty where one has none."""
     if any("note" in part for part in parts):
         parts = [part if "note" in part else part.assign(note="") for part in parts]
-    return joined({str(name): part[name].to_numpy() for name in part} for part in parts)
+    return join_columns({str(name): part[name].to_numpy() for name in part} for part in parts)
 
 
-def to_csv(table: "pd.DataFrame") -> bytes:
-    """A table as UTF-8 CSV: shortest numbers that read back equal, '
-
-    ' ends, an empty cell for NaN.
-
-    Several times faster than DataFrame.to_csv with the same text, and independent of pandas' version."""
-    columns = [_cells(table[name]) for name in table.columns]
-    lines = [",".join(map(_quoted, table.columns)), *map(",".join, zip(*columns, strict=True))]
-    return ("\n".join(lines) + "\n").encode()
-
-
-def from_csv(content: bytes) -> "pd.DataFrame":
-    """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written. Raises ValueError where a
-    row has another length."""
-    names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
-    columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    return frame({name: _read(name, column) for name, column in zip(names, columns, strict=True)})
-
-
-def read_rows(rows: Sequence[Mapping[Any, Any]], names: Iterable[str]) -> "pd.DataFrame":
-    """Columns of rows of a CSV file: numbers as numbers, NaN where a cell is empty."""
-    columns = {name: [row[name] for row in rows] for name in names}
-    flags = {name for name, column in columns.items() if all(isinstance(cell, bool) for cell in column)}
-    read = {name: column if name in flags else _read(name, list(map(str, column))) for name, column in columns.items()}
-    return frame(read)
-
-
-def _read(name: str, column: Sequence[str]) -> Sequence[str] | np.ndarray:
-    """A column of text converted back: to numbers, except labels and words."""
-    if name in LABEL_COLUMNS:
-        return list(column)
-    try:
-        return np.array([float(text) if text else np.nan for text in column])
-    except ValueError:
-        return list(column)
-
-
-def _cells(column: "pd.Series") -> list[str]:
-    values = column.to_numpy()
-    if values.dtype.kind == "b":
-        return ["true" if value else "false" for value in values.tolist()]
-    if values.dtype.kind in "iu":
-        return list(map(str, values.tolist()))
-    if values.dtype.kind == "f":
-        texts = list(map(repr, values.tolist()))
-        for i in np.flatnonzero(np.isnan(values)).tolist():
-            texts[i] = ""
-        return texts
-    codes, distinct = column.factorize(use_na_sentinel=False)
-    of_code = [_text(value) for value in distinct]
-    return [of_code[code] for code in codes.tolist()]
-
-
-def _text(value: object) -> str:
-    return "" if value is None or value != value else _quoted(str(value))
-
-
-def _quoted(text: str) -> str:
-    if any(mark in text for mark in ',"\n\r'):
-        return '"' + text.replace('"', '""') + '"'
-    return text
-
-
-def where(table: "pd.DataFrame", **values: object) -> "pd.DataFrame":
+def select_rows(table: "pd.DataFrame", **values: object) -> "pd.DataFrame":
     """The rows of a table that hold these values, by column."""
     for column, value in values.items():
         table = table[table[column] == value]
     return table
 
 
-def groups(table: "pd.DataFrame", *columns: str) -> "dict[Any, pd.DataFrame]":
+def group_by(table: "pd.DataFrame", *columns: str) -> "dict[Any, pd.DataFrame]":
     """The rows of a table by the values of some columns, in the order of the table: {(case, filter, …): rows}."""
     return dict(iter(table.groupby(list(columns), sort=False)))

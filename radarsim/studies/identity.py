@@ -7,7 +7,8 @@ are not in it.
 Its second half is a hash of what computes: the sources of radarsim and of the study (`radarsim.studies.sources`), and
 those of the user's filters. Any edit begins anew, also of a comment; an undone edit finds its own blocks again."""
 
-from radarsim.config.experiment import Case, canonical, digest, world
+from radarsim.config.experiment import Case
+from radarsim.config.identity import digest, identity_keys, world_keys
 from radarsim.engine.blocks import REQUEST_DIGITS
 from radarsim.studies.registry import study
 from radarsim.studies.sources import sources_digest
@@ -23,11 +24,11 @@ def request_digest(case: Case) -> str:
     """SHA-256 of what is computed, whatever computes it."""
     from radarsim.kernels import random  # the compiler, which takes half a second, is not loaded for `radarsim list`
 
-    request: dict[str, object] = {} if case.noise_of is None else {"noise_of": world(case.noise_of)}
+    request: dict[str, object] = {} if case.noise_of is None else {"noise_of": world_keys(case.noise_of)}
     request |= {
         "study": case.study,
         "model": study(case.study).model,
-        "spec": canonical(case.spec),
+        "spec": identity_keys(case.spec),
         "seed": case.seed,
         "random_layout": random.LAYOUT,
     }

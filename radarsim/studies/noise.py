@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from radarsim.config.experiment import Case, digest, world
+from radarsim.config.experiment import Case
+from radarsim.config.identity import digest, world_keys
 
 
 def noise_key(case: Case, stream_name: str) -> np.ndarray:
@@ -10,4 +11,4 @@ def noise_key(case: Case, stream_name: str) -> np.ndarray:
     from radarsim.kernels.random import stream  # loads the compiler, which `radarsim list` does without
 
     keyed_by = case.spec if case.noise_of is None else case.noise_of
-    return stream(case.seed, f"{case.study}:{stream_name}:{digest(world(keyed_by))}")
+    return stream(case.seed, f"{case.study}:{stream_name}:{digest(world_keys(keyed_by))}")

@@ -12,8 +12,6 @@
         paper = Paper("Kalman 1960", may_grow=("filters",))
         claims_yaml = "…"
 
-    STUDY = Walk()
-
 | given | is |
 |---|---|
 | `asks` | the question, one sentence |
@@ -25,9 +23,9 @@
 
 `filters`, `baseline` and `scans` are added to the keys, with their marks. The tables curves, gains and `last`, figures,
 question and answer, claims and interpretations, and the use of recorded plots follow; `shipped/` beside the file holds
-configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by functions
-of the file whose first argument is `seen`, or by those of `radarsim.papers.one_file_measures`. The alternatives of
-a choice set keys, `sets: {radar.scan_period_s: 2}`.
+configs. Claims find a case by its keys, `of: [{radar.scan_period_s: 2}]`, and are measured by functions of the file
+whose first argument is `seen`, or by those of `radarsim.papers.one_file_measures`. The alternatives of a choice set
+keys, `sets: {radar.scan_period_s: 2}`.
 
 A base for a kind of model derives from `OneFile` and gives `prepare`, with `axes` and `sums` from this module,
 `simulate`, and if it can `limits`, `drawing`, `tracker` and `likelihood`. `radarsim.studies.linear` is such a base.
@@ -39,27 +37,32 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import chain, combinations
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from radarsim.config.fields import Member, Model, keys_of
-from radarsim.config.fields import Study as Keys
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member, make_study_keys
 from radarsim.errors import ConfigError
-from radarsim.failures import call
-from radarsim.language import Term, few, listed, term, tr
+from radarsim.language.translate import Term, join_names, shorten_names, term, tr
 from radarsim.report.quantities import COMMON, Component, Quantity
-from radarsim.studies.interface import Draw, Likelihood, Paper, RecordedPlots, Study, Tracker
+from radarsim.studies.interface import Paper, Study
+from radarsim.studies.onefile_recordings import OneFileRecordings
+from radarsim.studies.recording_interface import Likelihood, RecordingInterface
+from radarsim.user_code_errors import call_user_function
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
     from radarsim.config.experiment import Case, Experiment
-    from radarsim.engine.results import Axes, CaseResult, Layout
-    from radarsim.report.drawing import Figure
+    from radarsim.config.study_keys import StudyKeys as Keys
+    from radarsim.engine.results import Axes, CaseResult
+    from radarsim.engine.sums import Layout
+    from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
+    from radarsim.studies.plot_arrays import DrawPlots
+    from radarsim.studies.recording_interface import Tracker
 
 
 class Measured(NamedTuple):
@@ -70,16 +73,15 @@ class Measured(NamedTuple):
     sigma_keys: tuple[str, ...] = ()
 
 
-RESERVED = "filters", "baseline", "scans"
-MAX_COLUMN_SETS = 6  # sets of columns of which a file may have any; with more, all sets or one
-NEEDED: Mapping[str, tuple[type, str]] = {
+RESERVED_KEYS = "filters", "baseline", "scans"
+REQUIRED_ATTRIBUTES: Mapping[str, tuple[type, str]] = {
     "name": (str, "the value of `study:` in YAML"),
     "about": (str, "one line for `radarsim list`"),
     "filters": (Mapping, "what `radarsim list` says of its filters: keys, and what they make"),
     "asks": (str, "the question, one sentence"),
     "components": (tuple, "the components of the errors, each Component(name, unit, symbol, words)"),
     "parts": (Mapping, "the models of the keys' parts, by name"),
-    "Filter": (type, "the keys of a filter, a subclass of radarsim.config.fields.Member"),
+    "Filter": (type, "the keys of a filter, a subclass of radarsim.config.study_keys.Member"),
     "scan_period": (str, "the dotted key of the time between two plots, s"),
 }
 
@@ -87,7 +89,7 @@ NEEDED: Mapping[str, tuple[type, str]] = {
 class OneFile(Study):
     """A study declared by one class of one file; the module's docstring lists what a subclass gives.
 
-    drawing(case): as `RecordedPlots.drawing`.
+    drawing(case): as `RecordingInterface.drawing`.
     tracker(case): the filters of a case before their first plot. Without either, or without `measured`, the numbers of
     a recorded plot, the study does nothing with recorded plots. most_scans: bound of `scans`. extra_figures: names of
     figures that a subclass draws beside those of each component, with * for the varying part.
@@ -101,12 +103,11 @@ class OneFile(Study):
     measured: tuple[Measured, ...] = ()
     paper: Paper | None = None
     claims_yaml: str = ""
-    drawing: "Callable[[Case], Draw] | None" = None
+    drawing: "Callable[[Case], DrawPlots] | None" = None
     tracker: "Callable[[Case], Tracker] | None" = None
     most_scans: int = 10_000
     extra_figures: tuple[str, ...] = ()
 
-    # ---- what is asked -------------------------------------------------------------------------------------------
     key_class: "type[Keys]"
 
     def __init_subclass__(cls) -> None:
@@ -114,7 +115,7 @@ class OneFile(Study):
         super().__init_subclass__()
         if not any(True for _ in cls.missing()):
             name = f"{cls.__name__}Keys"
-            cls.key_class = keys_of(name, cls.__module__, cls.parts, cls.Filter, cls.most_scans)
+            cls.key_class = make_study_keys(name, cls.__module__, cls.parts, cls.Filter, cls.most_scans)
             names = (
                 f"{kind}_{component.name}" for component in cls.components for kind in ("sigma", "gain", "dynamic")
             )
@@ -145,7 +146,7 @@ class OneFile(Study):
 
     @classmethod
     def _attribute_errors(cls) -> Iterator[str]:
-        for name, (kind, description) in NEEDED.items():
+        for name, (kind, description) in REQUIRED_ATTRIBUTES.items():
             value = getattr(cls, name, None)
             if not isinstance(value, kind) or not value:
                 got = "nothing" if value is None else repr(value)[:40]
@@ -165,7 +166,7 @@ class OneFile(Study):
         for name, part in (*cls.parts.items(), ("Filter", cls.Filter)):
             base = Member if name == "Filter" else Model
             if not (isinstance(part, type) and issubclass(part, base)):
-                yield f"{name} must be a subclass of radarsim.config.fields.{base.__name__}, got {part!r}"
+                yield f"{name} must be a subclass of {base.__module__}.{base.__name__}, got {part!r}"
         for number in cls.measured:
             if not isinstance(number, Measured):
                 yield f"measured: {number!r} must be Measured(column, unit, keys of its σ)"
@@ -184,7 +185,7 @@ class OneFile(Study):
             yield f"paper: must be Paper(…), got {cls.paper!r}"[:120]
         elif cls.paper is not None and isinstance(cls.paper.may_grow, str):
             yield f"paper: may_grow: must be a tuple, ({cls.paper.may_grow!r},); got {cls.paper.may_grow!r}"
-        yield from (f"parts: {name} is added to the keys of every study" for name in RESERVED if name in cls.parts)
+        yield from (f"parts: {name} is added to the keys of every study" for name in RESERVED_KEYS if name in cls.parts)
         yield from ("measured: t_s is the time of a plot" for number in cls.measured if number.column == "t_s")
         keys_by_user: dict[str, tuple[str, ...]] = {"scan_period": (cls.scan_period,)}
         keys_by_user |= {number.column: number.sigma_keys for number in cls.measured}
@@ -208,10 +209,9 @@ class OneFile(Study):
         model, first = cls.parts.get(part, Model) if subkey else cls.Filter, (subkey or part).partition(".")[0]
         return first in model.model_fields or isinstance(getattr(model, first, None), property)
 
-    # ---- numbers -------------------------------------------------------------------------------------------------
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """The value of one of the study's functions; ConfigError with its place and the study's name if it fails."""
-        return call(function, *arguments, owner=f"study {self.name}: ")
+        return call_user_function(function, *arguments, owner=f"study {self.name}: ")
 
     def scan_period_s(self, spec: Any) -> float:
         """The time between two plots of a config."""
@@ -242,7 +242,7 @@ class OneFile(Study):
     def sums(self, spec: Any) -> "Layout":
         """The sums of a case: `error` (F, K, C, 4) of e, e², e³, e⁴, and `paired` (F, K, C) of e² times the
         baseline's e²."""
-        from radarsim.engine.results import Layout
+        from radarsim.engine.sums import Layout
 
         shape = len(spec.filters), spec.scans, len(self.components)
         return Layout(error=(*shape, 4), paired=shape)
@@ -255,11 +255,10 @@ class OneFile(Study):
         limit = Quantity("limit", term("limit of σ"), "last", "steady_sigma", per="component")
         return COMMON if type(self).limits is OneFile.limits else (*COMMON, limit)
 
-    # ---- what is shown -------------------------------------------------------------------------------------------
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         from radarsim.report import tables
 
-        return {"last": tables.joined(map(self._last, results))}
+        return {"last": tables.join_columns(map(self._last, results))}
 
     def _last(self, result: "CaseResult") -> Mapping[str, Any]:
         """σ at the last scan, exact where known, and its limit."""
@@ -268,10 +267,10 @@ class OneFile(Study):
         from radarsim.report import statistics, tables
 
         f, c = np.nonzero(result.axes.available[:, -1])
-        sigma = statistics.errors(result.sums["error"][f, -1, c], tables.realisations(result)[f, -1, c]).sigma
+        sigma = statistics.errors(result.sums["error"][f, -1, c], tables.realisation_counts(result)[f, -1, c]).sigma
         limits = self.limits(result.spec)
         return {
-            **tables.leading(result, f, **tables.components(result, c)),
+            **tables.label_columns(result, f, **tables.component_columns(result, c)),
             "last_sigma|last": sigma,
             "exact_last_sigma": result.axes.exact_sigma[f, -1, c],
         } | ({} if limits is None else {"steady_sigma": limits[f, c]})
@@ -279,16 +278,16 @@ class OneFile(Study):
     def figures(
         self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
-        from radarsim.report import panels
+        from radarsim.report import time_figures
 
-        return panels.per_component(results, tables, self.shown(), experiment)
+        return time_figures.component_figures(results, tables, self.shown(), experiment)
 
     def shown(self) -> "list[Component]":
-        from radarsim.report import panels
+        from radarsim.report import key_labels
 
         return [
             component._replace(
-                symbol=component.symbol or panels.letter(component.name),
+                symbol=component.symbol or key_labels.component_symbol(component.name),
                 words=self._term(component.words or component.name),
             )
             for component in self.components
@@ -296,7 +295,7 @@ class OneFile(Study):
 
     def question(self, experiment: "Experiment") -> str:
         names = dict.fromkeys(filter_keys.name for case in experiment.cases for filter_keys in case.spec.filters)
-        return f"{tr(self._term(self.asks))} {tr('Filters: {names}.', names=few(list(names)))}"
+        return f"{tr(self._term(self.asks))} {tr('Filters: {names}.', names=shorten_names(list(names)))}"
 
     def _term(self, words: str) -> Term:
         """A text of the study, which the catalogue of its package translates."""
@@ -305,22 +304,22 @@ class OneFile(Study):
     def answer(
         self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]"
     ) -> "Sequence[str | Sentence]":
-        from radarsim.report import panels, sentences
+        from radarsim.report import case_selection, key_labels, sentences
 
-        reported, remark = panels.reported(results)
-        has_several_configs = len(panels.families(results)) > 1  # of an `include`
+        reported, remark = case_selection.select_reported(results)
+        has_several_configs = len(case_selection.group_by_config(results)) > 1  # of an `include`
         answer = []
         for result in reported:
-            prefix = f"{panels.stem(result)}: " if has_several_configs else ""
+            prefix = f"{key_labels.config_stem(result)}: " if has_several_configs else ""
             answer += [sentence.with_text(prefix + sentence.text) for sentence in self._sentences(result, tables)]
         return [*answer, *map(sentences.Sentence, remark)]
 
     def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """σ of the leading component at the last scan, and the gain of each filter."""
-        from radarsim.report import panels, sentences, tables, wording
+        from radarsim.report import case_selection, sentences, tables, wording
 
         leading = self.components[0]
-        last = tables.where(tables_by_name["last"], case=result.name, component=leading.name)
+        last = tables.select_rows(tables_by_name["last"], case=result.name, component=leading.name)
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
         sigmas = [
             f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}"
@@ -330,10 +329,12 @@ class OneFile(Study):
             "σ of the {quantity} after {t:g} s: {filters}.",
             quantity=self._term(leading.words or leading.name),
             t=float(result.axes.t_s[-1]),
-            filters=listed(sigmas),
+            filters=join_names(sigmas),
         )
-        yield sentences.Sentence(panels.at_its_place(result, text), sentences.intervals("last", "last", last))
-        gains = tables.where(tables_by_name["gains"], case=result.name, component=leading.name)
+        yield sentences.Sentence(
+            case_selection.after_swept_values(result, text), sentences.intervals("last", "last", last)
+        )
+        gains = tables.select_rows(tables_by_name["gains"], case=result.name, component=leading.name)
         gains = gains[gains["k"] == gains["k"].max()]
         if len(gains):
             keys = ("gain_percent", "gain_lo", "gain_hi")
@@ -342,10 +343,11 @@ class OneFile(Study):
                 for row in gains.to_dict("records")
             ]
             base = result.axes.filters[result.axes.baseline]
-            text = tr("Gain against {base} there: {filters}.", base=base, filters=listed(texts))
-            yield sentences.Sentence(panels.at_its_place(result, text), sentences.intervals("gains", "gain", gains))
+            text = tr("Gain against {base} there: {filters}.", base=base, filters=join_names(texts))
+            yield sentences.Sentence(
+                case_selection.after_swept_values(result, text), sentences.intervals("gains", "gain", gains)
+            )
 
-    # ---- beside --------------------------------------------------------------------------------------------------
     def columns(self, spec: Any, filter_keys: Any) -> tuple[str, ...]:
         """The columns of recorded plots that a filter takes, in the order of `measured`. Default: theirs."""
         return tuple(number.column for number in self.measured)
@@ -353,55 +355,13 @@ class OneFile(Study):
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
     ) -> Likelihood | None:
-        """As `RecordedPlots.likelihood`. Default: not known."""
+        """As `RecordingInterface.likelihood`. Default: not known."""
         return None
 
-    def recording_interface(self) -> RecordedPlots | None:
+    def recording_interface(self) -> RecordingInterface | None:
         drawing, tracker = self.drawing, self.tracker
         return OneFileRecordings(self, drawing, tracker) if self.measured and drawing and tracker else None
 
     def shipped(self) -> Path | None:
         folder = Path(str(sys.modules[type(self).__module__].__file__)).parent / "shipped"
         return folder if folder.is_dir() else None
-
-
-class OneFileRecordings(RecordedPlots):
-    """Recorded plots of a study in one file: a recording may have all columns, or those of some filters."""
-
-    from_any_origin = True
-    of_any_keys = True
-
-    def __init__(self, study: "OneFile", drawing: "Callable[[Case], Draw]", tracker: "Callable[[Case], Tracker]"):
-        self.study, self._drawing, self._tracker = study, drawing, tracker
-
-    def columns(self, spec: Any) -> Sequence[Sequence[str]]:
-        filter_columns = list(dict.fromkeys(self.study.columns(spec, filter_keys) for filter_keys in spec.filters))
-        counts = (
-            range(len(filter_columns), 0, -1) if len(filter_columns) <= MAX_COLUMN_SETS else (len(filter_columns), 1)
-        )
-        choices = [tuple(dict.fromkeys(chain(*chosen))) for n in counts for chosen in combinations(filter_columns, n)]
-        return [("t_s", *names) for names in dict.fromkeys(choices)]
-
-    def columns_of(self, spec: Any, filter_keys: Any) -> Sequence[str]:
-        return self.study.columns(spec, filter_keys)
-
-    def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
-        pairs = [
-            zip(self.study.columns(spec, filter_keys), self.study.measured, strict=False)
-            for filter_keys in spec.filters
-        ]
-        return {column: number.sigma_keys for columns in pairs for column, number in columns}
-
-    def scan_period_s(self, spec: Any) -> float:
-        return self.study.scan_period_s(spec)
-
-    def drawing(self, case: "Case") -> Draw:
-        return self._drawing(case)
-
-    def tracker(self, case: "Case") -> Tracker:
-        return self._tracker(case)
-
-    def likelihood(
-        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
-    ) -> Likelihood | None:
-        return self.study.likelihood(case, filter_name, tracks)

@@ -16,13 +16,13 @@ from inspect import isabstract
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from radarsim import failures
-from radarsim.config.document import did_you_mean
+from radarsim import user_code_errors
+from radarsim.config.common_keys import COMMON_KEYS
 from radarsim.config.experiment import Case
-from radarsim.config.fields import Study as Keys
-from radarsim.config.fields import kinds_of, widened
-from radarsim.config.schema import COMMON_KEYS
-from radarsim.errors import OF_AUTHORS, ConfigError, RadarsimError, StudyError
+from radarsim.config.find_files import did_you_mean
+from radarsim.config.study_keys import StudyKeys as Keys
+from radarsim.config.study_keys import extend_kinds, possible_kinds
+from radarsim.errors import AUTHOR_ERRORS, ConfigError, RadarsimError, StudyError
 from radarsim.extensions import extensions
 from radarsim.report.quantities import Quantity
 from radarsim.studies.interface import Study
@@ -41,7 +41,7 @@ SHIPPED = {  # in the order of the papers, then extensions
 
 
 @cache
-def entries(group: str = GROUP) -> Mapping[str, Mapping[str, EntryPoint]]:
+def entry_points_by_name(group: str = GROUP) -> Mapping[str, Mapping[str, EntryPoint]]:
     """Entry points of installed packages in a group: by the entry's name, then by the package's."""
     by_name: dict[str, dict[str, EntryPoint]] = {}
     for entry in sorted(entry_points(group=group)):
@@ -49,19 +49,19 @@ def entries(group: str = GROUP) -> Mapping[str, Mapping[str, EntryPoint]]:
     return by_name
 
 
-def offered() -> tuple[str, ...]:
+def package_study_names() -> tuple[str, ...]:
     """The names of the studies of installed packages; a name that is shipped here is ignored."""
-    return tuple(name for name in entries() if name not in SHIPPED)
+    return tuple(name for name in entry_points_by_name() if name not in SHIPPED)
 
 
-def names() -> tuple[str, ...]:
+def study_names() -> tuple[str, ...]:
     """The permitted values of `study:`."""
-    return (*SHIPPED, *offered())
+    return (*SHIPPED, *package_study_names())
 
 
-def has(name: str) -> bool:
+def is_study(name: str) -> bool:
     """Whether a study of that name exists; installed packages are searched only for names that are not shipped here."""
-    return name in SHIPPED or name in offered()
+    return name in SHIPPED or name in package_study_names()
 
 
 def study(name: str) -> Study:
@@ -77,7 +77,7 @@ def _loaded(name: str) -> Study | ConfigError:
     """The study, or the error for which it cannot be loaded, so that a package that fails is imported only once."""
     if name in SHIPPED:
         return import_module(SHIPPED[name]).STUDY
-    packages = entries()[name]
+    packages = entry_points_by_name()[name]
     if len(packages) > 1:
         return ConfigError(
             f"study {name}: offered by the packages {' and '.join(sorted(packages))}: uninstall all but one"
@@ -85,8 +85,8 @@ def _loaded(name: str) -> Study | ConfigError:
     (entry,) = packages.values()
     try:
         loaded = entry.load()
-    except OF_AUTHORS as error:
-        return _fault(name, f"cannot be loaded: {failures.summary(error)}")
+    except AUTHOR_ERRORS as error:
+        return _fault(name, f"cannot be loaded: {user_code_errors.error_summary(error)}")
     if not isinstance(loaded, Study):
         return _fault(name, f"must offer a radarsim.studies.interface.Study, got {type(loaded).__name__}")
     if loaded.name != name:
@@ -96,10 +96,10 @@ def _loaded(name: str) -> Study | ConfigError:
 
 def module(name: str) -> str:
     """The module that declares a study, by its full name."""
-    return SHIPPED[name] if name in SHIPPED else next(iter(entries()[name].values())).module
+    return SHIPPED[name] if name in SHIPPED else next(iter(entry_points_by_name()[name].values())).module
 
 
-def part(name: str, take: Callable[[Study], Part]) -> Part:
+def call_study(name: str, take: Callable[[Study], Part]) -> Part:
     """The result of `take` for the study of a name. Raises ConfigError with the package's name where the study of a
     package fails."""
     loaded = study(name)
@@ -109,29 +109,29 @@ def part(name: str, take: Callable[[Study], Part]) -> Part:
         return take(loaded)
     except RadarsimError:
         raise
-    except OF_AUTHORS as error:
-        raise _fault(name, f"fails: {failures.summary(error)}") from error
+    except AUTHOR_ERRORS as error:
+        raise _fault(name, f"fails: {user_code_errors.error_summary(error)}") from error
 
 
-def parts(take: Callable[[Study], Part]) -> dict[str, Part]:
+def call_studies(take: Callable[[Study], Part]) -> dict[str, Part]:
     """The results of `take` by the name of the study, without studies for which it fails."""
     results = {}
-    for name in names():
+    for name in study_names():
         try:
-            results[name] = part(name, take)
+            results[name] = call_study(name, take)
         except ConfigError:
             continue  # reported by `unusable`, and where this study is requested
     return results
 
 
-def unusable() -> dict[str, str]:
+def unusable_studies() -> dict[str, str]:
     """The unusable studies of installed packages, by name, with the reason."""
     reasons = {
         name: f"study {name}: shipped with radarsim; that of the package {' and '.join(sorted(packages))} is not used"
-        for name, packages in entries().items()
+        for name, packages in entry_points_by_name().items()
         if name in SHIPPED
     }
-    for name in offered():
+    for name in package_study_names():
         try:
             keys(name)
         except ConfigError as error:
@@ -139,14 +139,14 @@ def unusable() -> dict[str, str]:
     return reasons
 
 
-def lacking(stem: str) -> tuple[str, ...]:
+def reasons_for_missing_config(stem: str) -> tuple[str, ...]:
     """Why no config of a stem was found: errors of studies with this name, or whose packages ship such a config."""
-    return tuple(fault for name, fault in unusable().items() if stem == name or _ships(name, stem))
+    return tuple(fault for name, fault in unusable_studies().items() if stem == name or _ships(name, stem))
 
 
 def _ships(name: str, stem: str) -> bool:
     """Whether a package, which may fail to import, has a config of this stem in one of its folders `configs`."""
-    for entry in entries()[name].values():
+    for entry in entry_points_by_name()[name].values():
         try:
             spec = find_spec(entry.module.partition(".")[0])  # of the outermost module, which this does not import
         except (ImportError, ValueError):
@@ -159,15 +159,15 @@ def _ships(name: str, stem: str) -> bool:
 
 def keys(name: str) -> type[Keys]:
     """The schema of a study's YAML keys, with filters that packages add. Raises as `study`."""
-    takes_filters = name in SHIPPED and entries(FILTERS) and study(name).own_filters()
+    takes_filters = name in SHIPPED and entry_points_by_name(FILTERS) and study(name).own_filters()
     return _with_filters(name) if takes_filters else own_keys(name)
 
 
 def own_keys(name: str) -> type[Keys]:
     """The schema of a study's own YAML keys. Raises as `study`."""
-    key_class = part(name, _checked_keys)
+    key_class = call_study(name, _checked_keys)
     if not (isinstance(key_class, type) and issubclass(key_class, Keys)):
-        raise _fault(name, "must give keys that are a subclass of radarsim.config.fields.Study")
+        raise _fault(name, "must give keys that are a subclass of radarsim.config.study_keys.StudyKeys")
     if taken_keys := [key for key in key_class.model_fields if key in COMMON_KEYS]:
         raise _fault(name, f"has keys that every config has already: {', '.join(taken_keys)}")
     return key_class
@@ -181,9 +181,9 @@ def _checked_keys(study: Study) -> type[Keys]:
     return key_class
 
 
-def usable() -> tuple[str, ...]:
+def usable_studies() -> tuple[str, ...]:
     """The names of the studies whose keys can be read."""
-    return tuple(parts(lambda loaded: keys(loaded.name)))
+    return tuple(call_studies(lambda loaded: keys(loaded.name)))
 
 
 def quantity(name: str, case: Case) -> Quantity:
@@ -201,10 +201,10 @@ def quantity(name: str, case: Case) -> Quantity:
 
 def quantities(name: str, spec: Keys | None) -> tuple[Quantity, ...]:
     """The quantities of a study in a case with these keys; None: in any case. Raises as `part`."""
-    return part(name, lambda loaded: declared(loaded, spec))
+    return call_study(name, lambda loaded: study_quantities(loaded, spec))
 
 
-def declared(study: Study, spec: Keys | None) -> tuple[Quantity, ...]:
+def study_quantities(study: Study, spec: Keys | None) -> tuple[Quantity, ...]:
     """The quantities of a study object. Raises ConfigError for anything but a tuple of Quantity."""
     quantities: Any = study.quantities(spec)
     if not isinstance(quantities, tuple | list) or not all(isinstance(quantity, Quantity) for quantity in quantities):
@@ -214,15 +214,19 @@ def declared(study: Study, spec: Keys | None) -> tuple[Quantity, ...]:
 
 def folders() -> tuple[Path, ...]:
     """Folders of packages with `configs/` and `scenarios/`, whose configs are found by stem."""
-    shipped_folders = parts(lambda loaded: loaded.shipped()) if offered() else {}
+    shipped_folders = call_studies(lambda loaded: loaded.shipped()) if package_study_names() else {}
     return tuple(Path(folder) for folder in shipped_folders.values() if folder is not None)
 
 
 def packages() -> tuple[str, ...]:
     """The top-level modules of the packages that offer studies or filters, without importing them."""
-    filter_modules = (entry.module for by_package in entries(FILTERS).values() for entry in by_package.values())
+    filter_modules = (
+        entry.module for by_package in entry_points_by_name(FILTERS).values() for entry in by_package.values()
+    )
     return tuple(
-        dict.fromkeys(module_name.partition(".")[0] for module_name in (*map(module, offered()), *filter_modules))
+        dict.fromkeys(
+            module_name.partition(".")[0] for module_name in (*map(module, package_study_names()), *filter_modules)
+        )
     )
 
 
@@ -230,10 +234,10 @@ def package(name: str) -> str | None:
     """The installed package that offers a study, with its version; None for a study shipped here."""
     if name in SHIPPED:
         return None
-    return _package(next(iter(entries()[name].values())))
+    return _package(next(iter(entry_points_by_name()[name].values())))
 
 
-def homes() -> Iterator[Path]:
+def package_folders() -> Iterator[Path]:
     """The folder of each of these packages, or its single file."""
     for name in packages():
         try:
@@ -245,39 +249,38 @@ def homes() -> Iterator[Path]:
             yield from (Path(folder).resolve() for folder in folders)
 
 
-failures.homes = homes
+user_code_errors.study_folders = package_folders
 
 
 def _package(entry: EntryPoint) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
 
 
-def fault_of(error: BaseException) -> StudyError | None:
+def package_error(error: BaseException) -> StudyError | None:
     """An error for the user where the code of an installed package raised an uncaught one; else None."""
-    if failures.place(error, installed=True) is None:
+    if user_code_errors.locate(error, installed=True) is None:
         return None
-    return StudyError(f"the code of an installed package fails: {failures.summary(error)}")
+    return StudyError(f"the code of an installed package fails: {user_code_errors.error_summary(error)}")
 
 
 def _fault(name: str, words: str) -> ConfigError:
     return ConfigError(f"study {name}: the package {package(name) or 'radarsim'} {words}")
 
 
-def coded(keys: Any, place: str, baseline: bool, folder: Path) -> Any:
+def filter_from_code(keys: Any, place: str, baseline: bool, folder: Path) -> Any:
     """The user filter in Python that a config in a folder names at a place. Raises ConfigError."""
-    from radarsim.studies import code
+    from radarsim.studies.user_filters import from_code
 
-    return code.coded(keys, place, baseline, folder, first_plots)
+    return from_code.filter_from_code(keys, place, baseline, folder, first_plots)
 
 
 def first_plots(case: Case, count: int) -> Any:
     """The plots of a case's first realisations as a user filter sees them in a run."""
-    from radarsim.studies import outside
+    from radarsim.studies.user_filters import plots
 
-    return outside.first_plots(study(case.study), case, count)
+    return plots.first_plots(study(case.study), case, count)
 
 
-# ---- filters of packages ---------------------------------------------------------------------------------------------
 class Filters(NamedTuple):
     """Filters of installed packages: the keys of each by study and kind, and by kind why others cannot be used."""
 
@@ -286,11 +289,11 @@ class Filters(NamedTuple):
 
 
 @cache
-def filters() -> Filters:
+def package_filters() -> Filters:
     """The filters of all installed packages, which are imported for this."""
     usable: dict[str, dict[str, Any]] = {}
     unusable: dict[str, str] = {}
-    for kind, packages in entries(FILTERS).items():
+    for kind, packages in entry_points_by_name(FILTERS).items():
         by_study: dict[str, dict[str, Any]] = {}
         faults = []
         for package, entry in packages.items():
@@ -316,8 +319,8 @@ def _filter(kind: str, entry: EntryPoint) -> tuple[Any, str]:
     """The keys of a filter that a package offers, and why it cannot be used; empty where it can."""
     try:
         key_class = entry.load()
-    except OF_AUTHORS as error:
-        return None, f"which cannot be loaded: {failures.summary(error)}"
+    except AUTHOR_ERRORS as error:
+        return None, f"which cannot be loaded: {user_code_errors.error_summary(error)}"
     name = str(getattr(key_class, "study", None))
     base = study(name).own_filters() if name in SHIPPED else None
     if base is None:
@@ -325,13 +328,15 @@ def _filter(kind: str, entry: EntryPoint) -> tuple[Any, str]:
         return None, f"for the study {name}, which takes no filters of packages: {takes} does"
     if not (isinstance(key_class, type) and issubclass(key_class, base)) or isabstract(key_class):
         return None, f"which must be a class derived from {base.__module__}.{base.__name__}, with all that it asks for"
-    if kind in kinds_of(own_keys(name)):
+    if kind in possible_kinds(own_keys(name)):
         return None, f"which {name} has itself: that of the package is not used"
-    if kinds_of(key_class) != (kind,):
+    if possible_kinds(key_class) != (kind,):
         return None, f"whose key kind must be Literal[{kind!r}]"
     return key_class, ""
 
 
 @cache
 def _with_filters(name: str) -> type[Keys]:
-    return widened(own_keys(name), filters().usable.get(name, {}), filters().unusable, (keys, name))
+    return extend_kinds(
+        own_keys(name), package_filters().usable.get(name, {}), package_filters().unusable, (keys, name)
+    )

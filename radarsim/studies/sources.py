@@ -16,13 +16,14 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from radarsim.config.experiment import Case
-from radarsim.config.fields import Model
-from radarsim.module_sources import is_users_module, module_digest, module_source, module_spec, note_loaded_modules
+from radarsim.config.model import Model
+from radarsim.module_sources import module_digest, module_source, module_spec, note_loaded_modules
 from radarsim.studies.registry import study
-from radarsim.studies.user_code_sources import imports_in
+from radarsim.studies.user_filters.sources import imports_in
+from radarsim.user_files import is_user_module
 
 RADARSIM = __package__.partition(".")[0]
-ENGINE = "radarsim.app.case_work", "radarsim.engine.run"  # what takes a case through the engine
+ENGINE = "radarsim.api.case_work", "radarsim.engine.collect"  # what takes a case through the engine
 SHOW_RESULTS = "radarsim.report", "radarsim.language", "radarsim.papers", "radarsim.extensions"
 
 _COMMENT = re.compile(r"#.*")
@@ -67,7 +68,7 @@ def computing_modules(first: tuple[str, ...]) -> frozenset[str]:
         name = waiting.pop()
         top = name.partition(".")[0]
         if top not in counts:
-            counts[top] = is_users_module(top)
+            counts[top] = is_user_module(top)
         if name in modules or not counts[top] or _is_within(name, SHOW_RESULTS):
             continue
         if (spec := module_spec(name)) is None or not spec.has_location:

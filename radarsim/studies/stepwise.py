@@ -1,4 +1,4 @@
-"""A study in one file whose filters are not linear: the step of one realisation, from which eight are computed at once.
+"""A study in one file whose filters are not linear: the step of one realisation, from which eight are computed.
 
     class Turning(StepStudy):                       # besides what `radarsim.studies.onefile` needs
         known_columns = ("own_x_m", "own_y_m")      # what is known at each scan, as columns of recorded plots
@@ -21,17 +21,15 @@
         def covariance(s, u, c): …                  # their packed covariance, or None
 
 These are plain functions of numbers, tuples and named records; what calculates with numbers of a realisation is in
-`radarsim.kernels.traced` (`sqrt`, `atan2`, `where`, …). A state, a plot, a record is any tuple of numbers or of such
-tuples; its shape stays the same. The same text runs on eight realisations at a time, compiled, and on floats over
-recorded plots. Branches by keys are Python's: text, truth values and whole numbers of a record are no numbers of a
-realisation, and a kernel of its own is made for each.
+`radarsim.kernels.tracing` (`sqrt`, `where`, …) and `radarsim.kernels.formula_functions` (`sin`, `atan2`, …). A state, a
+plot, a record is any tuple of numbers or of such tuples; its shape stays the same. The same text runs on eight
+realisations at a time, compiled, and on floats over recorded plots. Branches by keys are Python's: text, truth values
+and whole numbers of a record are no numbers of a realisation, and each of their values has a separate kernel.
 
-The first plot is always there; of later ones `detection` is the probability. Where a filter gives a covariance,
+The first plot is always there; `detection` is the probability of each later one. Where a filter gives a covariance,
 `believed_sigma` in `curves` and the table `consistency` say how it agrees with the errors. A study that knows σ exactly
-gives `exact_sigma`.
-"""
+gives `exact_sigma`."""
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -39,22 +37,33 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from radarsim.config.fields import kinds_of
-from radarsim.engine.results import Axes, CaseResult, Layout, Track
-from radarsim.errors import ConfigError, PlotFault
-from radarsim.failures import call, fault, of_study
-from radarsim.kernels import traced
-from radarsim.studies.interface import Draw, Drawn
+from radarsim.config.study_keys import possible_kinds
+from radarsim.engine.results import Axes, CaseResult
+from radarsim.engine.sums import Layout
+from radarsim.errors import ConfigError
+from radarsim.kernels import small_matrices, tracing
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import OneFile
+from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
+from radarsim.studies.step_checks import (
+    DIFFERENT_FORMULA,
+    check_length,
+    check_same_shape,
+    record,
+    to_array,
+    traced_step,
+    variances,
+)
+from radarsim.studies.step_tracker import Tracker
+from radarsim.user_code_errors import study_context, user_code_error
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from radarsim.config.experiment import Case, Experiment
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
 
-DIFFERENT_FORMULA = "gives another formula each time"
+
 MAX_DIFFERENCE = 1e-9  # of the largest truth: permitted difference between plain Python and the kernel
 NO_COVARIANCE = -1e100  # stands for the variances and the NEES of a matrix that is not positive
 BLOCK = 512  # realisations in a block
@@ -84,7 +93,7 @@ class CompiledFilter:
 
 @dataclass(frozen=True)
 class Plan:
-    """Data of a block; see `radarsim.kernels.stepped` for the arrays."""
+    """Data of a block; see `radarsim.kernels.steps` for the arrays."""
 
     layout: Layout
     axes: Axes
@@ -156,24 +165,23 @@ class StepStudy(OneFile):
             for needed in ("design", "start", "predict", "update", "estimate"):
                 if not callable(getattr(steps, needed, None)):
                     yield f"{cls.__name__}.kinds: {kind}: {needed} must be given; see radarsim.studies.stepwise"
-        allowed_kinds = kinds_of(cls.Filter) if isinstance(getattr(cls, "Filter", None), type) else ()
+        allowed_kinds = possible_kinds(cls.Filter) if isinstance(getattr(cls, "Filter", None), type) else ()
         if kinds and not allowed_kinds:
             yield f"Filter: must have a key kind: Literal[{', '.join(map(repr, kinds))}]"
         elif missing_kinds := [kind for kind in allowed_kinds if kind not in kinds]:
             names = ", ".join(kinds)
             yield f"kinds: no {' and no '.join(missing_kinds)}, which the key kind of Filter allows; there are {names}"
 
-    # ---- numbers -------------------------------------------------------------------------------------------------
     def prepare(self, case: "Case") -> Plan:
-        with of_study(self.name):
+        with study_context(self.name):
             return self._prepared(case)
 
     def _prepared(self, case: "Case") -> Plan:
-        from radarsim.kernels import stepped
+        from radarsim.kernels import steps
 
         spec = case.spec
         axes, sums = self.axes(spec, self._exact(spec)), self.sums(spec)
-        known = self._known(spec, axes.t_s)
+        known_quantities = self._known(spec, axes.t_s)
         world, detection = record(self.world, spec), self._probability(spec)
         scene = self._scene(world)
         filters = tuple(self._compiled(spec, keys, scene, detection < 1) for keys in spec.filters)
@@ -181,15 +189,15 @@ class StepStudy(OneFile):
             f, k, c = sums.shapes["paired"]
             sums = Layout(**sums.shapes, believed=(f, k, c), nees=(f, k, 2))
         keys = np.stack([noise_key(case, "plots"), noise_key(case, "detections")])
-        draw = cached_kernel(stepped.world, scene.first, scene.following, scene.shape[2], scene.shape[1])
-        kernel_arguments = known.ravel(), known.shape[1], draw, to_numbers(world)
+        draw = cached_kernel(steps.truth_kernel, scene.first, scene.following, scene.shape[2], scene.shape[1])
+        kernel_arguments = known_quantities.ravel(), known_quantities.shape[1], draw, to_numbers(world)
         return Plan(sums, axes, keys, detection, *kernel_arguments, scene.shape, filters, case)
 
     def _probability(self, spec: Any) -> float:
         """The probability of a plot."""
         probability = self.call(self.detection, spec)
         if not isinstance(probability, int | float) or not 0 <= probability <= 1:
-            raise fault(self.detection, f"must give a probability, from 0 to 1, got {probability!r}"[:200])
+            raise user_code_error(self.detection, f"must give a probability, from 0 to 1, got {probability!r}"[:200])
         return float(probability)
 
     def _exact(self, spec: Any) -> np.ndarray | None:
@@ -199,7 +207,7 @@ class StepStudy(OneFile):
         shape = len(spec.filters), spec.scans, len(self.components)
         sigma = to_array(self.exact_sigma, values, "filters × scans × components")
         if sigma.shape != shape or (sigma < 0).any():
-            raise fault(self.exact_sigma, f"must give σ {shape}, none negative, got {sigma.shape}")
+            raise user_code_error(self.exact_sigma, f"must give σ {shape}, none negative, got {sigma.shape}")
         return sigma
 
     def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
@@ -214,14 +222,16 @@ class StepStudy(OneFile):
             or len(known_quantities) != len(self.known_columns)
         ):
             size = f"{len(known_quantities)}" if isinstance(known_quantities, tuple | list) else repr(known_quantities)
-            raise fault(self.known, f"{required}{size}"[:200])
+            raise user_code_error(self.known, f"{required}{size}"[:200])
         values, repeated_values = (
             to_array(self.known, columns, f"{t_s.size} in each column") for columns in (known_quantities, repeated)
         )
         if values.shape[1:] != (t_s.size,) * bool(len(known_quantities)) or not np.isfinite(values).all():
-            raise fault(self.known, f"{required}{values.shape}, {np.sum(~np.isfinite(values))} of them not finite")
+            raise user_code_error(
+                self.known, f"{required}{values.shape}, {np.sum(~np.isfinite(values))} of them not finite"
+            )
         if not np.array_equal(values, repeated_values):
-            raise fault(self.known, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
+            raise user_code_error(self.known, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
         columns = [np.diff(t_s, prepend=t_s[0]), *values]
         padded = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
         padded[:, : len(columns)] = np.transpose(columns)
@@ -229,86 +239,88 @@ class StepStudy(OneFile):
 
     def _scene(self, world: Any) -> "Scene":
         """The programs of truth and plots."""
-        from radarsim.kernels import stepped
+        from radarsim.kernels import steps
 
         first, move, plot = self.normals
         programs = []
         state: Any = None
         for count in (first, move):
-            trace = traced.Trace()
-            c, dt, u = trace.plain(stepped.NUMBERS, world, stated=True), *self._at_a_scan(trace)
+            trace = tracing.Trace()
+            c, dt, u = trace.plain(steps.NUMBERS, world, stated=True), *self._at_a_scan(trace)
             w = [unit_normal(trace, n) for n in range(count + plot)]
             state_normals, plot_normals = tuple(w[:count]), tuple(w[count:])
             if state is None:
                 x = traced_step(self.begin, c, state_normals)
             else:
-                x = traced_step(self.move, trace.rows(stepped.STATE, state), dt, c, state_normals)
+                x = traced_step(self.move, trace.rows(steps.STATE, state), dt, c, state_normals)
                 check_same_shape(self.move, x, state)
             state = x
             z, true = traced_step(self.plot, x, u, c, plot_normals), traced_step(self.truth, x, u, c)
             check_length(self.plot, z, len(self.measured), "measured")
             check_length(self.truth, true, len(self.components), "components")
-            trace.write(stepped.STATE, x)
-            trace.write(stepped.PLOT, (z, true), 1)
+            trace.write(steps.STATE, x)
+            trace.write(steps.PLOT, (z, true), 1)
             programs.append(trace.program())
         pairs = -(-(max(first, move) + plot) // 2)
-        shape = traced.count(state), 1 + len(self.measured) + len(self.components), pairs
+        shape = tracing.count_numbers(state), 1 + len(self.measured) + len(self.components), pairs
         return Scene(programs[0], programs[1], shape)
 
-    def _at_a_scan(self, trace: traced.Trace) -> tuple[Any, tuple[Any, ...]]:
+    def _at_a_scan(self, trace: tracing.Trace) -> tuple[Any, tuple[Any, ...]]:
         """The time since the scan before, and the known quantities at a scan."""
-        from radarsim.kernels import stepped
+        from radarsim.kernels import steps
 
-        dt, *u = trace.plain(stepped.KNOWN, (0.0,) * (1 + len(self.known_columns)))
+        dt, *u = trace.plain(steps.KNOWN, (0.0,) * (1 + len(self.known_columns)))
         return dt, tuple(u)
 
     def _compiled(self, spec: Any, filter_keys: Any, scene: "Scene", missed: bool) -> CompiledFilter:
         """A filter's kernel and numbers."""
-        from radarsim.kernels import stepped
+        from radarsim.kernels import steps as kernels_steps
 
         steps = self.kinds[filter_keys.kind]
         numbers = record(steps.design, spec, filter_keys)
         first, following, rows = self._filter_programs(steps, numbers, scene, missed)
         tested, rows_of_plot = steps.covariance is not None, scene.shape[1]
-        compiled = cached_kernel(stepped.follower, first, following, rows_of_plot, len(self.components), tested)
+        compiled = cached_kernel(
+            kernels_steps.filter_kernel, first, following, rows_of_plot, len(self.components), tested
+        )
         return CompiledFilter(compiled, to_numbers(numbers), rows, tested)
 
     def _filter_programs(self, steps: type[Steps], numbers: Any, scene: "Scene", missed: bool) -> tuple[Any, Any, int]:
         """The programs of a filter's first scan and of later ones, and the rows of its state."""
-        from radarsim.kernels import stepped
+        from radarsim.kernels import steps as kernels_steps
 
         programs, state = [], None
         for begins in (True, False):
-            trace = traced.Trace()
-            c, dt, u = trace.plain(stepped.NUMBERS, numbers, stated=True), *self._at_a_scan(trace)
-            z = trace.rows(stepped.PLOT, (0.0,) * len(self.measured), 1)
+            trace = tracing.Trace()
+            c, dt, u = trace.plain(kernels_steps.NUMBERS, numbers, stated=True), *self._at_a_scan(trace)
+            z = trace.rows(kernels_steps.PLOT, (0.0,) * len(self.measured), 1)
             if begins:
                 s = traced_step(steps.start, z, u, c)
             else:
-                predicted = traced_step(steps.predict, trace.rows(stepped.STATE, state), dt, u, c)
+                predicted = traced_step(steps.predict, trace.rows(kernels_steps.STATE, state), dt, u, c)
                 check_same_shape(steps.predict, predicted, state)
                 s = traced_step(steps.update, predicted, z, u, c)
                 check_same_shape(steps.update, s, state)
                 if missed:
-                    s = traced.where(trace.rows(stepped.PLOT, 0.0) > 0.5, s, predicted)
+                    s = tracing.where(trace.rows(kernels_steps.PLOT, 0.0) > 0.5, s, predicted)
             state = s
-            trace.write(stepped.STATE, s)
+            trace.write(kernels_steps.STATE, s)
             components = (0.0,) * len(self.components)
-            true = trace.rows(stepped.PLOT, components, 1 + len(self.measured))
+            true = trace.rows(kernels_steps.PLOT, components, 1 + len(self.measured))
             estimate = traced_step(steps.estimate, s, u, c)
             check_length(steps.estimate, estimate, len(components), "components")
             e = tuple(a - b for a, b in zip(estimate, true, strict=True))
-            counts = trace.rows(stepped.COUNTED, 0.0) > 0.5
-            trace.write(stepped.ERRORS, traced.where(counts, e, (0.0,) * len(e)))
+            counts = trace.rows(kernels_steps.COUNTED, 0.0) > 0.5
+            trace.write(kernels_steps.ERRORS, tracing.where(counts, e, (0.0,) * len(e)))
             if steps.covariance is not None:
                 P = traced_step(steps.covariance, s, u, c)
                 n = len(components)
                 check_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
-                nees, pivot = traced.elimination(P, e)
-                tests = traced.where(pivot > 0.0, (*variances(P, n), nees), (NO_COVARIANCE,) * (n + 1))
-                trace.write(stepped.TESTED, traced.where(counts, tests, (0.0,) * (n + 1)))
+                nees, pivot = small_matrices.eliminate(P, e)
+                tests = tracing.where(pivot > 0.0, (*variances(P, n), nees), (NO_COVARIANCE,) * (n + 1))
+                trace.write(kernels_steps.TESTED, tracing.where(counts, tests, (0.0,) * (n + 1)))
             programs.append(trace.program())
-        return programs[0], programs[1], traced.count(state)
+        return programs[0], programs[1], tracing.count_numbers(state)
 
     def simulate(self, plan: Plan, first: int, count: int) -> np.ndarray:
         values = np.zeros(plan.layout.size)
@@ -337,7 +349,7 @@ class StepStudy(OneFile):
 
         Gives each filter, the number of the first of some realisations and how many they are, and their errors
         (≥ used, K, C), which are valid till the next ones."""
-        from radarsim.kernels.compile import aligned_zeros
+        from radarsim.kernels.compiler import aligned_zeros
         from radarsim.kernels.lanes import WIDTH
 
         nothing = np.zeros((1, 2))
@@ -384,7 +396,6 @@ class StepStudy(OneFile):
             plan.checked["free"] = np.abs(estimate - truth) <= MAX_DIFFERENCE * np.abs(truth).max(axis=0)
         return plan.checked["free"]
 
-    # ---- what is shown -------------------------------------------------------------------------------------------
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         from radarsim.report import tables
 
@@ -392,13 +403,13 @@ class StepStudy(OneFile):
         if any("nees" in result.sums for result in results):
             tested = [result for result in results if "nees" in result.sums]
             tables_of_study["curves"] = self.curves(results)
-            tables_of_study["consistency"] = tables.joined(map(self._consistency, tested))
+            tables_of_study["consistency"] = tables.join_columns(map(self._consistency, tested))
         return tables_of_study
 
     def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
         from radarsim.report import tables
 
-        return tables.joined(map(self._curves, results))
+        return tables.join_columns(map(self._curves, results))
 
     def _curves(self, result: CaseResult) -> Mapping[str, Any]:
         """The curves, with the σ that filters with a covariance predict: the root of its mean variance."""
@@ -412,7 +423,7 @@ class StepStudy(OneFile):
 
     def _consistency(self, result: CaseResult) -> Mapping[str, Any]:
         """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""
-        from radarsim.report import notes, statistics, tables
+        from radarsim.report import consistency_tables, statistics, tables
 
         tested = [
             f
@@ -421,41 +432,40 @@ class StepStudy(OneFile):
         ]
         scans, freedom, n = result.axes.k.size, len(self.components), result.count
         sums = np.asarray(result.sums["nees"])[tested].reshape(-1, 2) / [freedom, freedom**2]
-        bounds = notes.bounds_from_spread(sums[:, 0], sums[:, 1], n, len(sums))
+        bounds = consistency_tables.bounds_from_spread(sums[:, 0], sums[:, 1], n, len(sums))
         means = [statistics.mean_square(total, square, n) for total, square in sums]
         return {
-            **tables.leading(result, np.repeat(tested, scans), np.tile(np.arange(scans), len(tested))),
+            **tables.label_columns(result, np.repeat(tested, scans), np.tile(np.arange(scans), len(tested))),
             "n": np.full(len(sums), n),
-            **notes.normalised("nees", statistics.Estimate(*np.transpose(means)), bounds),
+            **consistency_tables.normalised_square_columns("nees", statistics.Estimate(*np.transpose(means)), bounds),
         }
 
     def figures(
         self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
     ) -> "dict[str, Figure]":
-        from radarsim.report import panels
+        from radarsim.report import consistency_figures
 
         figures = super().figures(results, tables, experiment)
         return (
-            figures | panels.consistency(results, tables["consistency"], experiment)
+            figures | consistency_figures.consistency_figures(results, tables["consistency"], experiment)
             if "consistency" in tables
             else figures
         )
 
-    # ---- recorded plots ------------------------------------------------------------------------------------------
     def columns(self, spec: Any, filter_keys: Any) -> tuple[str, ...]:
         return (*super().columns(spec, filter_keys), *self.known_columns)
 
-    def drawing(self, case: "Case") -> Draw:
+    def drawing(self, case: "Case") -> DrawPlots:
         return self._drawing(self.prepare(case))
 
-    def _drawing(self, plan: Plan) -> Draw:
+    def _drawing(self, plan: Plan) -> DrawPlots:
         from radarsim.kernels.lanes import WIDTH
 
         scans, rows, numbers = plan.axes.k.size, plan.shape[1], len(self.measured)
-        known = plan.known.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)].T
+        known_quantities = plan.known.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)].T
         size = max(1, MAX_ROWS // (scans * rows))
 
-        def draw(first: int, count: int) -> Drawn:
+        def draw(first: int, count: int) -> SimulatedPlots:
             groups = -(-count // WIDTH)
             plots = np.empty((rows, scans, groups, WIDTH))
             for start in range(0, groups, size):
@@ -466,15 +476,16 @@ class StepStudy(OneFile):
             values = plots.reshape(rows, scans, -1)[..., :count].swapaxes(1, 2)
             columns = dict(zip((number.column for number in self.measured), values[1:], strict=False))
             columns |= {
-                name: np.broadcast_to(row, values[0].shape) for name, row in zip(self.known_columns, known, strict=True)
+                name: np.broadcast_to(row, values[0].shape)
+                for name, row in zip(self.known_columns, known_quantities, strict=True)
             }
             truth = values[1 + numbers :].transpose(1, 2, 0)
-            return Drawn(plan.axes.t_s, columns, plan.axes.components, truth, first=first)
+            return SimulatedPlots(plan.axes.t_s, columns, plan.axes.components, truth, first=first)
 
         return draw
 
     def tracker(self, case: "Case") -> "Tracker":
-        with of_study(self.name):
+        with study_context(self.name):
             return Tracker(self, case.spec)
 
 
@@ -482,22 +493,22 @@ class StepStudy(OneFile):
 class Scene:
     """The programs of truth and plots, and `Plan.shape`."""
 
-    first: traced.Program
-    following: traced.Program
+    first: tracing.Program
+    following: tracing.Program
     shape: tuple[int, int, int]
 
 
 @cache
 def cached_kernel(make: Callable[..., Any], *programs: Any) -> Callable[..., None]:
-    """The kernel that a function of `radarsim.kernels.stepped` makes of programs, cached."""
+    """The kernel that a function of `radarsim.kernels.steps` makes of programs, cached."""
     return make(*programs)
 
 
 def draw_plots(plan: Plan, first: int, groups: int) -> np.ndarray:
-    """Truth and plots (groups × K × rows × 8, flat) of realisations from `first` on, see `radarsim.kernels.stepped`."""
-    from radarsim.kernels.compile import aligned_zeros
+    """Truth and plots (groups × K × rows × 8, flat) of realisations from `first` on, see `radarsim.kernels.steps`."""
+    from radarsim.kernels.compiler import aligned_zeros
     from radarsim.kernels.lanes import WIDTH
-    from radarsim.kernels.stepped import STRIP
+    from radarsim.kernels.steps import STRIP
 
     state, rows, pairs = plan.shape
     room = [aligned_zeros(n * WIDTH) for n in (state, STRIP * pairs, STRIP * pairs, 2)]
@@ -506,168 +517,15 @@ def draw_plots(plan: Plan, first: int, groups: int) -> np.ndarray:
     return plots
 
 
-def unit_normal(trace: traced.Trace, n: int) -> traced.Lane:
+def unit_normal(trace: tracing.Trace, n: int) -> tracing.Lane:
     """The unit normal n of a scan."""
-    from radarsim.kernels import stepped
+    from radarsim.kernels import steps
 
-    array = (stepped.FIRST_NORMALS, stepped.SECOND_NORMALS)[n % 2]
-    lane: traced.Lane = trace.rows(array, 0.0, n // 2)
+    array = (steps.FIRST_NORMALS, steps.SECOND_NORMALS)[n % 2]
+    lane: tracing.Lane = trace.rows(array, 0.0, n // 2)
     return lane
 
 
 def to_numbers(numbers: Any) -> np.ndarray:
     """The numbers (n,) of a record and a zero, so that there is at least one."""
-    return np.array([*traced.leaves(numbers), 0.0], dtype=float)
-
-
-# ---- faults of an author's formulas ----------------------------------------------------------------------------------
-def step_numbers(function: Callable[..., Any], *arguments: Any) -> Any:
-    """The result of a step, with whole numbers as numbers of a realisation."""
-    return traced.numbered(call(function, *arguments))
-
-
-def traced_step(function: Callable[..., Any], *arguments: Any) -> Any:
-    """The result of a step on numbers of a realisation, checked to be the same on each call."""
-    result, repeated = (step_numbers(function, *arguments) for _ in range(2))
-    if result is None or isinstance(result, list):
-        raise fault(function, f"must give a tuple of numbers, got {'nothing' if result is None else 'a list'}")
-    if any(isinstance(number, traced.Mask) for number in traced.leaves(result)):
-        raise fault(function, "gives a comparison in place of a number: where(condition, 1.0, 0.0) makes one of it")
-    for numbers in (result, repeated):
-        if wrong := [
-            number
-            for number in traced.leaves(numbers)
-            if not isinstance(number, traced.Lane) and not math.isfinite(number)
-        ]:
-            raise fault(function, f"gives {wrong[0]:g}, which is no number to calculate with")
-    formulas = (
-        [number.index if isinstance(number, traced.Lane) else number for number in traced.leaves(numbers)]
-        for numbers in (result, repeated)
-    )
-    if next(formulas) != next(formulas):
-        raise fault(function, f"{DIFFERENT_FORMULA}: draw by normals")
-    return result
-
-
-def record(function: Callable[..., Any], *arguments: Any) -> Any:
-    """The numbers that an author's function makes of keys; ConfigError where it gives no tuple or named record."""
-    result, repeated = call(function, *arguments), call(function, *arguments)
-    if not isinstance(result, tuple):
-        raise fault(function, f"must give a tuple or a named record, got {type(result).__name__}")
-    numbers = [float(number) for number in traced.leaves(result)]
-    if not np.isfinite(numbers).all():
-        raise fault(function, f"must give finite numbers, got {result!r}"[:200])
-    if numbers != [float(number) for number in traced.leaves(repeated)]:
-        raise fault(function, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
-    return result
-
-
-def to_array(function: Callable[..., Any], values: Any, description: str) -> np.ndarray:
-    """An array (…,) of the numbers that an author's function gives; ConfigError where they are no such numbers."""
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise fault(function, f"must give numbers, {description}, got {values!r}"[:200]) from None
-
-
-def check_length(function: Callable[..., Any], values: Any, count: int, description: str) -> None:
-    """Raise ConfigError where a function does not give this many numbers."""
-    if not isinstance(values, tuple) or traced.count(values) != count or len(values) != count:
-        raise fault(function, f"must give a tuple of {count} numbers ({description}), got {shape(values)}")
-
-
-def variances(P: Sequence[Any], n: int) -> tuple[Any, ...]:
-    """The diagonal of a packed covariance of n components."""
-    return tuple(traced.row_of(P, n, i)[i] for i in range(n))
-
-
-def check_same_shape(function: Callable[..., Any], state: Any, previous: Any) -> None:
-    """Raise ConfigError where a state's shape differs from that of the previous one."""
-    if shape(state) != shape(previous):
-        raise fault(function, f"gives a state of the shape {shape(state)}, the one before has {shape(previous)}")
-
-
-def shape(value: Any) -> str:
-    """A structure with its numbers left out: ((·, ·), ·)."""
-    if isinstance(value, tuple):
-        return f"({', '.join(map(shape, value))})"
-    return "·" if traced.is_number(value) else f"a {type(value).__name__}" if isinstance(value, list) else repr(value)
-
-
-# ---- recorded plots --------------------------------------------------------------------------------------------------
-class Tracker:
-    """The filters of a case over recorded plots, in plain Python, chunk by chunk: each begins with the first plot."""
-
-    most_rows: int | None = None
-    several = False
-
-    def __init__(self, study: "StepStudy", spec: Any):
-        self.study, self.names = study, tuple(filter_keys.name for filter_keys in spec.filters)
-        filter_steps = [study.kinds[filter_keys.kind] for filter_keys in spec.filters]
-        self.filters = [
-            (steps, record(steps.design, spec, filter_keys))
-            for steps, filter_keys in zip(filter_steps, spec.filters, strict=True)
-        ]
-        self.states: list[Any] = [None] * len(self.filters)
-        self.last = math.nan
-
-    def feed(self, columns: "Mapping[str, np.ndarray]") -> Track:
-        with of_study(self.study.name):
-            return self._follow(columns)
-
-    def _follow(self, columns: "Mapping[str, np.ndarray]") -> Track:
-        study, t = self.study, columns["t_s"]
-        plots = np.transpose([columns[number.column] for number in study.measured])
-        known = np.reshape([columns[name] for name in study.known_columns], (-1, t.size)).T
-        values = np.full((len(self.filters), t.size, 2, len(study.components)), np.nan)
-        for n in range(t.size):
-            z, u = tuple(map(float, plots[n])), tuple(map(float, known[n]))
-            for f, (steps, c) in enumerate(self.filters):
-                s = previous = self.states[f]
-                if s is not None:
-                    s = self._next(n, steps.predict, previous, s, float(t[n] - self.last), u, c)
-                if not any(map(math.isnan, z)):
-                    step, step_arguments = (steps.start, (z, u, c)) if s is None else (steps.update, (s, z, u, c))
-                    s = self._next(n, step, previous, *step_arguments)
-                self.states[f] = s
-                if s is not None:
-                    m = len(study.components)
-                    values[f, n, 0] = self._numbers(n, steps.estimate, m, "components", s, u, c)
-                    if steps.covariance is not None:
-                        description = "elements of a packed covariance"
-                        P = self._numbers(n, steps.covariance, m * (m + 1) // 2, description, s, u, c)
-                        if min(variance := variances(P, m)) < 0:
-                            raise refusal(n, steps.covariance, f"gives a variance of {min(variance):g}")
-                        values[f, n, 1] = np.sqrt(variance)
-            self.last = float(t[n])
-        components = tuple((component.name, component.unit) for component in study.components)
-        return Track(self.names, components, t, values[:, :, 0], values[:, :, 1])
-
-    def _next(self, row: int, step: Callable[..., Any], previous: Any, *step_arguments: Any) -> Any:
-        """The state after a step at a row, of the shape of the one before, if any."""
-        with np.errstate(all="ignore"):
-            state = step_numbers(step, *step_arguments)
-        if previous is not None:
-            check_same_shape(step, state, previous)
-        return check_finite(row, step, state)
-
-    def _numbers(self, row: int, step: Callable[..., Any], count: int, description: str, *step_arguments: Any) -> Any:
-        """A given number of numbers from a step at a row."""
-        with np.errstate(all="ignore"):
-            numbers = step_numbers(step, *step_arguments)
-        check_length(step, numbers, count, description)
-        return check_finite(row, step, numbers)
-
-
-def check_finite(row: int, step: Callable[..., Any], result: Any) -> Any:
-    """The result of a step; raises PlotFault with the row where a number of it is not finite."""
-    if wrong := [number for number in traced.leaves(result) if not math.isfinite(number)]:
-        raise refusal(row, step, f"gives {wrong[0]:g}")
-    return result
-
-
-def refusal(row: int, step: Callable[..., Any], words: str) -> PlotFault:
-    """Why a filter cannot continue after a row."""
-    error = PlotFault(*fault(step, words).lines)
-    error.row = row
-    return error
+    return np.array([*tracing.leaves(numbers), 0.0], dtype=float)

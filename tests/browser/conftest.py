@@ -2,7 +2,7 @@
 
 import pytest
 
-from radarsim.app import run
+from radarsim.api import run
 from tests.browser.chromium import Chromium, found
 
 

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from radarsim.app.compare import chart
-from radarsim.studies.range_doppler import filters
-from radarsim.studies.range_doppler.filters import Plots
+from radarsim.api.doppler_chart import chart
+from radarsim.studies.range_doppler import closed_form, error_recursion, filter_design
+from radarsim.studies.range_doppler.error_recursion import Plots
 from tests.browser.test_report import CONTRAST, NAMES
 from tests.tolerances import assert_rounded
 
@@ -25,8 +25,8 @@ def live(tmp_path_factory):
 def sigmas(observes, start, r, v, dt, dm, k):
     """σ (k, 3) by the package, not-a-number where there is no estimate."""
     sigma = np.array([r, v])
-    design = filters.design(observes, start, dm, sigma, dt, k)
-    _, S = filters.error_recursion(design, Plots(sigma), np.zeros((k, 3)), dt)
+    design = filter_design.design(observes, start, dm, sigma, dt, k)
+    _, S = error_recursion.error_recursion(design, Plots(sigma), np.zeros((k, 3)), dt)
     return np.where(design.available, np.sqrt(np.diagonal(S, axis1=1, axis2=2)), np.nan)
 
 
@@ -54,8 +54,8 @@ def test_two_hundred_random_radars_are_those_of_python(page, live):
         np.testing.assert_allclose(two, expected[1], rtol=STATED)
         np.testing.assert_allclose(1 - gain / 100, expected[1] / expected[0], rtol=2 * STATED)
         numbers = page.evaluate(f"radar.numbers({json.dumps(asked)})")
-        assert_rounded(numbers["c"], filters.groups(r, v, dt, dm).c, operations=12)
-        assert_rounded(numbers["limit"], filters.steady_gains(numbers["c"]), size=100, operations=60)
+        assert_rounded(numbers["c"], closed_form.dimensionless_groups(r, v, dt, dm).c, operations=12)
+        assert_rounded(numbers["limit"], closed_form.steady_gains(numbers["c"]), size=100, operations=60)
 
 
 def test_it_loads_offline_without_a_word_in_the_console(page, live):

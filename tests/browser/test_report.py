@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from radarsim.app import run
+from radarsim.api import run
 
 pytestmark = pytest.mark.slow
 LARGEST = 1_500_000  # bytes

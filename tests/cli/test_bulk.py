@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import run
-from radarsim.recorded import follow
+from radarsim.api import load_experiments
+from radarsim.recordings import bulk_plots
 from tests.program import command
 
 CLUTTER = "sweep.sensor.false_plots_per_km2=[0.03]"
@@ -16,7 +16,7 @@ CLUTTER = "sweep.sensor.false_plots_per_km2=[0.03]"
 @pytest.fixture
 def small(monkeypatch):
     """Batches of eight, so that a few realisations are several."""
-    monkeypatch.setattr(follow, "NUMBERS_PER_DRAW", 1)
+    monkeypatch.setattr(bulk_plots, "NUMBERS_PER_DRAW", 1)
 
 
 @pytest.mark.parametrize(("config", "overrides"), [("rls2", ()), ("sonar_clutter", (CLUTTER,))])
@@ -70,9 +70,9 @@ def test_what_is_stopped_leaves_what_was_there(tmp_path, small, name):
         if done > 8:
             raise KeyboardInterrupt
 
-    (loaded,) = run.load_all(["rls2"], ())
+    (loaded,) = load_experiments.load_all(["rls2"], ())
     with pytest.raises(KeyboardInterrupt):
-        follow.write_many(loaded, 40, 0, tmp_path / name, stopped)
+        bulk_plots.write_realisations(loaded, 40, 0, tmp_path / name, stopped)
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [(name, "mine")]
 
 

@@ -3,7 +3,7 @@
 import pytest
 from click.shell_completion import ShellComplete
 
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 
 
 def offered(*words, last):

@@ -7,11 +7,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from radarsim.cli import console, outcomes
-from radarsim.config import document
+from radarsim.cli import console, print_results
+from radarsim.cli import progress as cli_progress
+from radarsim.config import find_files
 from radarsim.papers.claims_table import CLASS_COLUMNS
 from radarsim.papers.print_claims import print_claims
-from radarsim.report import notes
+from radarsim.report import interval_notes, wording
 from radarsim.report.wording import significant_digits
 from radarsim.threads import limited
 from tests.program import Terminal, command
@@ -34,8 +35,8 @@ def test_numbers_of_tables_are_those_of_sentences(value, form, text):
 
 
 def test_a_number_that_is_not_known_has_no_unit():
-    assert outcomes.known(np.nan, ".2f", " %") == ""
-    assert outcomes.known(3.0, ".2f", " %") == "3.00 %"
+    assert wording.format_if_known(np.nan, ".2f", " %") == ""
+    assert wording.format_if_known(3.0, ".2f", " %") == "3.00 %"
 
 
 def test_claims_without_results_say_where_to_find_them(tmp_path):
@@ -103,7 +104,7 @@ def test_every_claim_is_one_line_of_a_terminal(monkeypatch):
     ],
 )
 def test_sentences_are_broken_between_words_and_never_within_a_number(line):
-    broken = console.wrapped(line, 40)
+    broken = console.wrap_line(line, 40)
     assert " ".join(part.strip() for part in broken).split() == line.split()
     assert all(len(part) <= 40 for part in broken)
     assert not any(part.rstrip().endswith(("140", "189.8", "18.27")) for part in broken)  # a unit stays with its number
@@ -116,7 +117,9 @@ def test_a_table_says_which_columns_it_leaves_out(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stdout", screen)
     columns = ("case", "sigma", "95 %", "exact")
-    console.show("", columns, [("rls2", "189.8 m", "188.1 m … 191.5 m", "189.7 m")], spare=("at", "exact", "95 %"))
+    console.print_table(
+        "", columns, [("rls2", "189.8 m", "188.1 m … 191.5 m", "189.7 m")], spare=("at", "exact", "95 %")
+    )
     assert "left out at 40 columns: exact" in screen.getvalue()
     assert "188.1 m … 191.5 m" in screen.getvalue()
 
@@ -127,9 +130,15 @@ def test_a_narrow_table_leaves_out_what_is_there(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stdout", screen)
     row = {"filter": "f", "case": "a", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": math.nan, "note": ""}
-    row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_note": str(notes.HEAVY), "n_eff": 900.0}
+    row |= {
+        "sigma": 1.5,
+        "sigma_lo": 1.0,
+        "sigma_hi": 2.0,
+        "gain_note": str(interval_notes.HEAVY_TAILS),
+        "n_eff": 900.0,
+    }
     last = pd.DataFrame([row | {"gain_percent": 3.25, "gain_lo": 1.0, "gain_hi": 5.0}])
-    outcomes.show_rows("a", last, {"a": "a"})
+    print_results.print_last_scan_rows("a", last, {"a": "a"})
     assert "3.25 %" in screen.getvalue()
     assert "left out at 40 columns: 95 %" in screen.getvalue()
 
@@ -137,25 +146,25 @@ def test_a_narrow_table_leaves_out_what_is_there(monkeypatch):
 def test_a_bar_moves_within_a_second_though_nothing_is_reported(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
-    with console.Progress("rls2", quiet=False) as progress:
+    with cli_progress.Progress("rls2", quiet=False) as progress:
         progress.timer.join(5)
         assert progress.bar is not None
         assert progress.bar.tasks[0].total is None
         progress.update(50, 200, 0)
         assert (progress.bar.tasks[0].total, progress.bar.tasks[0].completed) == (200, 50)
-    assert console.SILENT_S < 1
+    assert cli_progress.SILENT_S < 1
 
 
 def test_without_threads_a_bar_begins_with_the_first_report(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr("sys.stderr", screen)
     monkeypatch.setattr("threading.Thread.start", None)
-    monkeypatch.setattr(console, "SILENT_S", 0)
-    with limited(0), console.Progress("rls2", quiet=False) as progress:
+    monkeypatch.setattr(cli_progress, "SILENT_S", 0)
+    with limited(0), cli_progress.Progress("rls2", quiet=False) as progress:
         progress.update(50, 200, 0)
         assert (progress.bar.tasks[0].total, progress.bar.tasks[0].completed) == (200, 50)
         assert "25.0 %" in screen.getvalue()
-    with limited(0), console.Counter("tracking", "rows") as counter:
+    with limited(0), cli_progress.CountedProgress("tracking", "rows") as counter:
         counter.update(50)
         assert "tracking: 50 rows" in screen.getvalue()
 
@@ -166,8 +175,8 @@ def test_no_time_left_is_shown_while_the_rate_changes(monkeypatch, later, left):
     screen, now = Terminal(), [0.0]
     monkeypatch.setattr("sys.stderr", screen)
     monkeypatch.setattr("time.monotonic", lambda: now[0])
-    monkeypatch.setattr(console, "SILENT_S", 0)
-    with limited(0), console.Counter("fitting", "likelihoods") as counter:
+    monkeypatch.setattr(cli_progress, "SILENT_S", 0)
+    with limited(0), cli_progress.CountedProgress("fitting", "likelihoods") as counter:
         for k in range(1, 11):
             now[0] = float(k)
             screen.seek(0)
@@ -185,10 +194,10 @@ def test_list_is_one_screen_and_takes_words(tmp_path, monkeypatch):
         return result.stdout if code == 0 else result.stderr
 
     shown = listed().splitlines()
-    assert sum(len(console.wrapped(line, 80)) for line in shown) <= 24
+    assert sum(len(console.wrap_line(line, 80)) for line in shown) <= 24
     assert [line.split("  ")[0] for line in shown[1:5]] == ["P1", "P2", "P3", "P4"]
     names = [name for line in shown[1:5] for name in line[4:].split(", ")]
-    assert sorted(names) == list(document.stems("configs"))
+    assert sorted(names) == list(find_files.available_stems("configs"))
     assert {"rls2", "ambiguous", "orders"} <= set(shown[1][4:].split(", "))
     assert shown[0].startswith(f"{len(names)} configs ")
     titles = [line for line in listed("P2").splitlines() if line.startswith(("Configs", "Scenarios", "Studies"))]
@@ -207,13 +216,13 @@ def test_every_marked_interval_is_marked_on_the_terminal(capsys):
     row = {"case": "a", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": float("nan"), "n_eff": 900.0}
     row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_percent": 3.0, "gain_lo": 1.0, "gain_hi": 5.0}
     said = [
-        {"filter": "f", "note": str(notes.HEAVY), "gain_note": str(notes.HEAVY)},
-        {"filter": "g", "note": "rarer ones may decide", "gain_note": str(notes.ALIKE)},
-        {"filter": "h", "note": "", "gain_note": str(notes.HEAVY)},  # the baseline has few
+        {"filter": "f", "note": str(interval_notes.HEAVY_TAILS), "gain_note": str(interval_notes.HEAVY_TAILS)},
+        {"filter": "g", "note": "rarer ones may decide", "gain_note": str(interval_notes.ALIKE_FILTERS)},
+        {"filter": "h", "note": "", "gain_note": str(interval_notes.HEAVY_TAILS)},  # the baseline has few
         {"filter": "i", "note": "", "gain_note": ""},
         {"filter": "j", "note": "", "gain_note": float("nan"), "gain_lo": float("nan"), "gain_hi": float("nan")},
     ]
-    outcomes.show_rows("a", pd.DataFrame([row | own for own in said]), {"a": "a"})
+    print_results.print_last_scan_rows("a", pd.DataFrame([row | own for own in said]), {"a": "a"})
     *lines, tails, other = capsys.readouterr().out.splitlines()[2:]
     assert [re.findall(r"[*†]", line) for line in lines] == [["*"] * 2, ["†"] * 2, ["*"], [], []]
     assert tails.split(maxsplit=2)[:2] == ["*", "heavy"]
@@ -225,7 +234,7 @@ def test_a_table_has_no_empty_columns_and_says_once_what_all_rows_have(capsys):
     row = {"case": "a b=1", "component": "x", "t_s": 1.0, "unit": "m", "exact_sigma": math.nan, "note": ""}
     row |= dict.fromkeys(("gain_percent", "gain_lo", "gain_hi"), math.nan)
     row |= {"sigma": 1.5, "sigma_lo": 1.0, "sigma_hi": 2.0, "gain_note": math.nan}
-    outcomes.show_rows("a", pd.DataFrame([row | {"filter": name} for name in "fg"]), {"a b=1": "b = 1"})
+    print_results.print_last_scan_rows("a", pd.DataFrame([row | {"filter": name} for name in "fg"]), {"a b=1": "b = 1"})
     title, head, *lines = capsys.readouterr().out.splitlines()
     assert title.strip() == "a, b = 1, 1 s"
     assert head.split() == ["filter", "component", "sigma", "95", "%"]

@@ -6,11 +6,11 @@ import signal
 import pytest
 from click.testing import CliRunner
 
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
-from radarsim.app.run import case_result
-from radarsim.cli import main
-from radarsim.engine.run import collect
+from radarsim.api.case_results import case_result
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
+from radarsim.cli.command_group import main
+from radarsim.engine.collect import collect
 from radarsim.report.quantities import FLOORS
 from radarsim.studies import registry
 from tests.cli.test_stopped import ended_by

@@ -2,11 +2,11 @@
 
 import pytest
 
-from radarsim.app import configs
+from radarsim.api import configs
 from radarsim.errors import ConfigError
 from tests.program import command
-from tests.recorded import whole
-from tests.recorded.test_plots import CHOICES, faults
+from tests.recordings import whole
+from tests.recordings.test_plots import CHOICES, faults
 
 COLUMNS = "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got "
 

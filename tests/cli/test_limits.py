@@ -9,14 +9,12 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import ahead
-from radarsim.app import result as output
-from radarsim.app import run as writing
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
-from radarsim.app.run import case_result
-from radarsim.engine import run as stopping
-from radarsim.engine.run import collect
+from radarsim.api import progress, result_content, writing_time
+from radarsim.api.case_results import case_result
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
+from radarsim.engine import stopping
+from radarsim.engine.collect import collect
 from radarsim.errors import TargetUnmet
 from tests.program import command, csv_bytes, record
 from tests.tolerances import assert_rounded
@@ -29,7 +27,7 @@ def few(case):
     one = load("range_doppler", ["realisations=2000", "figures=[]"])
     work = CaseWork(case)
     result = case_result(case, work, collect(work, 2))
-    return [result], output.case_tables([result], stem=one.stem), one
+    return [result], result_content.case_tables([result], stem=one.stem), one
 
 
 def half_widths(folder):
@@ -182,13 +180,13 @@ def test_a_limit_leaves_time_for_tables_and_figures(monkeypatch):
 @pytest.mark.parametrize(("figures", "overrides"), [(True, []), (False, []), (True, ["figures=[]"])])
 def test_what_writing_takes_is_measured_by_case_and_figure(monkeypatch, figures, overrides):
     ticks = iter(range(100))
-    monkeypatch.setattr(writing.time, "perf_counter", lambda: float(next(ticks)))
+    monkeypatch.setattr(writing_time.time, "perf_counter", lambda: float(next(ticks)))
     saved = []
-    monkeypatch.setattr("radarsim.report.figures.draw", lambda *given: saved.append(given))
+    monkeypatch.setattr("radarsim.report.drawing.canvas.draw", lambda *given: saved.append(given))
     experiment = load("range_doppler", ["realisations=2000", *overrides])
-    found = writing.seconds(experiment, figures, None)
+    found = writing_time.writing_seconds(experiment, figures, None)
     assert len(saved) == 2 * figures
-    names = len(experiment.figures or output.case_figures(*few(experiment.cases[0])))
+    names = len(experiment.figures or result_content.case_figures(*few(experiment.cases[0])))
     assert found == 1.25 * (len(experiment.cases) + (0.5 * names if figures else 0))
 
 
@@ -359,9 +357,9 @@ def test_a_pilot_that_saw_large_errors_foretells_where_a_run_ends(tmp_path):
 @pytest.mark.parametrize("chunk", [1, 8, 512])
 def test_a_pilot_knows_that_kernels_calculate_chunks(monkeypatch, chunk):
     """One realisation costs as much as a chunk of them, and stands for no more than its share."""
-    monkeypatch.setattr(ahead, "timed", lambda work, count: 0.02 * -(-count // chunk))
+    monkeypatch.setattr(progress, "measure_seconds", lambda work, count: 0.02 * -(-count // chunk))
     for pilot_s in (0.3, 0.06):
-        seconds = ahead.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
+        seconds = progress.seconds_each(SimpleNamespace(block=4096), 100_000, pilot_s)
         assert_rounded(seconds, 0.02 / chunk, operations=4)
 
 

@@ -10,7 +10,8 @@ import shutil
 import numpy as np
 import pytest
 
-from radarsim.app import doctor
+from radarsim.api import case_work
+from radarsim.api.maintenance import doctor, self_test
 from tests.engine.test_audit import damage
 from tests.engine.test_damage import reforged
 from tests.program import command, csv_bytes, record
@@ -27,7 +28,7 @@ def made(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def no_waiting(monkeypatch):
     """Outputs that look altered are looked at again without the pause for a run beside us."""
-    monkeypatch.setattr(doctor, "LOOK_S", 0)
+    monkeypatch.setattr(doctor, "ATTEMPT_INTERVAL_S", 0)
 
 
 @pytest.fixture
@@ -62,12 +63,12 @@ def test_a_hundred_of_a_hundred_damaged_files_are_named_and_come_again(out):
     identity = record(out / "rls2")["identities"]["rls2"]
     outputs = [path for path in (out / "rls2").iterdir() if path.name != "run.json"]
     files = [*(path for path in block_files(out) if identity in str(path)), *outputs]
-    from radarsim.app.doctor import inspected
+    from radarsim.api.maintenance.doctor import inspect_result
 
     for _ in range(100):
         path = draw.choice(files)
         kind = damage(path, draw)
-        faults = inspected(out / "rls2").faults
+        faults = inspect_result(out / "rls2").faults
         assert [fault.split(":")[0] for fault in faults] == [str(path)], (kind, path, faults)
         path.write_bytes(good[path])
     for path in files:
@@ -182,7 +183,7 @@ def test_blocks_that_another_user_may_have_written_are_named_by_doctor_and_repor
 
 
 def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
-    monkeypatch.setattr(doctor.CaseWork, "identity", "ab12")
+    monkeypatch.setattr(case_work.CaseWork, "identity", "ab12")
     command("doctor", out / "rls2")
     assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=2).stderr
 
@@ -196,8 +197,8 @@ def altered(tables, column, change):
 
 
 def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
-    made = {name: (doctor.KNOWN / f"discriminator.{name}.csv").read_bytes() for name in doctor.TABLES}
-    assert doctor.verdict("discriminator", made, True).words == "the known bytes"
+    made = {name: (self_test.KNOWN_FOLDER / f"discriminator.{name}.csv").read_bytes() for name in self_test.TABLES}
+    assert self_test.verdict("discriminator", made, True).words == "the known bytes"
     # Rounding is forgiven as far as its conditioning allows.
     for column, factor, sound in (
         ("sigma", 1 + 1e-10, True),
@@ -210,32 +211,34 @@ def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
     ):
         changed = altered(made, column, lambda value, factor=factor: value * factor)
         for same_platform in (True, False):
-            assert doctor.verdict("discriminator", changed, same_platform).good is sound, (column, factor)
+            assert self_test.verdict("discriminator", changed, same_platform).good is sound, (column, factor)
         if sound:
-            assert "not the known bytes" in doctor.verdict("discriminator", changed, True).words
+            assert "not the known bytes" in self_test.verdict("discriminator", changed, True).words
     for spoiled in (made["curves"].replace(b"cured", b"cursed"), made["curves"][: len(made["curves"]) // 2]):
-        assert not doctor.verdict("discriminator", made | {"curves": spoiled}, False).good
-    monkeypatch.setattr(doctor, "verdicts", lambda: [doctor.Verdict("sonar", False, "differs")])
+        assert not self_test.verdict("discriminator", made | {"curves": spoiled}, False).good
+    monkeypatch.setattr(self_test, "verdicts", lambda: [self_test.Verdict("sonar", False, "differs")])
     assert "self-test: sonar: differs" in command("doctor", code=4).stderr
 
 
 def test_the_tolerances_are_what_conditioning_allows():
     """κ of the known case's balanced information, times half a rounding, and no more than a few times that."""
-    from radarsim.app.configs import load
-    from radarsim.bursts.burst import fisher
-    from radarsim.studies.discriminator.study import burst_of
+    from radarsim.api.configs import load
+    from radarsim.bursts.fisher import fisher
+    from radarsim.studies.discriminator.scenario import configured_burst
 
-    burst = burst_of(load(doctor.KNOWN / "discriminator.yaml").cases[0].spec)
+    burst = configured_burst(load(self_test.KNOWN_FOLDER / "discriminator.yaml").cases[0].spec)
     information = fisher(burst, 5, burst.duration_s)
     scale = np.sqrt(np.diag(information))
     rounding = np.linalg.cond(information / np.outer(scale, scale)) * np.finfo(float).eps / 2
-    assert rounding < doctor.TOLERANCES["discriminator"].exact < 10 * rounding
+    assert rounding < self_test.TOLERANCES["discriminator"].exact < 10 * rounding
 
 
 def test_doctor_names_the_machine_and_passes_its_self_test():
     told = json.loads(command("doctor", "--json").stdout)
     assert {"machine", "instructions", "threads", "cache", "versions", "cluster"} <= told.keys()
-    assert [(one["study"], one["good"]) for one in told["self-test"]] == [(study, True) for study in doctor.TOLERANCES]
+    assert [(one["study"], one["good"]) for one in told["self-test"]] == [
+        (study, True) for study in self_test.TOLERANCES
+    ]
 
 
 def test_clean_drops_blocks_and_nothing_else(out):

@@ -12,17 +12,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.app import configs, run
-from radarsim.app.case_work import CaseWork
-from radarsim.cli import group, main
-from radarsim.config import document
-from radarsim.config.experiment import canonical
+from radarsim.api import configs, load_experiments
+from radarsim.api.case_work import CaseWork
+from radarsim.cli import command_group
+from radarsim.cli.command_group import main
+from radarsim.config import find_files
+from radarsim.config.identity import identity_keys
 from radarsim.errors import ConfigError
-from radarsim.recorded import follow, plots
-from radarsim.recorded import page as accuracy
-from radarsim.studies.range_doppler import track as range_doppler_plots
+from radarsim.recordings import csv_rows, read_plots, simulate_plots, study_part, track, track_rows
+from radarsim.recordings.report import innovation_tests
+from radarsim.studies.range_doppler import tracking
 from tests.program import command
-from tests.recorded import whole
+from tests.recordings import whole
 from tests.tolerances import Z, assert_rounded, rounding
 
 RUNS = {  # config, overrides
@@ -37,7 +38,7 @@ RUNS = {  # config, overrides
 
 
 def loaded(config, overrides=()):
-    return run.load_all([config], overrides)[0]
+    return load_experiments.load_all([config], overrides)[0]
 
 
 def table_of(path):
@@ -62,9 +63,9 @@ def track_rounding(track):
 @pytest.mark.parametrize("realisation", [0, 4099])
 def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, config, realisation):
     one = loaded(config, RUNS[config])
-    columns = follow.simulated(one, realisation)
+    columns = simulate_plots.simulate_realisation(one, realisation)
     path = tmp_path / "plots.csv"
-    plots.write_columns(columns, path)
+    csv_rows.write_columns(columns, path)
     case, track = whole.track(one, path)
     work = CaseWork(case)
     sums = work.plan.layout.unpack(work.simulate(realisation, 1))
@@ -80,12 +81,12 @@ def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, con
 @pytest.mark.parametrize("config", ["rls2", "multimodel"])
 def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
     one = loaded(config, ("scans=300",))
-    columns = follow.simulated(one)
+    columns = simulate_plots.simulate_realisation(one)
     rng = np.random.default_rng(5)
     measured = [name for name in columns if not name.startswith("true_")][1:]
     for name in measured:
         columns[name] = np.where(rng.random(300) < 0.2, np.nan, columns[name])
-    study = follow.recording_interface(one.cases[0])
+    study = study_part.recording_interface(one.cases[0])
     wanted = {name: columns[name] for name in ("t_s", *measured)}
     whole = study.tracker(one.cases[0]).feed(wanted)
     for size in (1, 7, 299):
@@ -93,7 +94,7 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
         pieces = [
             tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
         ]
-        parts = follow.join_tracks(pieces)
+        parts = track_rows.join_tracks(pieces)
         scale = np.where(whole.sigma > 0, whole.sigma, 1.0)
         assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(whole.estimate))
         assert np.nanmax(np.abs(parts.estimate - whole.estimate) / scale) < track_rounding(whole)
@@ -108,7 +109,7 @@ def test_uneven_times_and_missing_values_are_least_squares_without_a_manoeuvre()
     z[rng.random(z.shape) < 0.3] = np.nan
     z[0] = 1e5, -250
     columns = {"t_s": t, "range_m": z[:, 0], "velocity_mps": z[:, 1]}
-    track = follow.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = study_part.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
     s = t - t[-1]
     rows = [np.stack([np.ones(60), s, s**2 / 2], axis=1) / 250, np.stack([np.zeros(60), np.ones(60), s], axis=1) / 15]
     for f, observed in enumerate((1, 2)):
@@ -126,7 +127,7 @@ def test_a_row_without_a_value_is_extrapolated():
     one = loaded("rls2")
     columns = {"t_s": np.array([0.0, 10, 20, 30, 47]), "range_m": np.array([1e5, 9.7e4, 9.4e4, 9.1e4, np.nan])}
     columns["velocity_mps"] = np.array([-300.0, -300, -300, -300, np.nan])
-    track = follow.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = study_part.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
     for f in range(2):
         r, v, a = track.estimate[f, 3]
         expected = [r + 17 * v + 17**2 / 2 * a, v + 17 * a, a]
@@ -137,10 +138,10 @@ def test_a_row_without_a_value_is_extrapolated():
 
 def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
     one = loaded("rls2")
-    monkeypatch.setattr(range_doppler_plots, "LONGEST_START", 40)
+    monkeypatch.setattr(tracking, "MAX_START_PLOTS", 40)
     t = np.arange(150.0)  # more than a start looks back
     columns = {"t_s": t, "range_m": np.full(150, np.nan), "velocity_mps": np.full(150, 7.0)}
-    track = follow.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
+    track = study_part.recording_interface(one.cases[0]).tracker(one.cases[0]).feed(columns)
     assert np.isnan(track.estimate[0]).all()
     assert np.array_equal(np.isfinite(track.estimate[1]), np.tile([False, True, False], (150, 1)))
 
@@ -148,8 +149,8 @@ def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
 def followed(tmp_path, config, overrides, stated=()):
     one = loaded(config, overrides)
     path = tmp_path / "plots.csv"
-    plots.write_columns(follow.simulated(one), path)
-    return follow.follow(loaded(config, (*overrides, *stated)), path)
+    csv_rows.write_columns(simulate_plots.simulate_realisation(one), path)
+    return track.track_plots(loaded(config, (*overrides, *stated)), path)
 
 
 @pytest.mark.slow_cases("*sonar_smoothing*")
@@ -165,20 +166,24 @@ def followed(tmp_path, config, overrides, stated=()):
 def test_a_wrong_accuracy_is_seen(tmp_path, config, overrides, key, true, factor):
     found = followed(tmp_path, config, overrides, (f"{key}={true * factor!r}",))
     name = {"sigma_range_m": "range_m", "sigma_velocity_mps": "velocity_mps"}.get(key.split(".")[1], "bearing_rad")
-    judged = [one for one in accuracy.judged(found) if one.name == name and one.tests]
+    judged = [one for one in innovation_tests.innovation_tests(found) if one.name == name and one.tests]
     assert judged
     for one in judged:
-        assert one.verdict == (accuracy.TOO_SMALL if factor < 1 else accuracy.TOO_LARGE)
+        assert one.verdict == (innovation_tests.TOO_SMALL if factor < 1 else innovation_tests.TOO_LARGE)
 
 
 def test_a_right_accuracy_is_called_so(tmp_path):
     found = followed(tmp_path, "multimodel", ("scans=3000",))
-    verdicts = {one.filter: one for one in accuracy.judged(found)}
-    assert verdicts["Kalman-1 5"].verdict == accuracy.TOO_SMALL  # its model lags behind a target that falls
+    verdicts = {one.filter: one for one in innovation_tests.innovation_tests(found)}
+    assert verdicts["Kalman-1 5"].verdict == innovation_tests.TOO_SMALL  # its model lags behind a target that falls
     assert 0.9 < verdicts["MMA2-122"].nis < 1.1
     for scans in (8, 4):
-        few = [one for one in accuracy.judged(followed(tmp_path, "rls2", (f"scans={scans}",))) if one.tests]
-        assert {one.verdict for one in few} == {accuracy.TOO_FEW_PLOTS}
+        few = [
+            one
+            for one in innovation_tests.innovation_tests(followed(tmp_path, "rls2", (f"scans={scans}",)))
+            if one.tests
+        ]
+        assert {one.verdict for one in few} == {innovation_tests.TOO_FEW_PLOTS}
         assert all(0 <= one.lo < 1 < one.hi for one in few)
 
 
@@ -270,7 +275,7 @@ def test_times_are_judged_across_pieces_of_a_file(tmp_path, monkeypatch):
     path = tmp_path / "plots.csv"
     path.write_text("t_s,range_m,velocity_mps\n" + "".join(f"{t},1e5,1\n" for t in (0, 1, 2, 2, 3)))
     with pytest.raises(ConfigError, match=r":5:1: t_s: must be later than the row before, got 2 after 2"):
-        list(plots.pieces(path, [("t_s", "range_m", "velocity_mps")], 3))
+        list(read_plots.pieces(path, [("t_s", "range_m", "velocity_mps")], 3))
 
 
 def advised(fault):
@@ -312,7 +317,7 @@ for i in range(int(sys.argv[1])):
 """
 PEAK = """
 import resource, sys
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 try:
     main(["track", "rls2", "/dev/stdin", "-o", "/dev/null"])
 finally:
@@ -362,11 +367,11 @@ def test_the_page_names_a_config_for_every_example_file(tmp_path):
         command("track", first, Path("docs/examples") / name, *options, "-o", tmp_path / "track.csv")
 
 
-@pytest.mark.parametrize("like", document.stems("configs"))
+@pytest.mark.parametrize("like", find_files.available_stems("configs"))
 def test_a_config_of_ones_own_is_the_same_experiment(tmp_path, like):
     path = configs.new("mine", like, tmp_path)
     mine, theirs = configs.load(str(path)), configs.load(like)
-    assert [canonical(case.spec) for case in mine.cases] == [canonical(case.spec) for case in theirs.cases]
+    assert [identity_keys(case.spec) for case in mine.cases] == [identity_keys(case.spec) for case in theirs.cases]
     assert [(case.realisations, case.seed) for case in mine.cases] == [(c.realisations, c.seed) for c in theirs.cases]
 
 
@@ -386,14 +391,14 @@ def test_new_comments_every_key_and_never_overwrites(tmp_path, monkeypatch):
 
 def test_help_is_grouped_with_one_whole_line_for_each_command():
     text = command("--help").stdout
-    order = [text.index(f"\n{title}:\n") for title in group.command_sections()]
+    order = [text.index(f"\n{title}:\n") for title in command_group.command_sections()]
     assert order == sorted(order)
-    listed = [name for names in group.command_sections().values() for name in names]
-    assert set(main.commands) == {*listed, *group.UNLISTED}
+    listed = [name for names in command_group.command_sections().values() for name in names]
+    assert set(main.commands) == {*listed, *command_group.UNLISTED}
     *lines, unlisted = [line for line in text[order[0] :].split("\n") if line]
-    assert len(lines) == len(group.command_sections()) + len(listed)
-    assert ", ".join(group.UNLISTED) in unlisted
-    assert all("Usage: " in command(name, "--help").stdout for name in group.UNLISTED)
+    assert len(lines) == len(command_group.command_sections()) + len(listed)
+    assert ", ".join(command_group.UNLISTED) in unlisted
+    assert all("Usage: " in command(name, "--help").stdout for name in command_group.UNLISTED)
     assert not any("..." in line or len(line) > 80 for line in lines)
 
 

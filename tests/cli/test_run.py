@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 from tests.program import command, csv_bytes, newcomer, record
 
 CURVES = (
@@ -57,10 +57,10 @@ def test_same_bytes_with_more_threads_when_extended_and_of_fewer_realisations_af
 @pytest.mark.slow
 def test_the_command_that_a_run_names_shows_the_claims_of_that_run(tmp_path):
     """Of any directory of results and a config of one's own, as of the shipped ones."""
-    from radarsim.config import document
+    from radarsim.config import find_files
 
     mine, out = tmp_path / "mine.yaml", tmp_path / "my results"
-    mine.write_text((document.SHIPPED / "configs/rls2.yaml").read_text())
+    mine.write_text((find_files.SHIPPED / "configs/rls2.yaml").read_text())
     for config in ("rls2", mine):
         said = command("run", config, "-n", 300, "--out", out, "--no-figures").output
         for _ in range(2):  # the command that it names, and that which this one names

@@ -10,8 +10,8 @@ import sys
 import pytest
 from click.testing import CliRunner
 
-from radarsim.cli import main
-from radarsim.language import VARIABLE
+from radarsim.cli.command_group import main
+from radarsim.language.current import VARIABLE
 from tests.program import command, csv_bytes, newcomer
 from tests.warm import ROOT, Start
 

@@ -6,8 +6,9 @@ import re
 
 import pytest
 
-from radarsim.cli import console, main
-from radarsim.language import VARIABLE
+from radarsim.cli import progress as cli_progress
+from radarsim.cli.command_group import main
+from radarsim.language.current import VARIABLE
 from tests.language.test_russian import NAMES, untranslated
 from tests.program import Terminal
 
@@ -56,7 +57,7 @@ def shown(monkeypatch, *arguments):
     with monkeypatch.context() as patch:
         patch.setattr("sys.stdout", out)
         patch.setattr("sys.stderr", err)
-        patch.setattr(console, "SILENT_S", 1e6)
+        patch.setattr(cli_progress, "SILENT_S", 1e6)
         with pytest.raises(SystemExit):
             main(list(arguments))
     return [re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", one.getvalue()) for one in (out, err)]
@@ -121,25 +122,25 @@ class Clock:
         return self.now
 
 
-def bar(monkeypatch, of=console.Progress):
+def bar(monkeypatch, of=cli_progress.Progress):
     """A clock of one's own, and a bar on a terminal that goes by it."""
     clock = Clock()
     monkeypatch.setattr("sys.stderr", Terminal())
-    monkeypatch.setattr(console, "time", clock)
+    monkeypatch.setattr(cli_progress, "time", clock)
     return clock, of(FIRST, quiet=False)
 
 
 def test_a_bar_of_foretold_time_never_goes_back(monkeypatch):
     """Where more turns out to be ahead, the share waits, and the time left is what is foretold."""
-    clock, progress = bar(monkeypatch, console.Foretold)
+    clock, progress = bar(monkeypatch, cli_progress.TimedProgress)
     with progress:
-        told = []
+        texts = []
         for total in (4000, 16_000, 16_000):
             clock.now += 2
             progress.update(round(1000 * (clock.now - Clock.now)), total, 0)
-            told.append(progress.bar.tasks[0].fields["told"].split())
-    assert [words[0] for words in told] == ["50.0", "50.0", "50.0"]
-    assert [words[2] for words in told] == ["0:00:02", "0:00:12", "0:00:10"]
+            texts.append(progress.bar.tasks[0].fields["text"].split())
+    assert [words[0] for words in texts] == ["50.0", "50.0", "50.0"]
+    assert [words[2] for words in texts] == ["0:00:02", "0:00:12", "0:00:10"]
 
 
 def test_a_bar_says_in_the_language_what_is_left(monkeypatch):
@@ -149,9 +150,9 @@ def test_a_bar_says_in_the_language_what_is_left(monkeypatch):
         progress.update(0, 200, 0)
         clock.now += 2
         progress.update(50, 200, 0)
-        told = progress.bar.tasks[0].fields["told"]
+        told = progress.bar.tasks[0].fields["text"]
         progress.update(200, 200, 0)
-        done = progress.bar.tasks[0].fields["told"]
+        done = progress.bar.tasks[0].fields["text"]
     assert told.startswith(" 25,0 %")
     assert "осталось 0:00:06, затем результаты" in told
     assert "осталось" not in done
@@ -172,6 +173,6 @@ def test_a_bar_foretells_within_a_factor_of_two_what_is_left(monkeypatch, seed):
             done, held = done + 100, held + 100 * (not seconds)
             progress.update(done, 6000, held)
             if 2500 <= done <= 5500:
-                told = re.search(r"(\d+):(\d+):(\d+) left", progress.bar.tasks[0].fields["told"]).groups()
+                told = re.search(r"(\d+):(\d+):(\d+) left", progress.bar.tasks[0].fields["text"]).groups()
                 hours, minutes, rest = map(int, told)
                 assert 0.5 <= (3600 * hours + 60 * minutes + rest) / (ends - clock.now) <= 2

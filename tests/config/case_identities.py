@@ -8,9 +8,10 @@ import multiprocessing
 import sys
 from collections.abc import Iterable
 
-from radarsim.app.configs import load
-from radarsim.config.document import SHIPPED
-from radarsim.config.experiment import Case, canonical, digest, world
+from radarsim.api.configs import load
+from radarsim.config.experiment import Case
+from radarsim.config.find_files import SHIPPED
+from radarsim.config.identity import digest, identity_keys, world_keys
 
 CONFIGS = tuple(sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml")))
 
@@ -22,7 +23,7 @@ def case_identities(configs: Iterable[str]) -> dict[str, str]:
 
 def case_identity(case: Case) -> str:
     """The digest of a case's keys and of those that its noise depends on."""
-    return digest([canonical(case.spec), world(case.spec)])
+    return digest([identity_keys(case.spec), world_keys(case.spec)])
 
 
 if __name__ == "__main__":

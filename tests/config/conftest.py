@@ -5,7 +5,7 @@ import textwrap
 
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 
 GOOD = {

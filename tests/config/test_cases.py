@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.config.experiment import matches
-from radarsim.config.load import texts
+from radarsim.api.configs import load
+from radarsim.config.experiment import matches_pattern
+from radarsim.config.overrides import override_texts
 from radarsim.errors import ConfigError
 
 RADAR = "radar: {wavelength_m: 0.15, sigma_range_m: 250, sigma_velocity_mps: 15, scan_period_s: 10}\n"
@@ -214,7 +214,7 @@ def test_a_mapping_of_overrides_is_what_its_texts_say(folder):
         "seed": 3,
     }
     found = load("a", values)
-    assert found == load("a", texts(values))
+    assert found == load("a", override_texts(values))
     (case,) = found.cases
     assert (case.spec.radar.sigma_range_m, case.spec.radar.name, case.seed) == (300, 'no: "Ω", #', 3)
     assert case.spec.radar.sigma_velocity_mps == 15  # what a nested mapping does not name stays
@@ -363,8 +363,8 @@ def test_named_figures_are_drawn_in_their_order_with_all_cases(folder, named, dr
 
 
 def test_brackets_in_patterns_are_brackets():
-    assert matches("a observes=[range] scans=3", "* observes=[range] scans=?")
-    assert not matches("a observes=r scans=3", "* observes=[range] scans=?")
+    assert matches_pattern("a observes=[range] scans=3", "* observes=[range] scans=?")
+    assert not matches_pattern("a observes=r scans=3", "* observes=[range] scans=?")
 
 
 def test_a_mapping_is_a_config_too(good):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
 

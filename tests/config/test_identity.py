@@ -13,10 +13,13 @@ import pydantic
 import pytest
 from pydantic import Field
 
-from radarsim.app.configs import load
-from radarsim.config.document import SHIPPED
-from radarsim.config.experiment import canonical
-from radarsim.config.fields import Added, DataFile, Design, Model, Study, key
+from radarsim.api.configs import load
+from radarsim.config.find_files import SHIPPED
+from radarsim.config.identity import identity_keys
+from radarsim.config.key_types import key
+from radarsim.config.marks import AddedKeyMark, DataFile, DesignMark
+from radarsim.config.model import Model
+from radarsim.config.study_keys import StudyKeys
 from radarsim.studies import registry
 from radarsim.studies.identity import identity
 from radarsim.studies.noise import noise_key
@@ -91,19 +94,19 @@ def test_the_world_changes_both(override):
 
 def test_the_baseline_is_a_place_and_no_name():
     renamed = spec("filters.1.name=other", "baseline=other")
-    assert canonical(renamed)["baseline"] == 1
-    assert canonical(renamed) == canonical(spec("baseline=r+Vr"))
+    assert identity_keys(renamed)["baseline"] == 1
+    assert identity_keys(renamed) == identity_keys(spec("baseline=r+Vr"))
 
 
 def test_negative_zero_is_zero():
-    plus, minus = (json.dumps(canonical(spec(f"target.coefficients=[1, {zero}]"))) for zero in ("0", "-0.0"))
+    plus, minus = (json.dumps(identity_keys(spec(f"target.coefficients=[1, {zero}]"))) for zero in ("0", "-0.0"))
     assert plus == minus
 
 
 def test_a_named_scenario_is_its_content(good):
     good["target"] = "polynomial"
     inline = {"kind": "polynomial", "coefficients": [100e3, -250, 4]}
-    assert canonical(load(good).cases[0].spec) == canonical(load({**good, "target": inline}).cases[0].spec)
+    assert identity_keys(load(good).cases[0].spec) == identity_keys(load({**good, "target": inline}).cases[0].spec)
 
 
 @pytest.mark.parametrize("stem", sorted(file.stem for file in (SHIPPED / "configs").glob("*.yaml")))
@@ -111,8 +114,8 @@ def test_shipped_configs_go_to_json_and_back(stem):
     experiment = load(stem)
     assert json.loads(json.dumps(experiment.resolved, allow_nan=False)) == experiment.resolved
     for case in experiment.cases:
-        told = json.loads(json.dumps(canonical(case.spec), allow_nan=False))
-        assert told == canonical(case.spec)
+        told = json.loads(json.dumps(identity_keys(case.spec), allow_nan=False))
+        assert told == identity_keys(case.spec)
         kept = {key: value for key, value in case.resolved().items() if key not in ("case", "swept")}
         again = load({"study": case.study, **kept}).cases[0]
         assert (again.spec, again.seed, again.realisations) == (case.spec, case.seed, case.realisations)
@@ -122,7 +125,7 @@ def test_included_cases_are_the_cases_themselves():
     alone = load("rls2").cases[0]
     included = {case.name: case for case in load("range_doppler").cases}
     assert included["rls2"] == alone
-    assert canonical(included["rls2 manoeuvre_variance=0.001"].spec) == canonical(alone.spec)
+    assert identity_keys(included["rls2 manoeuvre_variance=0.001"].spec) == identity_keys(alone.spec)
 
 
 def test_cases_travel_to_other_processes():
@@ -145,7 +148,7 @@ class Flight(Model):
     file: Annotated[str, DataFile()] = Field(description="CSV of the flight")
 
 
-class Recorded(Study):
+class Recorded(StudyKeys):
     """A study of recorded flights."""
 
     flights: tuple[Flight, ...] = Field(description="flights")
@@ -164,13 +167,13 @@ def test_a_file_of_data_is_its_content(house, said, recorded):
     house("configs/flight.csv", "t_s\n1\n")
     here = load("own").cases[0].spec
     assert here.flights[0].file == "configs/flight.csv"
-    assert canonical(here)["flights"][0]["file"] == hashlib.sha256(b"t_s\n1\n").hexdigest()
+    assert identity_keys(here)["flights"][0]["file"] == hashlib.sha256(b"t_s\n1\n").hexdigest()
     house("elsewhere.csv", "t_s\n1\n")
     there = load("own", ["flights.0.file=elsewhere.csv"]).cases[0].spec
     assert there.flights[0].file == "elsewhere.csv"
-    assert canonical(there) == canonical(here)
+    assert identity_keys(there) == identity_keys(here)
     house("elsewhere.csv", "t_s\n2\n")
-    assert canonical(there) != canonical(here)
+    assert identity_keys(there) != identity_keys(here)
 
 
 def marks(model):
@@ -180,24 +183,24 @@ def marks(model):
 
 def test_a_key_that_several_models_share_has_the_marks_of_each():
     shared = key("key", "a key that several models share", [])
-    first = pydantic.create_model("First", __base__=Model, shared=(Annotated[list[int], Added()], shared))
-    second = pydantic.create_model("Second", __base__=Model, shared=(Annotated[list[str], Design()], shared))
+    first = pydantic.create_model("First", __base__=Model, shared=(Annotated[list[int], AddedKeyMark()], shared))
+    second = pydantic.create_model("Second", __base__=Model, shared=(Annotated[list[str], DesignMark()], shared))
     third = pydantic.create_model("Third", __base__=Model, shared=(list[str], shared))
-    assert [marks(model) for model in (first, second, third)] == [[Added], [Design], []]
+    assert [marks(model) for model in (first, second, third)] == [[AddedKeyMark], [DesignMark], []]
     assert (first(shared=[1]).shared, second(shared=["1"]).shared, third().shared) == ([1], ["1"], [])
 
 
 class KeysOfAPlainClass:
     """Keys that models take from a class that is no model."""
 
-    shared: Annotated[float | None, Design()] = key("key", "a key that several models take", None)
+    shared: Annotated[float | None, DesignMark()] = key("key", "a key that several models take", None)
 
 
 @pytest.mark.filterwarnings("ignore:Field name:UserWarning")  # of pydantic's earlier versions
 def test_a_key_that_several_models_take_from_a_plain_class_has_its_marks_once():
     for name in ("First", "Second"):
         model = type(name, (KeysOfAPlainClass, Model), {"__module__": __name__})
-        assert marks(model) == [Design]
+        assert marks(model) == [DesignMark]
         assert model(shared=2.0).shared == 2.0
 
 

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.config.experiment import canonical
-from radarsim.config.load import new
+from radarsim.api.configs import load
+from radarsim.config.identity import identity_keys
+from radarsim.config.new_config import new_config
 from radarsim.errors import ConfigError
-from radarsim.recorded.follow import single_case
+from radarsim.recordings.study_part import single_case
 from radarsim.studies import registry
 from tests.tolerances import assert_rounded
 
@@ -50,7 +50,7 @@ def test_keys_beside_include_do_what_set_does(folder, beside, override):
     (case,) = load("other").cases
     filters = ["filters=[{name: alone, observes: [range], manoeuvre_variance: 1e-4}]"]
     (expected,) = load("mine", [override] if override else filters).cases
-    assert canonical(case.spec) == canonical(expected.spec) != canonical(load("mine").cases[0].spec)
+    assert identity_keys(case.spec) == identity_keys(expected.spec) != identity_keys(load("mine").cases[0].spec)
     assert case.name == "mine"
 
 
@@ -146,14 +146,14 @@ def test_nor_can_its_twin_in_another_unit_or_said_another_way(folder, said, base
 
 def test_one_of_ones_own_after_a_config_that_changes_another(folder):
     folder("configs/other.yaml", "include: [mine]\nradar: {sigma_range_m: 80}\n")
-    name, text = new("third", "other", registry)
+    name, text = new_config("third", "other", registry)
     folder(f"configs/{name}", text)
     assert "detection_probability" not in text  # a default is not what the included config says
-    assert canonical(load("third").cases[0].spec) == canonical(load("other").cases[0].spec)
-    name, text = new("fitted", "other", registry, {"radar.sigma_range_m": 70.0, "manoeuvre_variance": 0.5})
+    assert identity_keys(load("third").cases[0].spec) == identity_keys(load("other").cases[0].spec)
+    name, text = new_config("fitted", "other", registry, {"radar.sigma_range_m": 70.0, "manoeuvre_variance": 0.5})
     folder(f"configs/{name}", text)
     expected = load("other", ["radar.sigma_range_m=70", "manoeuvre_variance=0.5"]).cases[0].spec
-    assert canonical(load("fitted").cases[0].spec) == canonical(expected)
+    assert identity_keys(load("fitted").cases[0].spec) == identity_keys(expected)
 
 
 def test_of_several_changed_cases_one_is_chosen_with_its_changes(folder, command_line):
@@ -167,9 +167,9 @@ def test_of_several_changed_cases_one_is_chosen_with_its_changes(folder, command
 def test_one_of_ones_own_after_what_includes_a_neighbour_is_written_out(folder):
     folder("apart/base.yaml", "include: [rls2]\nscans: 20\n")
     folder("apart/over.yaml", "include: [base]\nscans: 30\n")
-    name, text = new("copy", "apart/over.yaml", registry)
+    name, text = new_config("copy", "apart/over.yaml", registry)
     folder(name, text)
-    assert canonical(load("copy").cases[0].spec)["scans"] == 30
+    assert identity_keys(load("copy").cases[0].spec)["scans"] == 30
 
 
 def test_what_own_keys_break_in_an_included_config_names_both(folder, said):

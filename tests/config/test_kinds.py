@@ -5,7 +5,8 @@ from typing import Literal
 import pytest
 from pydantic import ValidationError
 
-from radarsim.config.fields import Model, Positive, key
+from radarsim.config.key_types import Positive, key
+from radarsim.config.model import Model
 from radarsim.errors import ConfigError
 
 

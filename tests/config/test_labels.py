@@ -3,9 +3,11 @@
 import pytest
 from pydantic import Field
 
-from radarsim.app.configs import load
-from radarsim.config.check import Label, label
-from radarsim.config.fields import Model, Positive, Study
+from radarsim.api.configs import load
+from radarsim.config.key_types import Positive
+from radarsim.config.labels import Label, label
+from radarsim.config.model import Model
+from radarsim.config.study_keys import StudyKeys
 
 
 @pytest.mark.parametrize(
@@ -39,7 +41,7 @@ class Leg(Model):
     course_rad: Positive = Field(title="course", json_schema_extra={"unit": "rad"}, description="of a leg, rad")
 
 
-class Outside(Study):
+class Outside(StudyKeys):
     """Keys of a study from outside."""
 
     bare_keys = "legs"

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.config import document
+from radarsim.api.configs import load
+from radarsim.config import find_files
 
-SHIPPED = sorted(file.stem for file in (document.SHIPPED / "configs").glob("*.yaml"))
+SHIPPED = sorted(file.stem for file in (find_files.SHIPPED / "configs").glob("*.yaml"))
 KINDS = "configs", "scenarios"
-OWN = (document.SHIPPED / "configs/rls2.yaml").read_text()
+OWN = (find_files.SHIPPED / "configs/rls2.yaml").read_text()
 
 
 def coefficients(source):
@@ -22,7 +22,7 @@ def coefficients(source):
 def test_shipped_configs_run_by_stem_from_anywhere(house, stem):
     experiment = load(stem)
     assert experiment.stem == stem
-    assert experiment.path == str(document.SHIPPED / f"configs/{stem}.yaml")
+    assert experiment.path == str(find_files.SHIPPED / f"configs/{stem}.yaml")
 
 
 def test_a_config_here_comes_before_one_in_configs_before_the_shipped(house):
@@ -145,21 +145,21 @@ def test_a_file_that_may_not_be_read(house, said):
 
 @pytest.mark.parametrize("name", ["a", "rls2_manoeuvre_variance", "multimodel_1hz", "a-b+c=1.5", "рлс2", "2"])
 def test_stems(name):
-    assert document.is_stem(name)
+    assert find_files.is_stem(name)
 
 
 @pytest.mark.parametrize(
     "name", ["", ".", "..", ".a", "a/b", "/a", "a\\b", "C:a", "a b", "a\n", "a..b", "a.", "-a", "x" * 101, "~"]
 )
 def test_no_stems(name):
-    assert not document.is_stem(name)
+    assert not find_files.is_stem(name)
 
 
 def test_what_is_shipped_is_what_lies_beside_the_package():
     """By links in a checkout, by copies in a source distribution."""
     root = Path(__file__).parents[2]
     for kind in KINDS:
-        folders = document.SHIPPED / kind, root / kind
+        folders = find_files.SHIPPED / kind, root / kind
         shipped, beside = ({file.name: file.read_bytes() for file in folder.iterdir()} for folder in folders)
         assert shipped == beside
 
@@ -169,4 +169,4 @@ def test_a_wheel_holds_every_shipped_file():
     root = Path(__file__).parents[2]
     patterns = tomllib.loads((root / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["radarsim"]
     packed = {file for pattern in patterns for file in (root / "radarsim").glob(pattern)}
-    assert packed >= {document.SHIPPED / kind / file.name for kind in KINDS for file in (root / kind).iterdir()}
+    assert packed >= {find_files.SHIPPED / kind / file.name for kind in KINDS for file in (root / kind).iterdir()}

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.config import fields
+from radarsim.api.configs import load
+from radarsim.config import numeric_keys
 from radarsim.errors import ConfigError
 from tests.tolerances import assert_rounded
 
@@ -19,7 +19,7 @@ def test_keys_can_be_set_to_their_own_values(stem):
     all, has no place there."""
     case = load(stem).cases[0]
     swept = {key for key, _ in case.swept}
-    given = [key for key in fields.keys(case.spec) if key.value is not None and key.path not in swept]
+    given = [key for key in numeric_keys.numeric_keys(case.spec) if key.value is not None and key.path not in swept]
     places, refused = [], []
     for key in given:
         try:
@@ -33,15 +33,15 @@ def test_keys_can_be_set_to_their_own_values(stem):
 
 
 def test_the_keys_of_a_radar():
-    keys = {key.path: key for key in fields.keys(load("rls2").cases[0].spec)}
-    assert keys["radar.sigma_range_m"] == fields.NumericKey("radar.sigma_range_m", 250.0, 0, math.inf, False)
+    keys = {key.path: key for key in numeric_keys.numeric_keys(load("rls2").cases[0].spec)}
+    assert keys["radar.sigma_range_m"] == numeric_keys.NumericKey("radar.sigma_range_m", 250.0, 0, math.inf, False)
     assert keys["target.coefficients.2"].value == 4.0
     assert (keys["filters.1.initial_scans"].low, keys["filters.1.initial_scans"].whole) == (2, True)
     assert not any(path.startswith("radar.band") for path in keys)
 
 
 def test_bounds_of_both_ends_and_optional_keys():
-    keys = {key.path: key for key in fields.keys(load("sonar_clutter").cases[0].spec)}
+    keys = {key.path: key for key in numeric_keys.numeric_keys(load("sonar_clutter").cases[0].spec)}
     probability = keys["sensor.detection_probability"]
     assert (probability.low, probability.high) == (0, 1)
     assert (keys["filters.0.gate_probability"].value, keys["filters.0.plots"].value) == (0.99, None)
@@ -50,9 +50,9 @@ def test_bounds_of_both_ends_and_optional_keys():
 
 def test_a_bare_filter_key_means_every_filter_and_degrees_are_understood():
     spec = load("rls2").cases[0].spec
-    both = fields.find(spec, "manoeuvre_variance")
+    both = numeric_keys.find_numeric_keys(spec, "manoeuvre_variance")
     assert [key.path for key in both] == ["filters.0.manoeuvre_variance", "filters.1.manoeuvre_variance"]
-    (one,) = fields.find(load("sonar_clutter").cases[0].spec, "sensor.sigma_bearing_deg")
+    (one,) = numeric_keys.find_numeric_keys(load("sonar_clutter").cases[0].spec, "sensor.sigma_bearing_deg")
     assert one.path == "sensor.sigma_bearing_deg"
     assert_rounded([one.value, one.high], [1, math.degrees(0.5)], operations=3)
 
@@ -73,5 +73,5 @@ def test_a_bare_filter_key_means_every_filter_and_degrees_are_understood():
 )
 def test_what_is_no_numeric_key(name, words):
     with pytest.raises(ConfigError) as refused:
-        fields.find(load("rls2").cases[0].spec, name)
+        numeric_keys.find_numeric_keys(load("rls2").cases[0].spec, name)
     assert words in str(refused.value)

@@ -12,12 +12,15 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import BaseModel, Field
 
-from radarsim.app.configs import load, new, schema_json
-from radarsim.config import schema
-from radarsim.config.check import check, models_in
-from radarsim.config.document import Document, Faults, Origin
-from radarsim.config.fields import Model, Number, Positive, Study
-from radarsim.config.schema import schema as json_schema
+from radarsim.api.configs import load, new, schema_json
+from radarsim.config import common_keys
+from radarsim.config.document import Document
+from radarsim.config.error_list import ErrorList, Origin
+from radarsim.config.json_schema import json_schema
+from radarsim.config.key_types import Number, Positive
+from radarsim.config.model import Model
+from radarsim.config.study_keys import StudyKeys
+from radarsim.config.validate import models_in, validate
 from radarsim.errors import ConfigError
 from radarsim.studies import registry
 
@@ -31,7 +34,7 @@ def every_model(model: type[BaseModel]) -> set[type[BaseModel]]:
 
 @pytest.mark.parametrize("study", registry.SHIPPED)
 def test_every_key_is_described(study):
-    for model in every_model(registry.keys(study)) | {schema.Common}:
+    for model in every_model(registry.keys(study)) | {common_keys.CommonKeys}:
         assert model.__doc__
         for name, info in model.model_fields.items():
             assert info.description, f"{model.__name__}.{name}"
@@ -40,7 +43,7 @@ def test_every_key_is_described(study):
 
 @pytest.mark.parametrize("study", registry.SHIPPED)
 def test_no_key_is_both_common_and_a_studys(study):
-    assert not set(registry.keys(study).model_fields) & set(schema.COMMON_KEYS)
+    assert not set(registry.keys(study).model_fields) & set(common_keys.COMMON_KEYS)
 
 
 def test_the_copy_for_editors_is_fresh():
@@ -118,7 +121,7 @@ class Noise(Model):
     x: Positive = Field(description="of x")
 
 
-class Fan(Study):
+class Fan(StudyKeys):
     """A study with angles in all places."""
 
     tilt_rad: Number = Field(description="tilt")
@@ -130,8 +133,8 @@ class Fan(Study):
 
 
 def fan(**data):
-    faults = Faults()
-    checked = check(Fan, Document(data, "config", None, {(): Origin("config")}), faults)
+    faults = ErrorList()
+    checked = validate(Fan, Document(data, "config", None, {(): Origin("config")}), faults)
     faults.raise_if_any()
     return checked
 

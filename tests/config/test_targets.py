@@ -6,8 +6,8 @@ import random
 import numpy as np
 import pytest
 
-from radarsim import physics
-from radarsim.app.configs import load
+from radarsim.api.configs import load
+from radarsim.physics import targets
 from radarsim.studies.range_doppler.config import Turn
 from tests.tolerances import assert_rounded
 
@@ -88,7 +88,7 @@ def test_closest_approach_of_a_turn_is_that_of_its_path():
             duration_s=rng.uniform(1, 200),
         )
         end = rng.uniform(1, 200)
-        path = physics.turn(
+        path = targets.turn(
             target.range_m,
             target.speed_mps,
             target.aspect_rad,

@@ -4,8 +4,8 @@ import copy
 
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.config.experiment import complete
+from radarsim.api.configs import load
+from radarsim.config.identity import all_keys
 
 SHORT = "must be >= 3 for the initialisation of filter r, got 2"
 OBSERVES = "must be [range] or [range, velocity], got ['velocity']"
@@ -121,7 +121,7 @@ def spoilt(stem: str, changes: dict) -> dict:
     """A shipped config's first case as a dictionary, with other values at dotted keys; None takes the key away."""
     experiment = load(stem)
     case = experiment.cases[0]
-    config = {"study": case.study, "realisations": 10} | copy.deepcopy(complete(case.spec))
+    config = {"study": case.study, "realisations": 10} | copy.deepcopy(all_keys(case.spec))
     for key, value in changes.items():
         *outer, last = (int(step) if step.isdecimal() else step for step in key.split("."))
         holder = config

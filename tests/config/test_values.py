@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.config.document import Faults, Origin, short, shown
-from radarsim.config.fields import NotFinite, from_python, from_text
+from radarsim.config.error_list import ErrorList, Origin, quoted_value, short_number
+from radarsim.config.scalars import NotFinite, from_python, from_text
 from radarsim.errors import ConfigError
 
 NUMBERS = {
@@ -75,7 +75,7 @@ def test_words():
 
 
 def test_numpy_values_become_plain():
-    faults = Faults()
+    faults = ErrorList()
     value = from_python(
         {"a": np.float64(1.5), "b": np.arange(3), "c": (np.int64(2), "x"), 5: True}, (), Origin("config"), faults
     )
@@ -96,7 +96,7 @@ def test_numpy_values_become_plain():
     ],
 )
 def test_python_values_refused(value, line):
-    faults = Faults()
+    faults = ErrorList()
     from_python({"a": value}, (), Origin("config"), faults)
     with pytest.raises(ConfigError) as caught:
         faults.raise_if_any()
@@ -106,7 +106,7 @@ def test_python_values_refused(value, line):
 def test_a_mapping_that_holds_itself_ends():
     endless = {}
     endless["a"] = endless
-    faults = Faults()
+    faults = ErrorList()
     from_python(endless, (), Origin("config"), faults)
     with pytest.raises(ConfigError, match=r"config: a\.a\.a: nested more than 50 deep"):
         faults.raise_if_any()
@@ -129,7 +129,7 @@ def test_a_mapping_that_holds_itself_ends():
     ],
 )
 def test_short_numbers_read_back(number, text):
-    assert short(number) == text
+    assert short_number(number) == text
     assert float(text) == number
 
 
@@ -147,12 +147,12 @@ def test_short_numbers_read_back(number, text):
     ],
 )
 def test_quoted_values_are_short_and_on_one_line(value, text):
-    assert shown(value) == text
+    assert quoted_value(value) == text
     assert len(text) <= 60
 
 
 def test_faults_are_told_file_by_file_from_the_top():
-    faults = Faults()
+    faults = ErrorList()
     for origin, key in [
         (Origin("b.yaml", 9, 1), "late"),
         (Origin("a.yaml", 3, 1), "other"),

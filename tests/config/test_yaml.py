@@ -3,8 +3,8 @@
 import pytest
 import yaml
 
-from radarsim.config import load
-from radarsim.config.document import Faults
+from radarsim.config import yaml_io
+from radarsim.config.error_list import ErrorList
 
 STRUCTURE = {
     "duplicate key": ("study: x\nstudy: y\n", "c.yaml:2:1: study: duplicate key, first in line 1"),
@@ -98,9 +98,9 @@ def test_byte_order_mark_is_ignored(house, said):
 
 def test_pure_python_parser_gives_the_same(house, monkeypatch):
     text = "é: {b: [1, 'é', 2], c: x}\nd:\n  - e: |\n      text\n    f: .5\n"
-    fast = load.parse(text, "c.yaml", Faults())
-    monkeypatch.setattr(load, "LOADER", yaml.SafeLoader)
-    assert load.parse(text, "c.yaml", Faults()) == fast
+    fast = yaml_io.parse_yaml(text, "c.yaml", ErrorList())
+    monkeypatch.setattr(yaml_io, "LOADER", yaml.SafeLoader)
+    assert yaml_io.parse_yaml(text, "c.yaml", ErrorList()) == fast
     assert fast.data == {"é": {"b": [1, "é", 2], "c": "x"}, "d": [{"e": "text\n", "f": 0.5}]}
     assert fast.origin(("é", "b", 2))[:3] == ("c.yaml", 1, 17)
     assert fast.key_origin(("d", 0, "f"))[:3] == ("c.yaml", 5, 5)
@@ -108,6 +108,6 @@ def test_pure_python_parser_gives_the_same(house, monkeypatch):
 
 @pytest.mark.parametrize("text", ["1e5", "7", "true", "~", ".nan", ""])
 def test_what_stands_in_quotes_is_text(text):
-    faults = Faults()
-    assert load.parse(f"a: '{text}'\nb: \"{text}\"\n", "c.yaml", faults).data == {"a": text, "b": text}
+    faults = ErrorList()
+    assert yaml_io.parse_yaml(f"a: '{text}'\nb: \"{text}\"\n", "c.yaml", faults).data == {"a": text, "b": text}
     assert not faults

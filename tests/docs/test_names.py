@@ -35,7 +35,7 @@ OTHERS = (
     "docs/making/measured_STUDY.py",
     "w2_c.py",
 )
-OF = {"result": "Result", "seen": "Evidence"}  # classes of what pages call so
+OF = {"result": "Result", "evidence": "Evidence"}  # classes of what pages call so
 ROOMS = "radarsim", "tests", "docs", "benchmarks", "examples"
 SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 TEXTS = [page for page in PAGES if page.name != "CHANGELOG.md"]  # which says how things were called
@@ -87,13 +87,15 @@ def test_names_in_code_font_are_names_of_something():
     assert sorted(f"{path.relative_to(ROOT)}: {name}" for path, name in named if not stands(name)) == []
 
 
-@pytest.mark.parametrize("name", ["kernels.linear", "linear.simulate_block", "Study.floor", "app/run.py", "radar.seed"])
+@pytest.mark.parametrize(
+    "name", ["kernels.lanes", "second_order.simulate_block", "Study.floor", "api/run.py", "radar.seed"]
+)
 def test_a_name_of_something_stands(name):
     assert stands(name)
 
 
 @pytest.mark.parametrize(
-    "name", ["kernels.orders", "linear.simulated", "Study.computes_in", "radarsim.went", "fit/run.py"]
+    "name", ["kernels.quadruples", "second_order.simulated", "Study.computes_in", "radarsim.went", "fit/run.py"]
 )
 def test_a_name_of_nothing_is_seen(name):
     assert not stands(name)

@@ -47,7 +47,7 @@ def filled(text, results, prefix):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    from radarsim.app.run import run
+    from radarsim.api.run import run
 
     out = tmp_path_factory.mktemp("results")
 

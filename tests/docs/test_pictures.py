@@ -8,7 +8,7 @@ import pytest
 from making import pictures
 from PIL import Image
 
-from radarsim.report.drawing import Axis, Figure, Line, Panel, Style
+from radarsim.report.drawing.model import Axis, Figure, Line, Panel, Style
 
 STUDIES = (
     *("range_doppler", "multimodel", "sonar", "sonar_manoeuvre", "sonar_clutter", "discriminator"),
@@ -85,11 +85,11 @@ def test_marks_are_filled_with_pictures_and_captions(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("config", [config for config in pictures.figures_by_config() if config != pictures.CHART])
 def test_every_figure_that_a_page_shows_is_one_of_its_config(config):
-    from radarsim.app import result as output
-    from radarsim.app.run import run
+    from radarsim.api import result_content
+    from radarsim.api.run import run
 
     result = run(config, realisations=64)
-    drawn = output.case_figures(result.cases, result.tables, result.experiment)
+    drawn = result_content.case_figures(result.cases, result.tables, result.experiment)
     assert {name for name, _ in pictures.figures_by_config()[config]} <= set(drawn)
 
 

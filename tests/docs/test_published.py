@@ -11,7 +11,7 @@ import yaml
 from packaging.version import Version
 
 import radarsim
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 from tests.trust import versions
 
 ROOT = Path(__file__).parents[2]

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from radarsim.engine.results import Sums
-from radarsim.engine.run import Signals, collect
+from radarsim.engine.collect import collect
+from radarsim.engine.stopping import Signals
 from radarsim.engine.store import writer as store_writer
+from radarsim.engine.sums import Sums
 from radarsim.threads import limited
 
 

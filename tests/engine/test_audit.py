@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from radarsim.engine.run import collect, share
+from radarsim.engine.collect import collect, compute_share
 from radarsim.engine.store.audit import agree, audit_blocks
 from radarsim.engine.store.store import removable_files
 from tests.engine.fake import NAMES, WORK, Fake, N, contents
@@ -55,7 +55,7 @@ def test_what_runs_of_any_sizes_leave_is_whole(tmp_path, blocks, sizes):
 
 
 def test_shares_and_stopped_runs_are_whole(tmp_path, blocks):
-    share(WORK, N, (2, 3), store=tmp_path)
+    compute_share(WORK, N, (2, 3), store=tmp_path)
     asked = iter([None] * 8)
     cut = collect(Fake(pause_s=1e-3), N, store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
     assert audit_blocks(blocks, cut.count or None).faults == []

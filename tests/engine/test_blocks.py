@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from radarsim.engine.blocks import Forest, Node, Partial, Total, maximal, simulated, widest
-from radarsim.engine.results import Sums
+from radarsim.engine.blocks import Forest, Node, Partial, Total, maximal_nodes, simulate_piece, widest_node
+from radarsim.engine.sums import Sums
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
 from tests.engine.tree import decomposition
@@ -34,7 +34,7 @@ def test_no_blocks_no_nodes():
 
 @given(st.integers(0, 10**6), st.integers(1, 10**6), st.integers(0, 20))
 def test_the_widest_node_is_aligned_and_cannot_grow(first, blocks, highest):
-    node = widest(first, first + blocks, highest)
+    node = widest_node(first, first + blocks, highest)
     assert node.first == first
     assert node.stop <= first + blocks
     grown = Node(node.level + 1, node.index // 2)
@@ -58,7 +58,7 @@ def shuffled_cuts(draw):
     blocks = draw(st.integers(1, 70))
     nodes, first = [], 0
     while first < blocks:
-        nodes.append(widest(first, blocks, draw(st.integers(0, 7))))
+        nodes.append(widest_node(first, blocks, draw(st.integers(0, 7))))
         first = nodes[-1].stop
     return blocks, draw(st.permutations(nodes))
 
@@ -68,7 +68,7 @@ def test_any_cut_in_any_order_gives_the_bytes_of_the_textbook(case):
     blocks, nodes = case
     forest = Forest(WORK.block, WORK.size)
     for node in nodes:
-        forest.add(node, simulated(WORK, node))
+        forest.add(node, simulate_piece(WORK, node))
     assert forest.prefix() == decomposition(blocks)
     assert sorted(forest.nodes) == sorted(decomposition(blocks))
     assert bytes_of(forest.total()) == (blocks * WORK.block, textbook(WORK, blocks * WORK.block).tobytes())
@@ -80,7 +80,7 @@ def test_gaps_and_nodes_tile_the_blocks_and_the_prefix_ends_at_the_first_gap(cas
     kept = data.draw(st.lists(st.sampled_from(nodes), unique=True))
     forest = Forest(WORK.block, WORK.size)
     for node in kept:
-        forest.add(node, simulated(WORK, node))
+        forest.add(node, simulate_piece(WORK, node))
     held = [block for node in forest.nodes for block in range(node.first, node.stop)]
     missing = [block for first, stop in forest.gaps(blocks) for block in range(first, stop)]
     assert sorted(held + missing) == list(range(blocks))
@@ -93,7 +93,7 @@ def test_gaps_and_nodes_tile_the_blocks_and_the_prefix_ends_at_the_first_gap(cas
 
 @given(st.lists(st.builds(Node, st.integers(0, 5), st.integers(0, 20))), st.integers(0, 100))
 def test_maximal_nodes_cover_what_all_cover_and_overlap_nowhere(nodes, stop):
-    top = maximal(nodes, stop)
+    top = maximal_nodes(nodes, stop)
     covered = [block for node in top for block in range(node.first, node.stop)]
     assert covered == sorted({b for node in nodes if node.stop <= stop for b in range(node.first, node.stop)})
 
@@ -114,7 +114,7 @@ def test_sums_of_another_shape_or_type_are_refused(given_back):
             return given_back
 
     with pytest.raises(ValueError, match=r"simulate\(48, …\): expected sums float64 \(5,\)"):
-        simulated(Wrong(), Node(0, 3))
+        simulate_piece(Wrong(), Node(0, 3))
 
 
 def test_numbers_that_are_not_finite_are_named_by_their_block():
@@ -123,10 +123,10 @@ def test_numbers_that_are_not_finite_are_named_by_their_block():
             return [f"looked at {first}, {count}"]
 
     with pytest.raises(NonFiniteError) as caught:
-        simulated(Explaining(bad=100), Node(3, 0))
+        simulate_piece(Explaining(bad=100), Node(3, 0))
     assert caught.value.lines == ("realisations 96 to 111: the sums are not finite", "looked at 96, 16")
     with pytest.raises(NonFiniteError, match=r"^realisations 96 to 100: the sums are not finite$"):
-        simulated(Fake(bad=100), Partial(6, 5))
+        simulate_piece(Fake(bad=100), Partial(6, 5))
 
 
 def test_an_overflow_between_blocks_is_no_result():
@@ -135,8 +135,8 @@ def test_an_overflow_between_blocks_is_no_result():
             return np.full(5, 1.5e308)
 
     with pytest.raises(NonFiniteError, match="realisations 0 to 31: the sums overflow"):
-        simulated(Huge(), Node(1, 0))
+        simulate_piece(Huge(), Node(1, 0))
     forest = Forest(16, 5)
-    forest.add(Node(0, 2), simulated(Huge(), Node(0, 2)))
+    forest.add(Node(0, 2), simulate_piece(Huge(), Node(0, 2)))
     with pytest.raises(NonFiniteError, match="realisations 32 to 63: the sums overflow"):
-        forest.add(Node(0, 3), simulated(Huge(), Node(0, 3)))
+        forest.add(Node(0, 3), simulate_piece(Huge(), Node(0, 3)))

@@ -23,7 +23,7 @@ import pytest
 from radarsim.engine import cluster
 from radarsim.engine.blocks import Node
 from radarsim.engine.cluster import Cluster
-from radarsim.engine.run import collect
+from radarsim.engine.collect import collect
 from radarsim.engine.store import writer as store_writer
 from radarsim.errors import ClusterError, ConfigError, NonFiniteError
 from tests.engine.fake import WORK, Fake, N, same, textbook
@@ -66,7 +66,7 @@ def test_workers_write_where_nobody_else_may(two):
 
 def alive(workers):
     """The processes of a cluster."""
-    return [process.pid for process in workers._own._running]
+    return [process.pid for process in workers._processes._running]
 
 
 def test_workers_give_the_bytes_of_the_textbook(two, tmp_path):
@@ -173,7 +173,7 @@ def test_a_worker_prepares_a_work_once(monkeypatch):
     counted.__module__, counted.__qualname__ = __name__, "counted"
     pickled = pickle.dumps(Counted())
     for index in range(3):
-        cluster._attempted(pickled, WORK.identity, Node(0, index))
+        cluster._run_task(pickled, WORK.identity, Node(0, index))
     assert made == [1]
 
 
@@ -251,7 +251,7 @@ def test_a_clock_that_is_set_back_ends_the_run(two, monkeypatch, tmp_path):
 
     monkeypatch.setattr(cluster, "time", SimpleNamespace(monotonic=time.monotonic, time=time_of_day))
     two._time_of_day = time_of_day()
-    two._looked = time.monotonic()
+    two._last_look_s = time.monotonic()
     with pytest.raises(ClusterError, match="its clock was set back by 3600 s"):
         collect(Fake(pause_s=1e-2), 16 * 10_000, executor=two, store=tmp_path)
     resumed = collect(WORK, N, store=tmp_path)
@@ -282,12 +282,12 @@ def test_addresses_that_cannot_be_used_are_told_at_once(address, words):
     ],
 )
 def test_what_a_scheduler_elsewhere_rests_on_is_told(address, words):
-    assert words in cluster.trust(address)
+    assert words in cluster.scheduler_warning(address)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:8786", "tcp://127.1.2.3:1", "tls://[::1]:8786", "localhost:8786"])
 def test_a_scheduler_of_this_machine_takes_no_trust(address):
-    assert cluster.trust(address) is None
+    assert cluster.scheduler_warning(address) is None
 
 
 def certificates(folder):

@@ -9,8 +9,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from radarsim.engine.collect import collect
+from radarsim.engine.dispatch import Pace
+from radarsim.engine.executors import Serial, Threads
 from radarsim.engine.machine import available_cores
-from radarsim.engine.run import Pace, Serial, Threads, TimeLimit, collect
+from radarsim.engine.stopping import TimeLimit
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
 
@@ -186,7 +189,7 @@ def test_memory_is_flat_up_to_a_thousand_million_realisations():
     program = """if True:
         import resource
         import numpy as np
-        from radarsim.engine.run import collect
+        from radarsim.engine.collect import collect
 
         class Light:
             identity, block, size = "ab", 4096, 500

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from radarsim.engine.blocks import Node
-from radarsim.engine.results import Sums
-from radarsim.engine.run import collect, stored
+from radarsim.engine.collect import collect, read_stored
 from radarsim.engine.store import writer as store_writer
 from radarsim.engine.store.audit import audit_blocks
 from radarsim.engine.store.block_file import MAGIC, decode, encode
 from radarsim.engine.store.store import Store
+from radarsim.engine.sums import Sums
 from radarsim.errors import StoreError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 
@@ -96,7 +96,7 @@ def test_damage_that_cannot_be_moved_aside_is_not_believed_either(tmp_path, bloc
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "replace", refuse)
-        assert stored(WORK, N, tmp_path) is None
+        assert read_stored(WORK, N, tmp_path) is None
         reader = Store(tmp_path, WORK)
         assert len(reader.forest(312).nodes) == 3
         assert len(reader.warnings) == 1
@@ -177,7 +177,7 @@ def test_a_disk_that_fills_up_while_running_ends_the_run_at_once(tmp_path, block
 
 LIMITED = """if True:
     import resource, signal
-    from radarsim.engine.run import collect
+    from radarsim.engine.collect import collect
     from radarsim.errors import StoreError
     from tests.engine.fake import Fake
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from radarsim.engine.blocks import Node, Total
-from radarsim.engine.run import Share, collect, share, stored
+from radarsim.engine.collect import collect, compute_share, read_stored
+from radarsim.engine.dispatch import Share
 from radarsim.engine.store.inventory import CHANCE_LIMIT, Inventory, missing_shares, take_inventory
 from radarsim.engine.store.store import Store
 from tests.engine.fake import WORK, Fake, N, same
@@ -37,7 +38,7 @@ def test_united_by_copying_they_give_the_bytes_of_one_run(tmp_path_factory, real
     numbers = list(range(1, of + 1))
     draw.shuffle(numbers)
     for number in numbers:
-        share(WORK, realisations, (number, of), store=root / str(number), threads=0)
+        compute_share(WORK, realisations, (number, of), store=root / str(number), threads=0)
         shutil.copytree(root / str(number), root / "all", dirs_exist_ok=True)
     united = collect(WORK, realisations, store=root / "all", threads=0)
     assert same(united, realisations)
@@ -45,41 +46,41 @@ def test_united_by_copying_they_give_the_bytes_of_one_run(tmp_path_factory, real
 
 
 def test_a_share_is_stored_without_a_total_and_counted_once(tmp_path):
-    first = share(WORK, N, (2, 3), store=tmp_path, threads=2)
+    first = compute_share(WORK, N, (2, 3), store=tmp_path, threads=2)
     assert (first.asked, first.done, first.computed, first.from_store, first.stopped) == (1664, 1664, 1664, 0, None)
     assert not [piece for piece in Store(tmp_path, WORK).pieces() if isinstance(piece, Total)]
     assert held(tmp_path) == 1664
-    again = share(WORK, N, (2, 3), store=tmp_path, threads=2)
+    again = compute_share(WORK, N, (2, 3), store=tmp_path, threads=2)
     assert (again.done, again.computed, again.from_store) == (1664, 0, 1664)
-    assert stored(WORK, N, tmp_path) is None
+    assert read_stored(WORK, N, tmp_path) is None
 
 
 def test_a_share_finds_what_a_whole_run_has_stored(tmp_path):
     collect(WORK, N, store=tmp_path)
-    assert share(WORK, N, (2, 5), store=tmp_path).computed == 0
+    assert compute_share(WORK, N, (2, 5), store=tmp_path).computed == 0
 
 
 def test_more_shares_than_blocks_leave_some_with_nothing_to_do(tmp_path):
-    done = [share(WORK, 20, (number, 7), store=tmp_path, threads=0).done for number in range(1, 8)]
+    done = [compute_share(WORK, 20, (number, 7), store=tmp_path, threads=0).done for number in range(1, 8)]
     assert sorted(done) == [0, 0, 0, 0, 0, 4, 16]
-    assert same(stored(WORK, 20, tmp_path), 20)
+    assert same(read_stored(WORK, 20, tmp_path), 20)
 
 
 @pytest.mark.parametrize("number", [1, 3])
 def test_a_stopped_share_keeps_what_it_did_and_goes_on(tmp_path, number):
     asked = iter([None] * 8)
     slow = Fake(pause_s=1e-3)
-    cut = share(slow, 16 * 900, (number, 3), store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
+    cut = compute_share(slow, 16 * 900, (number, 3), store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
     assert cut.stopped == "enough"
     assert 0 < cut.done < cut.asked == 16 * 300
     assert held(tmp_path) == cut.done
-    whole = share(WORK, 16 * 900, (number, 3), store=tmp_path, threads=2)
+    whole = compute_share(WORK, 16 * 900, (number, 3), store=tmp_path, threads=2)
     assert (whole.done, whole.from_store) == (16 * 300, cut.done)
 
 
 def test_progress_is_that_of_the_share(tmp_path):
     seen = []
-    share(WORK, 1_600, (1, 4), store=tmp_path, progress=lambda *given: seen.append(given))
+    compute_share(WORK, 1_600, (1, 4), store=tmp_path, progress=lambda *given: seen.append(given))
     assert seen[-1] == (400, 400, 0)
 
 
@@ -91,7 +92,7 @@ def test_what_is_missing_is_named_by_realisations_and_shares(tmp_path_factory, r
     absent = data.draw(st.sets(st.sampled_from(numbers)))
     root = tmp_path_factory.mktemp("stock")
     for number in set(numbers) - absent:
-        share(WORK, realisations, (number, of), store=root, threads=0)
+        compute_share(WORK, realisations, (number, of), store=root, threads=0)
     found = take_inventory(WORK, realisations, root)
     parts = {number: take_inventory(WORK, realisations, root, (number, of)) for number in numbers}
     assert found.asked == realisations == sum(part.asked for part in parts.values())
@@ -112,7 +113,7 @@ def test_a_share_that_lacks_is_named(tmp_path):
     for absent, shares in (({2}, ((2,), 3)), ({1}, ((1,), 3)), ({3}, ((3,), 3)), ({1, 3}, ((1, 3), 3))):
         root = tmp_path / "".join(map(str, absent))
         for number in {1, 2, 3} - absent:
-            share(WORK, N, (number, 3), store=root, threads=0)
+            compute_share(WORK, N, (number, 3), store=root, threads=0)
         found = take_inventory(WORK, N, root)
         assert (found.shares, found.loose) == (shares, True)
         assert collect(WORK, N, store=root, threads=0).computed == N - found.stored

@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 
 from radarsim.engine.blocks import Node
-from radarsim.engine.run import Signals, collect, stored
+from radarsim.engine.collect import collect, read_stored
+from radarsim.engine.stopping import Signals
 from radarsim.engine.store.store import Store
-from radarsim.errors import Interrupted
+from radarsim.errors import Interruption
 from radarsim.threads import limited
 from tests.engine.fake import Fake, textbook
 
@@ -62,7 +63,7 @@ def test_a_signal_stops_the_run_and_all_it_did_is_stored(tmp_path, number, threa
     count = int(said[0])
     assert 0 < count < 16 * 4_000
     assert said[1] == hashlib.sha256(textbook(WORK, count).tobytes()).hexdigest()
-    assert stored(WORK, count, tmp_path).from_store == count
+    assert read_stored(WORK, count, tmp_path).from_store == count
     assert whole(tmp_path, 16 * 4_000) == count
 
 
@@ -122,7 +123,7 @@ def test_a_signal_is_told_as_a_reason_and_as_an_exception(threads):
         while signals() is None:
             time.sleep(0.01)
         assert signals() == "signal 15"
-    with pytest.raises(Interrupted) as caught:
+    with pytest.raises(Interruption) as caught:
         signals.raise_if_received()
     assert caught.value.exit_code == 143
 
@@ -155,7 +156,7 @@ def test_processes_on_one_store_at_once(tmp_path, copies):
         digest = hashlib.sha256(textbook(WORK, size).tobytes()).hexdigest()
         assert said.split() == ["running", str(size), digest]
     for size in sizes:
-        assert stored(WORK, size, tmp_path).count == size
+        assert read_stored(WORK, size, tmp_path).count == size
 
 
 @pytest.mark.slow

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.engine import run as engine_run
+from radarsim.engine import executors, machine
 from radarsim.engine.blocks import Node, Partial, Total
-from radarsim.engine.results import Sums
-from radarsim.engine.run import collect, share, stored
+from radarsim.engine.collect import collect, compute_share, read_stored
 from radarsim.engine.store import writer as store_writer
 from radarsim.engine.store.block_file import decode, is_directory, piece_named
 from radarsim.engine.store.store import Store
+from radarsim.engine.sums import Sums
 from radarsim.errors import NonFiniteError, StoreError
 from tests.engine.fake import NAMES, WORK, Fake, N, contents, names, same
 from tests.engine.tree import decomposition
@@ -39,7 +39,7 @@ def test_what_is_stored_is_not_computed_again(tmp_path, blocks):
 def test_nodes_alone_make_the_total_which_is_then_stored(tmp_path, blocks):
     collect(WORK, N, store=tmp_path)
     (blocks / "T5005.sums").unlink()
-    assert same(stored(WORK, N, tmp_path))
+    assert same(read_stored(WORK, N, tmp_path))
     assert "T5005.sums" not in names(blocks)
     again = collect(WORK, N, store=tmp_path)
     assert same(again)
@@ -52,7 +52,7 @@ def test_only_what_is_lost_is_computed(tmp_path, blocks, name, lost):
     collect(WORK, N, store=tmp_path)
     for gone in (name, "T5005"):
         (blocks / f"{gone}.sums").unlink()
-    assert stored(WORK, N, tmp_path) is None
+    assert read_stored(WORK, N, tmp_path) is None
     again = collect(WORK, N, store=tmp_path)
     assert same(again)
     assert again.computed == lost
@@ -65,9 +65,9 @@ def test_any_history_of_n_gives_the_bytes_of_each_n_at_once(tmp_path, blocks):
         assert same(collect(WORK, realisations, store=tmp_path), realisations)
     for realisations in sizes:
         before = contents(blocks)
-        assert same(stored(WORK, realisations, tmp_path), realisations)
+        assert same(read_stored(WORK, realisations, tmp_path), realisations)
         assert contents(blocks) == before
-    assert stored(WORK, 4_321, tmp_path) is None
+    assert read_stored(WORK, 4_321, tmp_path) is None
 
 
 def test_a_larger_run_computes_only_what_is_new_and_the_cut_block_again(tmp_path, blocks):
@@ -157,7 +157,7 @@ def test_a_stopped_run_can_be_reported_after_a_longer_one(tmp_path):
     longer = collect(WORK, 16 * 200, store=tmp_path)
     assert same(longer, 16 * 200)
     assert longer.from_store == cut.count
-    assert same(stored(WORK, cut.count, tmp_path), cut.count)
+    assert same(read_stored(WORK, cut.count, tmp_path), cut.count)
 
 
 def test_a_stored_cut_block_counts_only_once_all_before_it_is_done(tmp_path, blocks):
@@ -172,9 +172,9 @@ def test_a_stored_cut_block_counts_only_once_all_before_it_is_done(tmp_path, blo
 def test_instruction_sets_are_recorded_and_mixing_warns(tmp_path, blocks, monkeypatch):
     collect(WORK, N, store=tmp_path)
     header, _ = decode((blocks / "L08-0.sums").read_bytes())
-    assert header["platforms"] == [engine_run.platform_name()]
+    assert header["platforms"] == [machine.platform_name()]
     assert header["versions"].keys() >= {"python", "numpy"}
-    monkeypatch.setattr(engine_run, "platform_name", lambda: "abacus")
+    monkeypatch.setattr(executors, "platform_name", lambda: "abacus")
     assert collect(WORK, N, store=tmp_path).warnings == ()
     mixed = collect(WORK, 2 * N, store=tmp_path)
     assert len(mixed.warnings) == 1
@@ -244,7 +244,7 @@ def test_several_runs_on_one_store_at_once(tmp_path, monkeypatch, sizes):
         for place, realisations in enumerate(sizes):
             assert same(results[place], realisations)
             assert results[place].warnings == ()
-            assert same(stored(WORK, realisations, tmp_path), realisations)
+            assert same(read_stored(WORK, realisations, tmp_path), realisations)
 
 
 def test_a_node_merged_away_between_listing_and_reading_is_found_in_its_parent(tmp_path, monkeypatch):
@@ -287,7 +287,7 @@ def test_the_file_is_what_the_description_says(tmp_path, blocks):
 def test_blocks_that_are_cleaned_away_while_a_run_works_are_written_again(tmp_path, monkeypatch):
     """Whatever is written before the end goes at once, the directory too."""
     monkeypatch.setattr(store_writer, "PERIOD_S", 0.0)
-    monkeypatch.setattr("radarsim.engine.run.PROGRESS_S", 0.0)
+    monkeypatch.setattr("radarsim.engine.dispatch.PROGRESS_S", 0.0)
     removed = []
 
     def cleaned(done, total, held):
@@ -365,9 +365,9 @@ def test_a_folder_that_another_user_may_have_filled_is_neither_read_nor_written(
     assert len(result.warnings) == 1
     assert str(tmp_path / place) in result.warnings[0]
     assert contents(blocks) == before
-    assert stored(WORK, N, tmp_path) is None
+    assert read_stored(WORK, N, tmp_path) is None
     with pytest.raises(StoreError, match="not used"):
-        share(WORK, N, (1, 2), store=tmp_path)
+        compute_share(WORK, N, (1, 2), store=tmp_path)
 
 
 @pytest.mark.parametrize("change", OTHERS)

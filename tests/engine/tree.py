@@ -1,6 +1,6 @@
 """The binary tree over blocks, written down once more."""
 
-from radarsim.engine.blocks import Node, widest
+from radarsim.engine.blocks import Node, widest_node
 
 
 def decomposition(blocks: int) -> list[Node]:
@@ -11,6 +11,6 @@ def decomposition(blocks: int) -> list[Node]:
     """
     nodes, first = [], 0
     while first < blocks:
-        nodes.append(widest(first, blocks, blocks.bit_length()))
+        nodes.append(widest_node(first, blocks, blocks.bit_length()))
         first = nodes[-1].stop
     return nodes

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Collection
 from pathlib import Path
 
+from radarsim.cli.command_group import main
+
 KERNELS = Path(__file__).parents[2] / "radarsim/kernels"
 PUBLIC = ("numba", "numba.extending", "llvmlite", "llvmlite.binding", "llvmlite.ir")
 

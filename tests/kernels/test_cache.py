@@ -16,9 +16,9 @@ import pytest
 from numba import njit
 from numba.core.registry import cpu_target
 
-from radarsim.app import doctor
+from radarsim.api.maintenance import self_test
 from radarsim.kernels import cache
-from radarsim.kernels.compile import FLAGS
+from radarsim.kernels.compiler import FAST_MATH_FLAGS
 from radarsim.kernels.numba_internals import COMMON, KernelCache, compile_kernel
 
 
@@ -203,7 +203,7 @@ def test_a_function_of_no_file_is_not_kept():
     sys.modules["no_file"] = module = ModuleType("no_file")
     try:
         exec("def thrice(x):\n    return 3 * x\n", names)
-        assert not isinstance(compile_kernel(names["thrice"], FLAGS)._cache, KernelCache)
+        assert not isinstance(compile_kernel(names["thrice"], FAST_MATH_FLAGS)._cache, KernelCache)
     finally:
         del sys.modules[module.__name__]
 
@@ -212,15 +212,17 @@ def test_a_function_of_no_file_is_not_kept():
 def test_the_command_goes_on_and_says_so_in_one_line(tmp_path, libraries):
     """A run whose cache cannot be used at all: the same bytes, one line on stderr, and the same in run.json."""
     place = {"RADARSIM_CACHE_DIR": str(tmp_path / "cache")}
-    prepared = "from radarsim.kernels.linear import add_block as one; print(one._cache.cache_path)"
+    prepared = "from radarsim.kernels.second_order import add_block as one; print(one._cache.cache_path)"
     Path(libraries.run(code=prepared, **place).stdout.strip()).write_text("no directory")
-    config = doctor.KNOWN / "range_doppler.yaml"
+    config = self_test.KNOWN_FOLDER / "range_doppler.yaml"
     done = libraries.run("run", config, "--no-figures", "--out", tmp_path, **place)
     assert done.returncode == 0
     lines = [line for line in done.stderr.splitlines() if "kernel cache" in line]
     assert len(lines) == len(done.stderr.splitlines()) == 1, done.stderr
     assert (tmp_path / "range_doppler" / "run.json").read_text().count("kernel cache: ") == 1
-    assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == doctor.tables("range_doppler")["curves"]
+    assert (tmp_path / "range_doppler" / "curves.csv").read_bytes() == self_test.compute_tables("range_doppler")[
+        "curves"
+    ]
 
 
 by_numbers = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no user numbers here")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from radarsim.kernels.call_graph import source_hash, value_text
-from radarsim.kernels.compile import kernel
+from radarsim.kernels.compiler import kernel
 
 
 class Mode(Enum):

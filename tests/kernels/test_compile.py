@@ -16,10 +16,10 @@ import pytest
 from numba.core.registry import cpu_target
 from numba.core.typing import Context
 
-from radarsim.kernels import compile, numba_internals
+from radarsim.kernels import call_graph, compiler, numba_internals
 from radarsim.kernels.numba_internals import remembering_context
 
-SOURCES = Path(compile.__file__).parent
+SOURCES = Path(compiler.__file__).parent
 MACHINERY = "algebra.py", "cache.py", "call_graph.py", "compile.py", "numba_internals.py", "numba_options.py"
 
 
@@ -82,7 +82,7 @@ def test_an_edited_helper_is_noticed_and_a_file_beside_is_not(house):
 def test_other_users_of_numba_keep_their_cache():
     before = numba.config.CACHE_DIR
 
-    @compile.kernel
+    @compiler.kernel
     def twice(x):
         return 2 * x
 
@@ -98,7 +98,7 @@ def test_loops_use_wide_registers():
         for i in range(x.size):
             x[i] = 1.5 * x[i]
 
-    options = {"fastmath": set(compile.FLAGS), **numba_internals.COMMON}
+    options = {"fastmath": set(compiler.FAST_MATH_FLAGS), **numba_internals.COMMON}
     function = numba.njit(**options)(scaled)
     function(np.ones(8))
     (assembly,) = function.inspect_asm().values()
@@ -108,42 +108,43 @@ def test_loops_use_wide_registers():
 def test_functions_without_an_entry_refuse_python():
     """They stay untranslated until a kernel needs them; Python gets an error, no crash; a formula it calls as it is."""
 
-    @compile.part
+    @compiler.kernel_part
     def halved(x):
         return x / 2
 
-    @compile.inline
+    @compiler.inline
     def grown(x):
         return halved(x) + 1
 
-    @compile.inline
+    @compiler.inline
     def doubled(x):
         return 2 * x
 
-    @compile.inline
+    @compiler.inline
     def squared(x):
         return doubled(x) * x / 2
 
     for function in (halved, grown):
         with pytest.raises(TypeError, match="not callable"):
             function(4.0)
-    assert compile.kernel(lambda x: grown(x))(4.0) == 3.0
-    assert compile.kernel(lambda x: squared(x))(4.0) == squared(4.0) == 16.0
+    assert compiler.kernel(lambda x: grown(x))(4.0) == 3.0
+    assert compiler.kernel(lambda x: squared(x))(4.0) == squared(4.0) == 16.0
     assert (squared(np.array([1.0, 2.0])) == [1.0, 4.0]).all()
 
 
 def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
     """Without an entry and machine code of its own, until Python calls it; it gives both the same bytes."""
-    monkeypatch.setattr(numba_internals, "module_digest", lambda module: "")  # so not from a cache
+    for module in (call_graph, numba_internals):  # so not from a cache
+        monkeypatch.setattr(module, "module_digest", lambda name: "")
 
-    @compile.kernel
+    @compiler.kernel
     def total(x):
         out = 0.0
         for i in range(x.size):
             out += x[i] * 0.1
         return out
 
-    @compile.kernel
+    @compiler.kernel
     def twice(x):
         return 2.0 * total(x)
 
@@ -158,7 +159,8 @@ def test_a_kernel_that_another_calls_is_compiled_for_it_apart(monkeypatch):
 def test_the_type_of_an_operation_is_found_once(monkeypatch):
     """However often it stands in kernels; what Numba compiles on the way is asked for each time, as it was."""
     asked = []
-    monkeypatch.setattr(numba_internals, "module_digest", lambda module: "")  # so not from a cache
+    for module in (call_graph, numba_internals):  # so not from a cache
+        monkeypatch.setattr(module, "module_digest", lambda name: "")
     monkeypatch.setattr(remembering_context(cpu_target.typing_context), "_signatures", {})
     numba_finds = Context.resolve_function_type
 
@@ -174,7 +176,7 @@ def test_the_type_of_an_operation_is_found_once(monkeypatch):
         return y if np.any(flags) or np.any(flags) else x
 
     for _ in range(2):  # a second kernel finds what the first has found
-        assert compile.kernel(types.FunctionType(powers.__code__, globals()))(5.0, np.ones(2, bool)) == 1.5
+        assert compiler.kernel(types.FunctionType(powers.__code__, globals()))(5.0, np.ones(2, bool)) == 1.5
     assert asked.count(operator.mod) == 1
     assert asked.count(np.any) > 2
 
@@ -206,7 +208,7 @@ def chosen(pair, more):
 def test_references_to_a_kernels_arguments_are_not_counted():
     sums = types.FunctionType(chosen.__code__, {"__name__": "nowhere"})  # of no file, so not from a cache
     second, counted = np.arange(3.0), []
-    for compiled in (numba.njit(sums), compile.kernel(sums)):
+    for compiled in (numba.njit(sums), compiler.kernel(sums)):
         assert compiled(Pair(np.ones(3), second), (second, 1.0)) == 3.0
         [made] = compiled.overloads.values()
         [inner] = (one for one in made.library._final_module.functions if one.name == made.fndesc.mangled_name)
@@ -218,7 +220,7 @@ def test_references_to_a_kernels_arguments_are_not_counted():
 def test_what_a_kernel_returns_is_counted():
     passed = types.FunctionType((lambda pair, x: (pair.first[1:], x)).__code__, {"__name__": "nowhere"})
     first = np.arange(1e6)
-    rest, _ = compile.kernel(passed)(Pair(first, first), 1.0)
+    rest, _ = compiler.kernel(passed)(Pair(first, first), 1.0)
     held = weakref.ref(first)
     del first
     assert held() is not None

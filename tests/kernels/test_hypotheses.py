@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from radarsim.kernels.compile import kernel
-from radarsim.kernels.hypotheses import least_kept
+from radarsim.kernels.compiler import kernel
+from radarsim.kernels.hypotheses import select_weight
 from radarsim.kernels.lanes import address
 
 
 @kernel
 def selected(weights, copy, most):
-    return least_kept(address(weights), weights.size, address(copy), most)
+    return select_weight(address(weights), weights.size, address(copy), most)
 
 
 @pytest.mark.parametrize("different", [1, 2, 5, 1000])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarsim.kernels import lanes
-from radarsim.kernels.compile import kernel
+from radarsim.kernels.compiler import kernel
 from radarsim.kernels.lanes import WIDTH
 from tests.tolerances import assert_rounded, units_off
 
@@ -15,7 +15,7 @@ def calculate(x, y, out):
     lanes.put(to, 0, a + b * 2.0)
     lanes.put(to, 1, 1.0 - a / b)
     lanes.put(to, 2, lanes.where_greater(a, b, a, lanes.full(7.0)))
-    lanes.put(to, 3, lanes.root(a * a))
+    lanes.put(to, 3, lanes.square_root(a * a))
     lanes.put(to, 4, lanes.nearest(a))
     lanes.put(to, 5, lanes.full(lanes.total(a)))
     lanes.put(lanes.row(to, 6), 0, lanes.full(1.0 if lanes.any_greater(a, b) else 0.0))

@@ -7,9 +7,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from radarsim.kernels import linear as kernels
+from radarsim.kernels import second_order
 from radarsim.kernels.random import stream
-from radarsim.studies.range_doppler import filters
+from radarsim.studies.range_doppler import filter_design
 from tests.studies.range_doppler import naive as naive
 from tests.tolerances import assert_rounded, mean_error, rounding, scaled_condition
 
@@ -42,25 +42,25 @@ def rounded(observes, start, sigma, dt):
 def problem_of(radar, designs=FILTERS, scans=K, **changes):
     """Several filters on a radar of the paper, parts of the problem changed."""
     truth, sigma, dt = world(radar, scans)
-    made = [filters.design(observes, start, variance, sigma, dt, scans) for observes, start, variance in designs]
+    made = [filter_design.design(observes, start, variance, sigma, dt, scans) for observes, start, variance in designs]
     longest = max(d.start for d in made)
     weights = np.zeros((len(made), 3, 2, longest))
     for f, d in enumerate(made):
         weights[f, :, :, : d.start] = d.weights
     observes, start = [d.observes for d in made], [d.start for d in made]
     gains = np.stack([d.gains for d in made])
-    return kernels.Problem(KEY, truth, sigma, dt, observes, start, weights, gains)._replace(**changes)
+    return second_order.Problem(KEY, truth, sigma, dt, observes, start, weights, gains)._replace(**changes)
 
 
 def filters_alone(dt, observes, start, weights, gains):
     """A problem of which only the filters are of interest."""
-    return kernels.Problem(KEY, np.zeros((gains.shape[1], 3)), np.ones(2), dt, observes, start, weights, gains)
+    return second_order.Problem(KEY, np.zeros((gains.shape[1], 3)), np.ones(2), dt, observes, start, weights, gains)
 
 
 def sums_of(problem, first, count):
     """Sums of a block."""
-    made = kernels.Sums(*map(np.zeros, kernels.shapes(*problem.gains.shape[:2]).values()))
-    kernels.simulate_block(problem, first, count, made)
+    made = second_order.Sums(*map(np.zeros, second_order.shapes(*problem.gains.shape[:2]).values()))
+    second_order.simulate_block(problem, first, count, made)
     return made
 
 
@@ -73,8 +73,8 @@ def sums(radar, first, count, **changes):
 def test_estimates_are_the_textbook_filter(radar):
     _, sigma, dt = world(radar)
     problem = problem_of(radar)
-    plots = kernels.simulate_plots(problem, 77, 20)
-    got = kernels.estimate(problem, plots)
+    plots = second_order.simulate_plots(problem, 77, 20)
+    got = second_order.estimate(problem, plots)
     for f, (observes, start, variance) in enumerate(FILTERS):
         for i in range(len(plots)):
             expected, _ = naive.kalman(plots[i], observes, start, variance, sigma, dt)
@@ -89,7 +89,7 @@ def test_gains_are_the_papers_closed_forms(radar, observes, start, variance):
     _, sigma, dt = world(radar)
     expected = naive.gains(observes, start, variance, sigma, dt, K)
     units = np.array([1.0, 1.0 / dt, 1.0 / dt**2])[:, None] / np.array([1.0, 1.0 / dt])
-    got = filters.design(observes, start, variance, sigma, dt, K).gains
+    got = filter_design.design(observes, start, variance, sigma, dt, K).gains
     # Gains are up to two in these units. An update leaves of a variance what is not cancelled, P − K H P, and divides
     # by the innovation's covariance S: ten operations on each of them.
     _, P = naive.kalman(np.zeros((K, 2)), observes, start, variance, sigma, dt)
@@ -104,7 +104,7 @@ def test_plots_are_truth_and_noise():
     truth, sigma, _ = world("RLS 2", 3)
     n = 200_000
     problem = problem_of("RLS 2", ((1, 3, 1e-3),), 3)
-    noise = (kernels.simulate_plots(problem, 0, n) - truth[:, :2]) / sigma
+    noise = (second_order.simulate_plots(problem, 0, n) - truth[:, :2]) / sigma
     flat = noise.reshape(n, -1)
     assert np.abs(flat.mean(axis=0)).max() < mean_error(n)
     assert np.abs(np.cov(flat.T) - np.eye(6)).max() < mean_error(n, np.sqrt(2))
@@ -113,7 +113,7 @@ def test_plots_are_truth_and_noise():
 def test_sums_are_those_of_the_estimates():
     count, radar = 1300, "RLS 3"  # two chunks and a part
     problem = problem_of(radar)
-    estimates = kernels.estimate(problem, kernels.simulate_plots(problem, 5, count))
+    estimates = second_order.estimate(problem, second_order.simulate_plots(problem, 5, count))
     e = np.nan_to_num(estimates - problem.truth, nan=0.0)
     _, sigma, dt = world(radar)
     off = np.array([rounded(observes, start, sigma, dt) for observes, start, _ in FILTERS])[:, None]
@@ -130,13 +130,15 @@ def test_sums_are_those_of_the_estimates():
         for power in range(4):
             assert_summed(error[..., power], *[(e, off)] * (power + 1))
         assert_summed(paired, (e, off), (e, off), *[(e[:, [baseline]], off[[baseline]])] * 2)
-        assert_summed(cross, *((e[..., list(of)], off[..., list(of)]) for of in zip(*kernels.CROSSED, strict=True)))
+        assert_summed(
+            cross, *((e[..., list(of)], off[..., list(of)]) for of in zip(*second_order.COMPONENT_PAIRS, strict=True))
+        )
 
 
 def test_before_the_start_the_plots_are_the_estimates():
     problem = problem_of("RLS 2")
-    plots = kernels.simulate_plots(problem, 0, 4)
-    got = kernels.estimate(problem, plots)
+    plots = second_order.simulate_plots(problem, 0, 4)
+    got = second_order.estimate(problem, plots)
     for f, (observes, start, _) in enumerate(FILTERS):
         np.testing.assert_array_equal(got[:, f, : start - 1, :observes], plots[:, : start - 1, :observes])
         assert np.isnan(got[:, f, : start - 1, observes:]).all()
@@ -153,14 +155,14 @@ def test_before_the_start_the_plots_are_the_estimates():
 @pytest.mark.parametrize("cuts", [(1,), (511, 512, 513), (100, 612, 1124), (3, 4, 999)])
 def test_any_split_gives_the_same(cuts):
     total, problem = 1200, problem_of("RLS 4")
-    whole_plots = kernels.simulate_plots(problem, 0, total)
-    whole = kernels.estimate(problem, whole_plots)
+    whole_plots = second_order.simulate_plots(problem, 0, total)
+    whole = second_order.estimate(problem, whole_plots)
     whole_sums = sums("RLS 4", 0, total)
     added = [np.zeros_like(s) for s in whole_sums]
     for first, last in zip((0, *cuts), (*cuts, total), strict=True):
-        plots = kernels.simulate_plots(problem, first, last - first)
+        plots = second_order.simulate_plots(problem, first, last - first)
         np.testing.assert_array_equal(plots, whole_plots[first:last])
-        np.testing.assert_array_equal(kernels.estimate(problem, plots), whole[first:last])
+        np.testing.assert_array_equal(second_order.estimate(problem, plots), whole[first:last])
         for total_sum, part in zip(added, sums("RLS 4", first, last - first), strict=True):
             total_sum += part
     # The same errors in another order: Σ|e|ᵖ is at most n times the largest, which is at most the fourth root of Σe⁴.
@@ -168,7 +170,7 @@ def test_any_split_gives_the_same(cuts):
     for p in range(4):
         assert_rounded(added[0][..., p], whole_sums.error[..., p], total * largest ** (p + 1), operations=total)
     assert_rounded(added[1], whole_sums.paired, operations=total)
-    a, b = (largest[..., list(of)] for of in zip(*kernels.CROSSED, strict=True))
+    a, b = (largest[..., list(of)] for of in zip(*second_order.COMPONENT_PAIRS, strict=True))
     assert_rounded(added[2], whole_sums.cross, total * a * b, operations=total)
 
 
@@ -218,7 +220,7 @@ def test_intervals_of_any_length():
     rng = np.random.default_rng(4)
     dt, plots = rng.uniform(0.1, 9.0, 12), rng.normal(size=(3, 12, 2)) * 100
     gains, weights = rng.uniform(0, 0.5, (1, 12, 3, 2)), rng.normal(size=(1, 3, 2, 2))
-    got = kernels.estimate(filters_alone(dt, [2], [2], weights, gains), plots)
+    got = second_order.estimate(filters_alone(dt, [2], [2], weights, gains), plots)
     for i in range(3):
         x = np.einsum("cjs,sj->c", weights[0], plots[i, :2])
         size = np.einsum("cjs,sj->c", np.abs(weights[0]), np.abs(plots[i, :2]))
@@ -239,7 +241,7 @@ def test_a_filter_of_the_first_order_has_no_third_gain():
     gains[0, :, 0, 0], gains[0, :, 1, 0] = 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1)) / 0.5  # P3 eq. (14)
     weights = np.zeros((1, 3, 2, 2))
     weights[0, 0, 0, 1], weights[0, 1, 0] = 1.0, [-2.0, 2.0]
-    got = kernels.estimate(filters_alone(0.5, [1], [2], weights, gains), plots)
+    got = second_order.estimate(filters_alone(0.5, [1], [2], weights, gains), plots)
     np.testing.assert_array_equal(got[:, 0, 1:, 2], 0.0)
     for i in range(2):
         for k in range(1, 40):
@@ -255,16 +257,16 @@ def test_memory_does_not_grow_with_scans_and_count():
     scans = 100_000
     truth, gains = np.zeros((scans, 3)), np.tile([[0.5, 0.0], [0.15, 0.0], [0.01, 0.0]], (1, scans, 1, 1))
     filters = [1], [3], np.zeros((1, 3, 2, 3))
-    problem = kernels.Problem(KEY, truth, np.ones(2), 1.0, *filters, gains).plain()
-    sums_of(kernels.Problem(KEY, truth[:5], np.ones(2), 1.0, *filters, gains[:, :5]), 0, 1)
-    added = kernels.Sums(*map(np.zeros, kernels.shapes(1, scans).values()))
+    problem = second_order.Problem(KEY, truth, np.ones(2), 1.0, *filters, gains).plain()
+    sums_of(second_order.Problem(KEY, truth[:5], np.ones(2), 1.0, *filters, gains[:, :5]), 0, 1)
+    added = second_order.Sums(*map(np.zeros, second_order.shapes(1, scans).values()))
     tracemalloc.start()
     try:
-        kernels.simulate_block(problem, 0, 600, added)
+        second_order.simulate_block(problem, 0, 600, added)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert peak < 4 * kernels.CHUNK * 6 * 8
+    assert peak < 4 * second_order.CHUNK * 6 * 8
     assert np.isfinite(added.error).all()
     assert added.error[0, -1, 0, 1] > 0
 
@@ -283,4 +285,4 @@ def test_one_type_is_compiled():
         truth=np.asfortranarray(truth),
         gains=problem_of("RLS 1").gains.astype(np.float32),
     )
-    assert len(kernels.add_block.signatures) == 1
+    assert len(second_order.add_block.signatures) == 1

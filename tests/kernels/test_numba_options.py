@@ -9,8 +9,8 @@ import numba
 import numpy as np
 import pytest
 
-from radarsim.kernels import cache, compile, numba_options
-from radarsim.kernels.linear import scan_value
+from radarsim.kernels import cache, compiler, numba_options
+from radarsim.kernels.second_order import scan_value
 from tests.kernels import hidden_numba
 from tests.kernels.test_lanes import calculate, exponentials
 
@@ -24,15 +24,15 @@ for name in sorted(names):
     for module in [module for module in sys.modules if module.partition(".")[0] == "radarsim"]:
         del sys.modules[module]
     hidden_numba.hide({name})
-    from radarsim.kernels import cache, compile
-    choices[" ".join(name)] = [compile.COMPILER.__name__, *cache.troubles.values()]
+    from radarsim.kernels import cache, compiler
+    choices[" ".join(name)] = [compiler.COMPILER.__name__, *cache.troubles.values()]
 hidden_numba.hide(names)
 from tests.kernels import test_numba_options
 print(json.dumps([choices, test_numba_options.numbers()]))
 """
 
 
-@compile.kernel
+@compiler.kernel
 def follow(x, z, gain):
     for _ in range(3):
         scan_value(x, z, 0.5, gain)
@@ -60,43 +60,43 @@ def test_without_any_private_name_kernels_give_the_same_numbers(libraries):
     assert done.returncode == 0, done.stderr
     choices, values = json.loads(done.stdout)
     assert len(choices) > 12
-    for name, (compiler, *lines) in choices.items():
-        assert compiler == numba_options.__name__
+    for name, (chosen, *lines) in choices.items():
+        assert chosen == numba_options.__name__
         (line,) = lines
         assert f"cannot import name {name.split()[-1]!r}" in line
     assert values == pytest.approx(numbers(), rel=1e-14, abs=1e-14)
 
 
 def without_lowering(monkeypatch):
-    monkeypatch.setattr(compile.COMPILER.WideLowering, "lowering_class", None)
+    monkeypatch.setattr(compiler.COMPILER.WideLowering, "lowering_class", None)
 
 
 def without_reduction(monkeypatch):
-    monkeypatch.delattr(compile.COMPILER.CompileResult, "_reduce")
+    monkeypatch.delattr(compiler.COMPILER.CompileResult, "_reduce")
 
 
 def with_a_wrong_number(monkeypatch):
-    monkeypatch.setattr(compile.COMPILER, "compile_inline", lambda function, flags: numba.njit(lambda x: x))
+    monkeypatch.setattr(compiler.COMPILER, "compile_inline", lambda function, flags: numba.njit(lambda x: x))
 
 
 @pytest.mark.parametrize("harm", [None, without_lowering, without_reduction, with_a_wrong_number])
 def test_an_unknown_release_compiles_a_small_kernel_first(monkeypatch, tmp_path, harm):
     monkeypatch.setattr(numba, "__version__", "0.99.0rc1")
     monkeypatch.setattr(cache, "ROOT", tmp_path)
-    monkeypatch.setattr(compile, "troubles", {})
+    monkeypatch.setattr(cache, "troubles", {})
     if harm is None:
-        assert compile.choose_compiler() is compile.COMPILER
-        assert compile.troubles == {}
+        assert compiler.choose_compiler() is compiler.COMPILER
+        assert cache.troubles == {}
         return
     harm(monkeypatch)
-    assert compile.choose_compiler() is numba_options
-    assert compile.troubles["compiler"].startswith("Numba 0.99.0rc1 differs inside")
+    assert compiler.choose_compiler() is numba_options
+    assert cache.troubles["compiler"].startswith("Numba 0.99.0rc1 differs inside")
 
 
 def test_a_known_release_costs_nothing(monkeypatch):
     monkeypatch.setattr(numba, "__version__", "0.68.1")
-    monkeypatch.setattr(compile, "check_compiler", lambda compiler: pytest.fail("it compiles"))
-    assert compile.choose_compiler() is compile.COMPILER
+    monkeypatch.setattr(compiler, "check_compiler", lambda compiler: pytest.fail("it compiles"))
+    assert compiler.choose_compiler() is compiler.COMPILER
 
 
 @pytest.mark.slow

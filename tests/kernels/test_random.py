@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
+from radarsim.kernels import polynomials
 from radarsim.kernels import random as kernels
 from tests.tolerances import assert_rounded, rounding, units_off
 
@@ -24,7 +25,7 @@ def entry(function):
 
 
 threefry, uniform, normal_pair = entry(kernels.threefry), entry(kernels.uniform), entry(kernels.normal_pair)
-log_polynomial, sine_cosine_polynomial = entry(kernels.log_polynomial), entry(kernels.sine_cosine_polynomial)
+log_polynomial, sine_cosine_polynomial = entry(polynomials.log_polynomial), entry(polynomials.sine_cosine_polynomial)
 
 
 def normals(seed=1, name="test", first=0, pair=0, count=N // 2):

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.kernels import traced
+from radarsim.kernels import formula_functions, small_matrices, tracing
 from radarsim.kernels.call_graph import source_hash
-from radarsim.kernels.compile import kernel
-from radarsim.kernels.lanes import WIDTH, address, emitted, row, rows
-from radarsim.kernels.traced import OneForAll, Trace, where
+from radarsim.kernels.compiler import kernel
+from radarsim.kernels.lane_programs import emit_program
+from radarsim.kernels.lanes import WIDTH, address, row, rows
+from radarsim.kernels.tracing import NeedsOneValue, Trace, where
 from tests.tolerances import absolute_product, assert_rounded, rounding, units_off
 
 
@@ -24,8 +25,8 @@ def in_lanes(function, *columns):
     found = function(*trace.rows(0, (0.0,) * len(columns)))
     wide = isinstance(found, tuple)
     trace.write(1, found)
-    many, results = columns[0].size // WIDTH, traced.count(found)
-    run = emitted(trace.program())
+    many, results = columns[0].size // WIDTH, tracing.count_numbers(found)
+    run = emit_program(trace.program())
     inputs = len(columns)
 
     @kernel
@@ -57,15 +58,15 @@ def precise(x):
 @EXTENDED
 def test_functions_are_those_of_the_library():
     """To the units that each states."""
-    assert units_off(in_lanes(traced.exp, 100 * SMALL), np.exp(precise(100 * SMALL))) < 3
+    assert units_off(in_lanes(formula_functions.exp, 100 * SMALL), np.exp(precise(100 * SMALL))) < 3
     near_one = np.concatenate([LARGE, 1 + 1e-3 * SMALL])
-    assert units_off(in_lanes(traced.log, near_one), np.log(precise(near_one))) < 3
-    assert np.array_equal(in_lanes(traced.sqrt, LARGE), np.sqrt(LARGE))
-    sine, cosine = in_lanes(traced.sine_cosine, WIDE)
+    assert units_off(in_lanes(formula_functions.log, near_one), np.log(precise(near_one))) < 3
+    assert np.array_equal(in_lanes(tracing.sqrt, LARGE), np.sqrt(LARGE))
+    sine, cosine = in_lanes(formula_functions.sine_cosine, WIDE)
     # Without fused multiply-adds four operations on numbers up to 1 round by half a unit, 2⁻⁵⁴, each.
     assert np.max(np.abs(sine - np.sin(precise(WIDE)))) < rounding()
     assert np.max(np.abs(cosine - np.cos(precise(WIDE)))) < rounding()
-    assert np.array_equal(in_lanes(traced.nearest, WIDE), np.rint(WIDE))
+    assert np.array_equal(in_lanes(tracing.nearest, WIDE), np.rint(WIDE))
 
 
 @EXTENDED
@@ -73,22 +74,22 @@ def test_angles_are_those_of_the_library():
     turns = np.concatenate([RNG.uniform(-math.pi, math.pi, 8000), np.arange(-8, 8) * (math.pi / 8)])
     size = np.exp(RNG.uniform(-100, 100, turns.size))
     x, y = size * np.cos(turns), size * np.sin(turns)
-    assert units_off(in_lanes(traced.atan2, y, x), np.arctan2(precise(y), precise(x))) < 3
-    assert traced.atan2(-0.0, -1.0) == math.pi  # zero has no sign
-    assert traced.atan2(0.0, -0.0) == 0.0
+    assert units_off(in_lanes(formula_functions.atan2, y, x), np.arctan2(precise(y), precise(x))) < 3
+    assert formula_functions.atan2(-0.0, -1.0) == math.pi  # zero has no sign
+    assert formula_functions.atan2(0.0, -0.0) == 0.0
     zero = np.zeros(8)
-    edges = in_lanes(traced.atan2, np.r_[0.0, 0, 1, -1, 0, 2, -2, 2], np.r_[1.0, -1, 0, 0, 0, 2, 2, -2])
+    edges = in_lanes(formula_functions.atan2, np.r_[0.0, 0, 1, -1, 0, 2, -2, 2], np.r_[1.0, -1, 0, 0, 0, 2, 2, -2])
     wanted = np.r_[0, math.pi, math.pi / 2, -math.pi / 2, 0, math.pi / 4, -math.pi / 4, 0.75 * math.pi]
     assert units_off(edges, precise(wanted)) < 3
-    assert np.array_equal(in_lanes(traced.wrapped, zero + 0.5), zero + 0.5)
-    assert_rounded(in_lanes(traced.wrapped, zero + 7), zero + 7 - math.tau, size=7)
+    assert np.array_equal(in_lanes(formula_functions.wrap_angle, zero + 0.5), zero + 0.5)
+    assert_rounded(in_lanes(formula_functions.wrap_angle, zero + 7), zero + 7 - math.tau, size=7)
 
 
 def branching(x, y):
     """Whatever a step may do, one text for floats and lanes."""
     pair = where((x > 0.0) & ~(y > 1.0), (x, -y), (y, 1))
     inside = where((x >= -1.0) | (y != x), abs(x) ** 3, 2.0)
-    return (*pair, inside, traced.least(x, y), traced.greatest(x, 0), 3 / (2 + x * x) - (+y))
+    return (*pair, inside, tracing.minimum(x, y), tracing.maximum(x, 0), 3 / (2 + x * x) - (+y))
 
 
 def test_branches_are_taken_lane_by_lane():
@@ -114,7 +115,7 @@ def test_comparisons_are_joined_and_counted_as_in_python():
     assert set(np.unique(wanted[:5])) == {0, 1}
     np.testing.assert_array_equal(wanted[0], (x <= 0) & (y <= 0))
     for number in (Trace().rows(0, 0.0), 1, 2.0):
-        with pytest.raises(traced.Unfit, match="join comparisons, got"):
+        with pytest.raises(tracing.UnsupportedFormula, match="join comparisons, got"):
             (Trace().rows(0, 0.0) > 0.0) & number
 
 
@@ -125,15 +126,20 @@ def test_small_matrices_are_those_of_the_textbook(n):
     upper = np.triu_indices(n)
 
     def unpacked(packed):
-        return np.array([traced.row_of(packed, n, i) for i in range(n)])
+        return np.array([small_matrices.row_of(packed, n, i) for i in range(n)])
 
     packed = tuple(P[upper])
-    assert_rounded(unpacked(traced.congruent(J, packed)), J @ P @ J.T, absolute_product(J, P, J.T), operations=2 * n)
     assert_rounded(
-        traced.normalised(packed, tuple(x)), x @ np.linalg.solve(P, x), condition=np.linalg.cond(P), operations=n**2
+        unpacked(small_matrices.congruence(J, packed)), J @ P @ J.T, absolute_product(J, P, J.T), operations=2 * n
+    )
+    assert_rounded(
+        small_matrices.normalised_square(packed, tuple(x)),
+        x @ np.linalg.solve(P, x),
+        condition=np.linalg.cond(P),
+        operations=n**2,
     )
     K = P @ h / (h @ P @ h + 0.3)
-    mean, shrunk = traced.updated(tuple(x), packed, tuple(h), 1.7, 0.3)
+    mean, shrunk = small_matrices.update(tuple(x), packed, tuple(h), 1.7, 0.3)
     S = absolute_product(h, P, h) + 0.3
     cancelled = S / (h @ P @ h + 0.3)  # S is a sum whose terms have signs, and K is divided by it
     size = absolute_product(P, h) * cancelled / (h @ P @ h + 0.3)
@@ -162,7 +168,7 @@ def branches_by_python(x):
     ],
 )
 def test_what_needs_one_value_is_refused_with_its_line(function):
-    with pytest.raises(OneForAll) as caught:
+    with pytest.raises(NeedsOneValue) as caught:
         function(Trace().rows(0, 0.0))
     frames = traceback.extract_tb(caught.value.__traceback__)
     own = [frame for frame in frames if frame.filename == __file__][-1]
@@ -173,7 +179,7 @@ def test_a_kernel_is_kept_by_what_its_programs_do():
     def kernel_of(function):
         trace = Trace()
         trace.write(1, function(trace.rows(0, 0.0)))
-        run = emitted(trace.program())
+        run = emit_program(trace.program())
         return lambda x, out: run((address(x), address(out)))
 
     kept = [source_hash(kernel_of(one)) for one in (lambda x: x * 2.0, lambda y: y * 2, lambda x: x * 3.0)]
@@ -181,7 +187,7 @@ def test_a_kernel_is_kept_by_what_its_programs_do():
 
 
 def test_a_number_of_numpy_leaves_arithmetic_to_the_lane():
-    assert isinstance(np.float64(2.0) * Trace().rows(0, 0.0), traced.Lane)
+    assert isinstance(np.float64(2.0) * Trace().rows(0, 0.0), tracing.Lane)
 
 
 def test_what_is_done_twice_stands_once_and_words_change_no_program():
@@ -198,16 +204,10 @@ def test_what_is_done_twice_stands_once_and_words_change_no_program():
 
 # ---- what authors may use, as the how-to has it ----
 PAGE = (Path(__file__).parents[2] / "docs/howto/own_study.md").read_text(encoding="utf-8")
-INNER = {
-    "elimination",
-    "is_number",
-    "leaves",
-    "count",
-    "mapped",
-    "numbered",
-    "power_of_two",
-    "stated",
-}  # of the program
+INNER = {  # of the program
+    *("case_value", "count_numbers", "eliminate", "is_number", "leaves"),
+    *("map_numbers", "power_of_two", "with_float_numbers"),
+}
 
 
 OPERATORS = {
@@ -217,14 +217,17 @@ OPERATORS = {
 
 
 def test_the_page_lists_every_function_of_numbers_with_its_docstring():
-    functions = {name: one for name, one in vars(traced).items() if inspect.isfunction(one) and name[0] != "_"}
-    wanted = {}
-    for name, one in functions.items():
-        if one.__module__ == traced.__name__ and name not in INNER:
-            words = " ".join(str(one.__doc__).split("\n\n")[0].split())
-            wanted[name] = f"({', '.join(inspect.signature(one).parameters)})` | {words}"
+    wanted, names = {}, set()
+    for module in (tracing, formula_functions, small_matrices):
+        functions = {name for name in vars(module) if inspect.isfunction(vars(module)[name]) and name[0] != "_"}
+        names |= functions
+        for name in functions - INNER:
+            function = getattr(module, name)
+            if function.__module__ == module.__name__:
+                text = " ".join(str(function.__doc__).split("\n\n")[0].split())
+                wanted[name] = f"({', '.join(inspect.signature(function).parameters)})` | {text}"
     rows = re.findall(r"^\| `(\w+)(\(.*\)` \| .*) \|$", PAGE, re.MULTILINE)
-    assert {name: row for name, row in rows if name in functions} == wanted
+    assert {name: row for name, row in rows if name in names} == wanted
 
 
 def test_the_operations_that_the_page_names_are_those_that_lanes_have():
@@ -232,9 +235,9 @@ def test_the_operations_that_the_page_names_are_those_that_lanes_have():
     named = set(" ".join(re.findall("`([^`]+)`", line)).split())
     assert named - {"n"} == {*OPERATORS, "abs", "**", "&", "|", "~"}
     x, y = Trace().rows(0, (0.0, 0.0))
-    assert all(isinstance(one(x, y), traced.Lane) for one in OPERATORS.values())
-    assert isinstance((x > y) & (x < y) | ~(x == y), traced.Mask)
-    assert isinstance(abs(x) ** 2, traced.Lane)
+    assert all(isinstance(one(x, y), tracing.Lane) for one in OPERATORS.values())
+    assert isinstance((x > y) & (x < y) | ~(x == y), tracing.Mask)
+    assert isinstance(abs(x) ** 2, tracing.Lane)
     for other in (operator.mod, operator.floordiv, operator.matmul, operator.lshift):
         with pytest.raises(TypeError):
             other(x, y)

@@ -4,7 +4,7 @@ from gettext import GNUTranslations
 
 import pytest
 
-from radarsim.language.catalogue import Entry, compiled, entries, written
+from radarsim.language.gettext_catalogue import Entry, catalogue_text, compile_catalogue, entries
 
 RUSSIAN = "nplurals=3; plural=(n%10==1 && n%100!=11 ? 0 : n%10>=2 && n%10<=4 && (n%100<10 || n%100>=20) ? 1 : 2);"
 HEADER = Entry("", translations={0: f"Content-Type: text/plain; charset=UTF-8\nPlural-Forms: {RUSSIAN}\n"})
@@ -23,11 +23,11 @@ MADE = [
 
 
 def test_what_is_written_comes_back():
-    assert entries(written(MADE)) == MADE
+    assert entries(catalogue_text(MADE)) == MADE
 
 
 def test_the_standard_library_reads_it():
-    said = GNUTranslations(compiled(MADE))
+    said = GNUTranslations(compile_catalogue(MADE))
     assert said.gettext("range") == "дальность"
     assert said.pgettext("genitive", "range") == "дальности"
     assert said.gettext('a "quoted"\n\\path\tand more') == "„так“\n\\и\tтак"

@@ -7,11 +7,13 @@ import re
 import pytest
 from making import messages
 
-from radarsim.app import configs, solve
-from radarsim.app.compare import chart, described
-from radarsim.app.configs import load
-from radarsim.app.quantities import Asked
-from radarsim.language import speaking, tr
+from radarsim.api import inventory
+from radarsim.api.configs import load
+from radarsim.api.design import question
+from radarsim.api.design.quantities import MeasuredQuantity
+from radarsim.api.doppler_chart import chart, describe_chart
+from radarsim.language.current import use_language
+from radarsim.language.translate import tr
 from radarsim.papers.claim_rows import decisive_value_words, expected_words, unit_after
 from radarsim.papers.interpretation_files import markdown_pages
 from radarsim.papers.interpretations import alternative_words
@@ -21,7 +23,7 @@ from radarsim.papers.paper_cases import key_differences
 from radarsim.papers.reasons import translate_reason
 from radarsim.papers.specification_curve import specification_curve
 from radarsim.report.quantities import SIGMA
-from radarsim.studies.range_doppler.chart import SAID
+from radarsim.studies.range_doppler.doppler_gain import PAGE_TERMS
 from radarsim.studies.range_doppler.study import exact_but_for
 from tests.language.test_russian import NAMES, shown, untranslated
 from tests.program import command
@@ -30,8 +32,8 @@ from tests.program import command
 @pytest.fixture(scope="module")
 def drawn():
     """The chart of a radar in Russian."""
-    with speaking("ru"):
-        return described(load("rls2").cases)
+    with use_language("ru"):
+        return describe_chart(load("rls2").cases)
 
 
 def test_the_chart_and_its_figures(drawn):
@@ -57,27 +59,27 @@ def test_the_live_page_is_russian_in_its_body_and_in_what_its_script_says(drawn)
         *re.findall(r'\b(?:translated|filled|part\(\w+,)\(?"([^"]+)"', script),
         *re.findall(r'"((?:takes|adds|the acc|{size})[^"]+)"', script),
     }
-    assert asked | {"range", "velocity", "acceleration"} == set(SAID)
-    assert all(said[text] != text for text in SAID)
+    assert asked | {"range", "velocity", "acceleration"} == set(PAGE_TERMS)
+    assert all(said[text] != text for text in PAGE_TERMS)
 
 
 def test_the_chart_table_is_the_same(tmp_path):
     english = chart("rls2", out=tmp_path / "en", figures=False)
-    with speaking("ru"):
+    with use_language("ru"):
         russian = chart("rls2", out=tmp_path / "ru", figures=False)
     assert (english.folder / "chart.csv").read_bytes() == (russian.folder / "chart.csv").read_bytes()
 
 
 def test_the_list_says_what_things_are_and_leaves_their_names():
-    with speaking("ru"):
+    with use_language("ru"):
         names = command("list")
         ended = command("list", "configs", "scenarios", "studies", "filters")
-    for title, _, rows in configs.inventory():
+    for title, _, rows in inventory.inventory():
         for row in rows:
             assert row[0] in names.stdout or "Configs" not in title
             assert row[0] in ended.stdout
             assert tr(row[-1]) == row[-1]
-            with speaking("ru"):
+            with use_language("ru"):
                 assert tr(row[-1]) in ended.stdout
                 assert tr(row[-1]) != row[-1]
 
@@ -85,7 +87,7 @@ def test_the_list_says_what_things_are_and_leaves_their_names():
 @pytest.mark.slow
 @pytest.mark.parametrize("claim", ["P1.4", "P1.5"])
 def test_interpretations_of_a_claim_and_their_curve(claim, tmp_path):
-    with speaking("ru"):
+    with use_language("ru"):
         done = judge_requests(judging_requests([claim]), out=tmp_path, figures=False)
         page = markdown_pages(done)
         over = done.papers[0].claims[0]
@@ -99,7 +101,7 @@ def test_interpretations_of_a_claim_and_their_curve(claim, tmp_path):
 def test_what_papers_leave_open_is_said_in_the_language():
     choices = [choice for paper in open_papers().values() for choice in paper.interpretations.choices]
     names = {one.name for choice in choices for one in choice.alternatives}
-    with speaking("ru"):
+    with use_language("ru"):
         said = {name: alternative_words(name) for name in names}
     assert {name: words for name, words in said.items() if untranslated(words, set())} == {}
     assert said["0.003"] == "0,003"
@@ -121,7 +123,7 @@ REASONS = (
 @pytest.mark.parametrize("why", REASONS)
 def test_reasons_of_claims_that_are_not_judged(why):
     assert translate_reason(why) == why
-    with speaking("ru"):
+    with use_language("ru"):
         said = translate_reason(why)
     assert untranslated(said, {"rls", "seed", "filters", "target", "radar"}) == []
     assert re.findall(r"\d+", said.replace(",", ".")) == re.findall(r"\d+", why)
@@ -146,7 +148,7 @@ def test_units_that_count_have_the_form_of_their_number():
     found = {"measured": 1.0, "exact": 1.0, "judged_lo": "", "judged_hi": "", "lo": 0.0, "hi": 3.0, "unit": "scans"}
     assert [unit_after(n, "scans") for n in (1, 2, 0.5)] == ["scan", "scans", "scans"]
     assert decisive_value_words(found) == "1 scan exactly"
-    with speaking("ru"):
+    with use_language("ru"):
         said = [unit_after(n, "scans") for n in (1, -2, 5, 1.5, 21, float("inf"))]
         assert said == ["обзор", "обзора", "обзоров", "обзора", "обзор", "обзора"]
         assert decisive_value_words(found) == "1 обзор точно"
@@ -157,14 +159,14 @@ def test_units_that_count_have_the_form_of_their_number():
 
 def test_what_solve_announces():
     said = []
-    with speaking("ru"):
-        solve.predict(
+    with use_language("ru"):
+        question.predict_duration(
             said.append,
             tr("computes the {quantity} at about {count} values of {key}", quantity="q", count=7, key="k"),
             12.3,
         )
         near = tr(exact_but_for(load("rls2", ["radar.detection_probability=0.9", "scans=22"]).cases[0]))
-        quantity = Asked(SIGMA, "r", "Vr", at_s=60.0).said
+        quantity = MeasuredQuantity(SIGMA, "r", "Vr", at_s=60.0).said
     assert said == ["вычисляется q примерно при 7 значениях k: около 12 с"]
     assert near.startswith("среднее")
     assert untranslated(near, set()) == []
@@ -176,7 +178,7 @@ def test_what_import_says_is_russian_and_its_faults_and_its_file_are_not(tmp_pat
     log.write_text("time,track,range_m\n0,1,1000\n5,1,1100\n5,1,1100\n9,,900\n")
     command("import", log, "-o", plots)
     english = plots.read_bytes()
-    with speaking("ru"):
+    with use_language("ru"):
         said = command("import", log, "-o", plots)
         fault = command("import", log, "-o", plots, "--track", "1", "--bias", "range_m=9999", code=2)
     assert re.search(r"plots.csv \(3 строки, 1 трасса: .*\n +csv, прочитано 4 записи", said.stdout)

@@ -7,18 +7,20 @@ from types import SimpleNamespace
 import pytest
 from making import messages
 
-from radarsim import language
 from radarsim.errors import ConfigError
-from radarsim.language import listed, numeral, plural, speaking, term, tr
+from radarsim.language import current, translate
+from radarsim.language.current import use_language
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import join_names, plural, term, tr
 from radarsim.report import wording
 from tests.program import command
 
-CODES = [code for code in language.known() if code != language.ENGLISH]
+CODES = [code for code in current.language_codes() if code != current.ENGLISH]
 
 
 @pytest.fixture(autouse=True)
 def _english(monkeypatch):
-    monkeypatch.delenv(language.VARIABLE, raising=False)
+    monkeypatch.delenv(current.VARIABLE, raising=False)
 
 
 def test_numbers_are_written_as_the_language_writes_them():
@@ -26,7 +28,7 @@ def test_numbers_are_written_as_the_language_writes_them():
     assert numeral("-1,234.5") == "−1,234.5"
     assert tr("a span of {span:.4g} m/s", span=6.678e9) == "a span of 6.678·10⁹ m/s"
     assert numeral("+1e-05") == "+10⁻⁵"
-    with speaking("ru"):
+    with use_language("ru"):
         assert numeral("1.72e-05") == "1,72·10⁻⁵"
         assert tr("a span of {span:.4g} m/s", span=-1.5) == "интервал однозначности −1,5 м/с"
         assert numeral("-1,234.5") == "−1\N{NARROW NO-BREAK SPACE}234,5"
@@ -47,13 +49,13 @@ def test_numbers_are_written_as_the_language_writes_them():
 )
 def test_counts(count, english, russian):
     assert plural("{count} run", "{count} runs", count) == english
-    with speaking("ru"):
+    with use_language("ru"):
         assert plural("{count} run", "{count} runs", count) == russian
 
 
 def test_a_word_has_the_form_that_its_place_asks_for():
     assert tr("σ of the {quantity}", quantity=term("range")) == "σ of the range"
-    with speaking("ru"):
+    with use_language("ru"):
         assert tr(term("range")) == "дальность"
         assert tr("σ of the {quantity}", quantity=term("range")) == "СКО дальности"
         assert tr("σ of the {quantity}", quantity="range") == "СКО range"  # no word of ours
@@ -61,7 +63,7 @@ def test_a_word_has_the_form_that_its_place_asks_for():
 
 def test_messages_that_differ_in_their_numbers_are_translated_once():
     assert tr("σ of f# at -0.5 s of 3") == "σ of f# at -0.5 s of 3"
-    with speaking("ru"):
+    with use_language("ru"):
         for n in (2, 20, 7):
             assert tr(f"smoothed σ after {n} plots, over the formula").count(f" {n} ") == 1
         assert tr("largest relative difference in σ of the two at ρ = -0.5").endswith("ρ = −0,5")
@@ -70,41 +72,50 @@ def test_messages_that_differ_in_their_numbers_are_translated_once():
 
 @pytest.mark.parametrize("code", CODES)
 def test_a_translation_has_as_many_numbers_as_its_message(code):
-    entries = [one for one in language.messages(code) if language.ANY in one.id]
+    entries = [one for one in current.messages(code) if translate.NUMBER_PLACEHOLDER in one.id]
     assert len(entries) > 50
-    assert [one.id for one in entries if one.translations[0].count(language.ANY) != one.id.count(language.ANY)] == []
+    assert [
+        one.id
+        for one in entries
+        if one.translations[0].count(translate.NUMBER_PLACEHOLDER) != one.id.count(translate.NUMBER_PLACEHOLDER)
+    ] == []
 
 
 def test_what_is_not_translated_is_said_in_english():
-    with speaking("ru"):
+    with use_language("ru"):
         assert tr("no such message") == "no such message"
         assert tr("") == ""
 
 
 def test_names_in_a_sentence():
-    assert [listed(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == ["", "a", "a and b", "a, b and c"]
-    with speaking("ru"):
-        assert listed(["a", "b", "c"]) == "a, b и c"
+    assert [join_names(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])] == [
+        "",
+        "a",
+        "a and b",
+        "a, b and c",
+    ]
+    with use_language("ru"):
+        assert join_names(["a", "b", "c"]) == "a, b и c"
 
 
 def test_the_option_comes_before_the_variable_and_both_before_english(monkeypatch):
-    assert language.current() == "en"
-    monkeypatch.setenv(language.VARIABLE, "ru")
-    assert language.current() == "ru"
-    with speaking("en"):
-        assert language.current() == "en"
-    monkeypatch.setenv(language.VARIABLE, "")
-    assert language.current() == "en"
+    assert current.current_language() == "en"
+    monkeypatch.setenv(current.VARIABLE, "ru")
+    assert current.current_language() == "ru"
+    with use_language("en"):
+        assert current.current_language() == "en"
+    monkeypatch.setenv(current.VARIABLE, "")
+    assert current.current_language() == "en"
 
 
 def test_an_unknown_language_is_one_line_and_exit_2(monkeypatch):
-    known = ", ".join(language.known())
+    known = ", ".join(current.language_codes())
     for arguments in (["--language", "xx", "list"], ["list", "--language", "xx"]):
         assert command(*arguments, code=2).stderr == f"--language: must be one of {known}, got 'xx'\n"
-    monkeypatch.setenv(language.VARIABLE, "xx")
+    monkeypatch.setenv(current.VARIABLE, "xx")
     assert command("list", code=2).stderr == f"RADARSIM_LANGUAGE: must be one of {known}, got 'xx'\n"
     with pytest.raises(ConfigError, match="RADARSIM_LANGUAGE"):
-        language.current()
+        current.current_language()
 
 
 @pytest.mark.slow
@@ -116,7 +127,7 @@ def test_every_message_is_translated(code):
 
 @pytest.mark.parametrize("code", CODES)
 def test_a_translation_has_the_places_of_its_message(code):
-    for entry in language.messages(code):
+    for entry in current.messages(code):
         if not entry.id or entry.context:
             continue
         allowed = {*places(entry.id), *places(entry.plural)}
@@ -128,7 +139,7 @@ def test_a_translation_has_the_places_of_its_message(code):
 
 @pytest.mark.parametrize("code", CODES)
 def test_a_word_that_has_a_form_has_every_form_that_is_asked_for(code):
-    entries = language.messages(code)
+    entries = current.messages(code)
     asked = {spec for one in entries for said in one.translations.values() for spec in forms(said)}
     words = {one.id for one in entries if one.context in asked}
     assert words
@@ -139,7 +150,7 @@ def test_a_word_that_has_a_form_has_every_form_that_is_asked_for(code):
 @pytest.mark.parametrize("code", CODES)
 def test_no_letter_of_a_translation_is_latin_by_mistake(code):
     """A Latin a, c, e, o, p or x inside a Cyrillic word looks right and is not."""
-    for entry in language.messages(code):
+    for entry in current.messages(code):
         for said in entry.translations.values():
             mixed = re.findall(r"[А-Яа-яё][A-Za-z]|[A-Za-z][А-Яа-яё]", said.replace("\\n", " "))
             assert not mixed, said
@@ -163,11 +174,13 @@ def forms(message):
 
 def test_names_with_commas_stay_one_name_in_a_row():
     """`cured, gated` is one filter, not two: in questions, captions and warnings."""
-    from radarsim.report import notes, seen
+    from radarsim.report import answer_warnings, captions
 
     names = ["sequence", "cured", "cured, gated", "dense"]
-    assert language.few(names) == seen.join_names(names) == "sequence, cured, “cured, gated” and dense"
-    assert notes.few_realisations_warning([SimpleNamespace(name=one, count=9) for one in names]) == [
+    assert (
+        translate.shorten_names(names) == captions.join_few_names(names) == "sequence, cured, “cured, gated” and dense"
+    )
+    assert answer_warnings.few_realisations_warning([SimpleNamespace(name=one, count=9) for one in names]) == [
         "sequence, cured, “cured, gated” and dense: intervals from 9 realisations are rough: run at least 200"
     ]
-    assert language.few(["cured, gated"]) == "cured, gated"
+    assert translate.shorten_names(["cured, gated"]) == "cured, gated"

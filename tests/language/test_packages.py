@@ -6,10 +6,11 @@ import sys
 import pytest
 from click.testing import CliRunner
 
-from radarsim import language
-from radarsim.cli import main
-from radarsim.config.check import label
-from radarsim.language import speaking, term, tr
+from radarsim.cli.command_group import main
+from radarsim.config.labels import label
+from radarsim.language import current, translate
+from radarsim.language.current import use_language
+from radarsim.language.translate import term, tr
 from radarsim.studies import registry
 
 CATALOGUE = """
@@ -33,8 +34,10 @@ msgid "scan period"
 msgstr ""
 """
 CODE = """
-from radarsim.config.fields import Model, Study, Member, Members, Positive, key
-from radarsim.language import plural, term, tr
+from radarsim.config.key_types import Positive, key
+from radarsim.config.model import Model
+from radarsim.config.study_keys import StudyKeys, Member, Members
+from radarsim.language.translate import plural, term, tr
 
 RANGE = term("range")
 
@@ -45,7 +48,7 @@ class Sensor(Model):
     scan_period_s: Positive = key("scan period", "time between two plots, s")
     reach_m: Positive = key("range", "how far it sees, m")
 
-class Keys(Study):
+class Keys(StudyKeys):
     sensor: Sensor = key("sensor", "the sensor")
     filters: Members[Member] = key("filters", "the filters")
 """
@@ -60,12 +63,12 @@ def packages(tmp_path, monkeypatch):
     (tmp_path / "speaks" / "language").mkdir()
     (tmp_path / "speaks" / "language" / "ru.po").write_text(CATALOGUE, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(language, "packages", lambda: ("speaks", "silent", "not_imported"))
+    monkeypatch.setattr(current, "packages", lambda: ("speaks", "silent", "not_imported"))
     made = [importlib.import_module(name) for name in ("speaks", "silent")]
-    for kept in (language._read, language._translated):
+    for kept in (current._read, translate._translated_keys):
         kept.cache_clear()
     yield made
-    for kept in (language._read, language._translated):
+    for kept in (current._read, translate._translated_keys):
         kept.cache_clear()
     for name in ("speaks", "silent"):
         del sys.modules[name]
@@ -73,7 +76,7 @@ def packages(tmp_path, monkeypatch):
 
 def test_what_a_package_says_is_looked_up_in_its_catalogue_alone(packages):
     speaks, _ = packages
-    with speaking("ru"):
+    with use_language("ru"):
         assert [one.says("range") for one in packages] == ["диапазон", "range"]
         assert speaks.says("radial velocity") == "radial velocity"  # radarsim's, which it does not translate
         assert speaks.says("σ of the {quantity}", quantity=speaks.RANGE) == "своё диапазон"
@@ -82,7 +85,7 @@ def test_what_a_package_says_is_looked_up_in_its_catalogue_alone(packages):
 
 def test_its_words_stay_its_own_in_radarsims_sentences(packages):
     speaks, silent = packages
-    with speaking("ru"):
+    with use_language("ru"):
         assert tr("range") == tr(term("range")) == "дальность"
         assert tr("σ of the {quantity}", quantity=speaks.RANGE) == "СКО диапазона"
         assert tr("σ of the {quantity}", quantity=silent.RANGE) == "СКО range"
@@ -91,7 +94,7 @@ def test_its_words_stay_its_own_in_radarsims_sentences(packages):
 
 
 def test_what_radarsim_says_for_it_is_found_in_its_catalogue(packages):
-    with speaking("ru"):
+    with use_language("ru"):
         assert tr("a question of its own") == "свой вопрос"
     assert tr("a question of its own") == "a question of its own"
 
@@ -99,7 +102,7 @@ def test_what_radarsim_says_for_it_is_found_in_its_catalogue(packages):
 def test_keys_are_called_by_the_catalogue_of_their_schemas_package(packages):
     speaks, _ = packages
     ours = label(registry.keys("range_doppler"), "radar.scan_period_s").text
-    with speaking("ru"):
+    with use_language("ru"):
         assert tr(ours) == "период обзора"
         assert [tr(label(one.Keys, "sensor.scan_period_s").text) for one in packages] == ["scan period"] * 2
         assert [tr(label(one.Keys, "sensor.reach_m").text) for one in packages] == ["диапазон", "range"]
@@ -116,21 +119,21 @@ def test_keys_are_called_by_the_catalogue_of_their_schemas_package(packages):
     ],
 )
 def test_a_file_that_is_no_catalogue_harms_its_package_alone(packages, tmp_path, monkeypatch, content, fault):
-    monkeypatch.setattr(language, "faults", [])
+    monkeypatch.setattr(current, "faults", [])
     (tmp_path / "silent" / "language").mkdir()
     file = tmp_path / "silent" / "language" / "ru.po"
     file.write_bytes(content)
-    with speaking("ru"):
+    with use_language("ru"):
         assert [packages[1].says("range") for _ in range(2)] == ["range"] * 2
         assert tr("range") == "дальность"
         assert tr("no message of anybody") == "no message of anybody"
         assert packages[0].says("range") == "диапазон"
-    (line,) = language.faults
+    (line,) = current.faults
     assert line.startswith(f"package silent speaks English: {file}: {fault}")
 
 
 def test_a_command_says_once_which_catalogue_it_leaves_out(packages, monkeypatch):
-    monkeypatch.setattr(language, "faults", ["package silent speaks English: its file"])
+    monkeypatch.setattr(current, "faults", ["package silent speaks English: its file"])
     done = [CliRunner().invoke(main, ["list"]) for _ in range(2)]
     assert [one.exit_code for one in done] == [0, 0]
     assert [one.stderr for one in done] == ["package silent speaks English: its file\n", ""]

@@ -6,14 +6,15 @@ import re
 import pytest
 from making import messages
 
-from radarsim import language
-from radarsim.app import result as output
-from radarsim.app.configs import load
-from radarsim.app.run import run
-from radarsim.config.document import SHIPPED
-from radarsim.language import called, speaking, tr
-from radarsim.report.drawing import Figure
-from radarsim.report.tables import to_csv
+from radarsim.api import result_content, write_result
+from radarsim.api.configs import load
+from radarsim.api.run import run
+from radarsim.config.find_files import SHIPPED
+from radarsim.language import current, translate
+from radarsim.language.current import use_language
+from radarsim.language.translate import tr, translate_names
+from radarsim.report.csv_text import to_csv
+from radarsim.report.drawing.model import Figure
 
 # A config of each study, and what of each other kind is quick.
 QUICK = ["rls2", "multimodel_1hz", "sonar_asynchronous", "sonar_manoeuvre", "discriminator_noise", "ambiguous_rls2"]
@@ -90,12 +91,14 @@ def check(stem: str, realisations: int, folder) -> None:
     names = NAMES | {part for text in own_names(result) for part in re.findall("[A-Za-z]+", text)}
     config = (SHIPPED / "configs" / f"{stem}.yaml").read_text(encoding="utf-8")
     names |= {path.stem for path in (SHIPPED / "scenarios").glob("*.yaml") if f"target: {path.stem}" in config}
-    before = {name: to_csv(table) for name, table in output.case_tables(result.cases, stem=stem).items()}
-    with speaking("ru"):
-        made = output.case_tables(result.cases, stem=stem)
+    before = {name: to_csv(table) for name, table in result_content.case_tables(result.cases, stem=stem).items()}
+    with use_language("ru"):
+        made = result_content.case_tables(result.cases, stem=stem)
         assert {name: to_csv(table) for name, table in made.items()} == before
-        figures = output.case_figures(result.cases, made, result.experiment)
-        written = output.write_files(result.experiment, result.cases, folder / "ru", {}, draw=False, made=made)
+        figures = result_content.case_figures(result.cases, made, result.experiment)
+        written = write_result.write_files(
+            result.experiment, result.cases, folder / "ru", {}, draw=False, tables_by_name=made
+        )
         page = (written.folder / "report.html").read_text(encoding="utf-8")
         texts = [words for figure in figures.values() for words in shown(figure)]
         said = [result.question, *type(result).answer.func(result), *texts]
@@ -154,9 +157,9 @@ def test_the_check_sees_what_is_latin(said, left):
 @pytest.mark.slow
 def test_all_names_of_shipped_configs_are_in_russian_and_no_others():
     """No config is run: what its cases call things; a name that no config gives any more has no translation."""
-    with speaking("ru"):
-        names = output.names_in(case for stem in ALL for case in load(stem).cases)
-    labels = {one.id for one in language.messages("ru") if one.context == language.LABEL}
+    with use_language("ru"):
+        names = result_content.config_names(case for stem in ALL for case in load(stem).cases)
+    labels = {one.id for one in current.messages("ru") if one.context == translate.LABEL}
     assert labels - names == set()
     given = {own.name for stem in ALL for case in load(stem).cases for own in listed_in(case.spec)}
     given |= {case.spec.device for stem in ALL for case in load(stem).cases if case.spec.device}
@@ -171,7 +174,7 @@ def listed_in(spec):
 
 def test_claims_are_in_russian_words():
     """Statements, what their parts measure and how they are read; what is typed stands in quotes or as `a_key`."""
-    with speaking("ru"):
+    with use_language("ru"):
         said = {text: tr(text) for text, _, _ in messages.in_claims() if text}
     assert len(said) > 300
     kept = {"phi"}
@@ -181,18 +184,21 @@ def test_claims_are_in_russian_words():
 
 def test_names_of_a_config_are_said_as_whole_words_alone():
     names = frozenset({"memory", "memory test", "no memory", "turn", "modified combined"})
-    with speaking("ru"):
-        assert called("no memory; memory, memory test", names) == "без памяти; с памятью, memory test"
-        assert called("`turn.yaml`, target=turn, turn_2: turn.", names) == "`turn.yaml`, target=turn, turn_2: разворот."
-        assert called("modified\ncombined", names) == "мод.\nкомб."
-        assert [called(name) for name in ("memory", "memory test")] == ["с памятью", "memory test"]
-    assert called("no memory", names) == "no memory"
+    with use_language("ru"):
+        assert translate_names("no memory; memory, memory test", names) == "без памяти; с памятью, memory test"
+        assert (
+            translate_names("`turn.yaml`, target=turn, turn_2: turn.", names)
+            == "`turn.yaml`, target=turn, turn_2: разворот."
+        )
+        assert translate_names("modified\ncombined", names) == "мод.\nкомб."
+        assert [translate_names(name) for name in ("memory", "memory test")] == ["с памятью", "memory test"]
+    assert translate_names("no memory", names) == "no memory"
 
 
-@pytest.mark.parametrize("code", [code for code in language.known() if code != language.ENGLISH])
+@pytest.mark.parametrize("code", [code for code in current.language_codes() if code != current.ENGLISH])
 def test_names_of_a_config_stay_apart_and_hold_commas_where_they_did(code):
     """Two filters must not get one name, and a list of names must part where it did."""
-    labels = {one.id: one.translations[0] for one in language.messages(code) if one.context == language.LABEL}
+    labels = {one.id: one.translations[0] for one in current.messages(code) if one.context == translate.LABEL}
     assert len(set(labels.values())) == len(labels) > 100
     assert [name for name, said in labels.items() if (", " in name) != (", " in said)] == []
 

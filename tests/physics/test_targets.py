@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 
-from radarsim import constants, physics
-from radarsim.physics import manoeuvre_covariance, transition
+from radarsim import constants
+from radarsim.physics import targets
+from radarsim.physics.motion import manoeuvre_covariance, transition
 from tests.tolerances import assert_rounded, rounding
 
 T = np.linspace(0.0, 60.0, 60001)
 TRUTHS = {
-    "polynomial": (physics.polynomial([1e5, -250.0, 4.0, 0.01], T), []),
-    "acceleration_start": (physics.acceleration_start([1e5, -250.0], 12.0, 20.0, T), [20.0]),
-    "jerk_pulse": (physics.jerk_pulse([1e5, -250.0, 4.0], 3.0, 20.0, 10.0, T), [20.0, 30.0]),
-    "turn": (physics.turn(1e5, 300.0, 2.5, 3.0, 20.0, 10.0, T), [20.0, 30.0]),
-    "fly_by": (physics.fly_by(3e3, 250.0, 9e3, T), []),
-    "turn of more than a circle": (physics.turn(4e4, 250.0, 3.0, -5.0, 5.0, 45.0, T), [5.0, 50.0]),
+    "polynomial": (targets.polynomial([1e5, -250.0, 4.0, 0.01], T), []),
+    "acceleration_start": (targets.acceleration_start([1e5, -250.0], 12.0, 20.0, T), [20.0]),
+    "jerk_pulse": (targets.jerk_pulse([1e5, -250.0, 4.0], 3.0, 20.0, 10.0, T), [20.0, 30.0]),
+    "turn": (targets.turn(1e5, 300.0, 2.5, 3.0, 20.0, 10.0, T), [20.0, 30.0]),
+    "fly_by": (targets.fly_by(3e3, 250.0, 9e3, T), []),
+    "turn of more than a circle": (targets.turn(4e4, 250.0, 3.0, -5.0, 5.0, 45.0, T), [5.0, 50.0]),
 }
 
 
@@ -39,7 +40,7 @@ def test_a_turn_keeps_its_speed_and_its_radius():
     speed, g = 300.0, 3.0
     period = 2 * np.pi * speed / (g * constants.STANDARD_GRAVITY_MPS2)
     t = np.array([0.0, 10.0, 10.0 + period])
-    x = physics.turn(1e5, speed, np.pi, g, 10.0, 2 * period, t)
+    x = targets.turn(1e5, speed, np.pi, g, 10.0, 2 * period, t)
     # Distances of 100 km, turned by angles of up to 2π that are themselves products of a few numbers.
     allowed = np.array([1e5, speed]) * 2 * np.pi
     assert_rounded(x[1, :2], [97000.0, -300.0], allowed, operations=6)
@@ -49,7 +50,7 @@ def test_a_turn_keeps_its_speed_and_its_radius():
 def test_turning_starts_at_the_start():
     """Before the turn a straight line; at aspect pi it is radial and without acceleration."""
     t = np.array([0.0, 5.0, 9.999, 10.0])
-    x = physics.turn(1e5, 200.0, np.pi, 2.0, 10.0, 5.0, t)
+    x = targets.turn(1e5, 200.0, np.pi, 2.0, 10.0, 5.0, t)
     # v²/r less its radial part, and the lateral acceleration times the cosine of a right angle.
     lateral = 2.0 * constants.STANDARD_GRAVITY_MPS2
     assert_rounded(x[:3, 2], np.zeros(3), 200.0**2 / x[:3, 0], operations=8)
@@ -74,7 +75,7 @@ def test_manoeuvre_covariance_is_the_papers_matrix():
 
 def test_a_fly_by_is_closest_when_it_has_flown_the_leg():
     t = np.array([0.0, 4000.0 / 250.0, 8000.0 / 250.0])
-    x = physics.fly_by(3000.0, 250.0, 5000.0, t)
+    x = targets.fly_by(3000.0, 250.0, 5000.0, t)
     # The leg flown and its square root: some eight operations on numbers of the size of the leg.
     assert_rounded(x[:, 0], [5000, 3000, 5000], operations=8)
     assert_rounded(x[:, 1], [-200, 0, 200], 250.0 * np.ones(3), operations=8)
@@ -99,7 +100,7 @@ def numbers_of(kind, dt, steps):
 
 @pytest.mark.parametrize("kind", ["random_jerk", "white_jerk", "white_acceleration"])
 def test_process_noise_is_what_the_manoeuvre_leads_to(kind):
-    from radarsim.physics import process_noise
+    from radarsim.physics.motion import process_noise
 
     dt, steps = 3.0, 20_000
     # A step of the loop leaves out h³/6 of a jerk, 1/steps² of the position, twice that of its square; the midpoint

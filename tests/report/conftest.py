@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.engine.results import CaseResult
 from radarsim.studies.range_doppler import study as range_doppler
-from radarsim.studies.range_doppler.filters import error_recursion
+from radarsim.studies.range_doppler.error_recursion import error_recursion
 
 # The paper's table: σ_r (m), σ_V (m/s), Δt (s), scans for 140 s, wavelength (m).
 RADARS = {

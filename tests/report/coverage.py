@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binom
 
-from radarsim.app import result
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
-from radarsim.config.document import SHIPPED
+from radarsim.api import result_content
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
 from radarsim.config.experiment import Experiment
+from radarsim.config.find_files import SHIPPED
 from radarsim.engine.results import CaseResult
-from radarsim.report import notes
+from radarsim.report import interval_notes
 from radarsim.report.row_notes import concerns
 from radarsim.report.statistics import Z95
 from radarsim.studies import registry
@@ -128,7 +128,7 @@ def shipped(config: str, overrides: Sequence[str] = ()) -> pd.DataFrame:
 
 def table(found: pd.DataFrame) -> str:
     """Coverage of marked and of unmarked intervals as Markdown: by study, then by what the note says."""
-    found = found.assign(marked=~found["note"].isin(("", str(notes.VARIES))))
+    found = found.assign(marked=~found["note"].isin(("", str(interval_notes.BELIEVED_VARIES))))
     lines = ["| | intervals | marked | of these hold | of the others hold |", "|---|---|---|---|---|"]
     for study, own in [*found.groupby("study"), ("all", found)]:
         count, held = own.groupby("marked")["intervals"].sum(), own.groupby("marked")["held"].sum()
@@ -190,7 +190,7 @@ def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray
         for case, work, own in zip(experiment.cases, works, sums, strict=True)
     ]
     declared = registry.study(experiment.study).quantities()
-    return notes.add_notes(result.measured(results), results, exact=False, quantities=declared)
+    return interval_notes.add_notes(result_content.measured_tables(results), results, exact=False, quantities=declared)
 
 
 def _index(name: str, table: pd.DataFrame) -> pd.MultiIndex:

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app.result import Result
-from radarsim.config import document
+from radarsim.api.result import Result
+from radarsim.config import find_files
 from radarsim.errors import DisagreementError
-from radarsim.report import notes, tables
+from radarsim.report import exact_check, tables
 from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import ERROR_OF_PROGRAM, Z95, Estimate, rate, root_mean_square, standard_errors
 from tests.program import command
@@ -60,40 +60,40 @@ def made(*results):
 def test_each_row_of_each_table_counts(expected_radar):
     """Sums as they are expected agree; one σ of 85 that is 3 % off, one bias, one gain are told with their place."""
     radar = expected_radar("rls2", count=100_000)
-    assert notes.disagreements(made(radar)) == []
+    assert exact_check.disagreements(made(radar)) == []
     one = np.ones(radar.axes.exact_sigma.shape)
     one[1, 7, 1] = 1.03
     wrong = changed(radar, exact_sigma=radar.axes.exact_sigma * one)
-    (line,) = notes.disagreements(made(wrong))
+    (line,) = exact_check.disagreements(made(wrong))
     assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): sigma measured ")
     assert "1 of 85 rows of this column exceed 5.85" in line
     moved = changed(radar, exact_bias=radar.axes.exact_bias + 0.05 * radar.axes.exact_sigma * (one > 1))
-    (line,) = notes.disagreements(made(moved))
+    (line,) = exact_check.disagreements(made(moved))
     assert line.startswith("curves.csv: rls2, r+Vr, Vr, k = 8 (70 s): bias measured ")
-    (line,) = notes.disagreements(made(changed(radar, exact_gain=radar.axes.exact_gains + (one > 1))))
+    (line,) = exact_check.disagreements(made(changed(radar, exact_gain=radar.axes.exact_gains + (one > 1))))
     assert line.startswith("gains.csv: rls2, r+Vr, Vr, k = 8 (70 s): gain_percent measured ")
 
 
 def test_a_bias_taken_for_none_is_told(expected_radar):
     """A target that jerks: the filters lag, and an exact bias of zero is as wrong as the σ that is right beside it."""
     radar = expected_radar("rls2", target={"kind": "polynomial", "coefficients": [100e3, -250, 4, 0.3]})
-    assert notes.disagreements(made(radar)) == []
-    (line,) = notes.disagreements(made(changed(radar, exact_bias=0 * radar.axes.exact_bias)))
+    assert exact_check.disagreements(made(radar)) == []
+    (line,) = exact_check.disagreements(made(changed(radar, exact_bias=0 * radar.axes.exact_bias)))
     assert "bias measured" in line
 
 
 def test_few_realisations_say_nothing(expected_radar):
     few = expected_radar("rls2", count=150)
     wrong = changed(few, exact_sigma=2 * few.axes.exact_sigma, exact_gain=few.axes.exact_gains - 90)
-    assert notes.disagreements(made(wrong)) == []
+    assert exact_check.disagreements(made(wrong)) == []
 
 
 def test_what_is_nearly_exact_may_differ_by_as_much(expected_radar):
     """At 10¹⁰ realisations a ten-thousandth is 14 standard errors."""
     radar = expected_radar("rls2", count=10**10)
     near = made(changed(radar, exact_sigma=radar.axes.exact_sigma * 1.0001))
-    assert len(notes.disagreements(near)) == 1
-    assert notes.disagreements(near, ["rls2"]) == []
+    assert len(exact_check.disagreements(near)) == 1
+    assert exact_check.disagreements(near, ["rls2"]) == []
 
 
 def curves(sigma, exact, kurtosis, bias=(0.0, 0.0), exact_bias=(0.0, 0.0), n=100_000):
@@ -110,7 +110,7 @@ def curves(sigma, exact, kurtosis, bias=(0.0, 0.0), exact_bias=(0.0, 0.0), n=100
 
 
 def told(table):
-    return [line.partition(" measured")[0] for line in notes.disagreements({"curves": table})]
+    return [line.partition(" measured")[0] for line in exact_check.disagreements({"curves": table})]
 
 
 SECOND = "curves.csv: one, f, r, k = 2 (1 s): "
@@ -133,8 +133,8 @@ def test_a_mean_of_squares_that_a_study_declares_is_held_likewise():
         own = made[["case", "filter", "component", "k", "n"]].assign(area=[1, value])
         own = own.assign(area_lo=own["area"] - 0.01, area_hi=own["area"] + 0.01, exact_area=1.0)
         both = {"curves": made, "areas": own}
-        assert len(notes.disagreements(both, quantities=[area])) == faults
-        assert len(notes.disagreements(both)) == 1
+        assert len(exact_check.disagreements(both, quantities=[area])) == faults
+        assert len(exact_check.disagreements(both)) == 1
 
 
 def test_a_bias_may_lack_what_eighteen_realisations_make():
@@ -156,8 +156,8 @@ def test_a_bias_makes_errors_no_less_gaussian():
 
 def test_columns_by_their_names():
     names = ["case", "rate", "rate_lo", "rate_hi", "bias", "bias_se", "exact_bias", "exact_rate", "exact_other"]
-    assert [one.value for one in notes.exact_columns(pd.DataFrame(columns=names))] == ["bias", "rate"]
-    (one,) = notes.exact_columns(pd.DataFrame(columns=["case", "error_probability", "lo", "hi", "exact"]))
+    assert [one.value for one in exact_check.exact_columns(pd.DataFrame(columns=names))] == ["bias", "rate"]
+    (one,) = exact_check.exact_columns(pd.DataFrame(columns=["case", "error_probability", "lo", "hi", "exact"]))
     assert one == ("error_probability", "lo", "hi", "exact")
 
 
@@ -197,11 +197,11 @@ def test_one_config_that_disagrees_does_not_stop_the_others(tmp_path, monkeypatc
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stem", sorted(path.stem for path in (document.SHIPPED / "configs").glob("*.yaml")))
+@pytest.mark.parametrize("stem", sorted(path.stem for path in (find_files.SHIPPED / "configs").glob("*.yaml")))
 def test_no_alarm_over_the_shipped_configs(stem):
     """Six seeds of 300 realisations, two of 2000: no exact value is further off than chance puts it."""
     for n, seed in (*((300, 1000 + i) for i in range(6)), (2000, 1), (2000, 2)):
         result = radarsim.run(stem, realisations=n, seed=seed)
         assert result.faults == ()
-        if not any(set(notes.exact_columns(table)) for table in result.tables.values()):
+        if not any(set(exact_check.exact_columns(table)) for table in result.tables.values()):
             break

@@ -2,11 +2,11 @@
 
 import pytest
 
-from radarsim import language
-from radarsim.app import result as output
-from radarsim.app.run import run
-from radarsim.config.document import SHIPPED
-from radarsim.report import html
+from radarsim.api import result_content
+from radarsim.api.run import run
+from radarsim.config.find_files import SHIPPED
+from radarsim.language import current
+from radarsim.report import page_sentences
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 FEW = ("rls2", "pulses_rls5", "ambiguous_rls2")
@@ -14,15 +14,15 @@ FEW = ("rls2", "pulses_rls5", "ambiguous_rls2")
 
 def unclosed(answer):
     """The paragraphs of an answer whose brackets do not close."""
-    parts = html.split_into_clauses(answer)
+    parts = page_sentences.split_into_clauses(answer)
     return [part for part in parts if any(part.count(a) != part.count(b) for a, b in ("[]", "()"))]
 
 
 def check_answer(config, n):
     result = run(config, realisations=n)
-    for code in language.known():
-        with language.speaking(code):
-            assert unclosed(output.make_answer(result.cases, result._tables).texts) == [], code
+    for code in current.language_codes():
+        with current.use_language(code):
+            assert unclosed(result_content.make_answer(result.cases, result._tables).texts) == [], code
     return result
 
 
@@ -35,7 +35,7 @@ def test_paragraphs_of_an_answer_close_their_brackets(config):
 @pytest.mark.parametrize("config", CONFIGS)
 def test_answers_and_figures_of_every_config_fit_a_page(config):
     result = check_answer(config, 200)
-    drawn = result.experiment.drawn(output.case_figures(result.cases, result._tables, result.experiment))
+    drawn = result.experiment.drawn(result_content.case_figures(result.cases, result._tables, result.experiment))
     assert 1 <= len(drawn) <= 8  # a page that is read
     named = result.experiment.figures
     assert len(drawn) >= 0.5 * len(named)  # of so few realisations some have nothing to show

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import configs
+from radarsim.api import configs
 from radarsim.papers import expected_ranges
 from radarsim.papers.claims_table import NOT_JUDGED, UNCLEAR, claim_rows, claims_table, disagreements, old_verdict
 from radarsim.papers.evidence import Curve, MissingEvidence, common_times, ratio, subtract
@@ -245,8 +245,8 @@ def test_simulation_checks_a_parts_own_exact_value(paper):
         return disagreements(claims_table(of, results, made, configs.shipped))
 
     assert errors(paper, None) == []
-    assert all("5.85" in line and line.startswith("P1.1: ") for line in errors(paper, lambda seen: 90.0))
-    assert len(errors(paper, lambda seen: 90.0)) == len(first.parts)
+    assert all("5.85" in line and line.startswith("P1.1: ") for line in errors(paper, lambda evidence: 90.0))
+    assert len(errors(paper, lambda evidence: 90.0)) == len(first.parts)
 
 
 def test_few_realisations_leave_it_open(expected_radar):

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from radarsim.app import configs
+from radarsim.api import configs
 from radarsim.papers.study_claims import paper_claims
 from radarsim.papers.verdict_rule import ABOUT, GRID, LIMIT, MATERIAL, PRINT, SAME
 

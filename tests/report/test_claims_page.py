@@ -5,8 +5,8 @@ from radarsim.papers.claims_page import _class_lines, claims_page
 from radarsim.papers.claims_table import NOT_RUN
 from radarsim.papers.forest_plot import BEYOND, MAX_DRAWN_MARGINS, _drawn_distance, forest_plot
 from radarsim.papers.verdict_rule import CONFIRMED, DEPENDS, REFUTED, UNDECIDED
-from radarsim.report.drawing import Line, Note
-from radarsim.report.figures import MARKERS
+from radarsim.report.drawing.model import Line, Note
+from radarsim.report.drawing.style import MARKERS
 
 
 def row(claim="P9.1", kind=REFUTED, **more):

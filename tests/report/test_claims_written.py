@@ -8,12 +8,13 @@ from types import ModuleType
 import pytest
 
 from radarsim.errors import ConfigError
-from radarsim.language import speaking, tr
+from radarsim.language.current import use_language
+from radarsim.language.translate import tr
 from radarsim.papers import evidence
 from radarsim.papers.claim_files import load_choices, load_claims, with_arguments, with_cases
 from radarsim.papers.evidence import ExactNumber
 from radarsim.papers.expected_ranges import above, printed
-from radarsim.papers.sonar.measures import FOUND
+from radarsim.papers.sonar.measures import CASE_FINDERS
 from radarsim.papers.study_claims import claims_of, interpretations_of, paper_claims
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
@@ -30,11 +31,11 @@ class Evidence(evidence.Evidence):
         return 7.0 * key * times
 
 
-def gain(seen: Evidence, key: int, pick: str, scan: int = 1) -> Estimate:
+def gain(evidence: Evidence, key: int, pick: str, scan: int = 1) -> Estimate:
     return Estimate(key, scan, len(pick))
 
 
-def exact_gain(seen: Evidence, key: int, pick: str, scan: int = 1) -> float:
+def exact_gain(evidence: Evidence, key: int, pick: str, scan: int = 1) -> float:
     return 10.0 * key
 
 
@@ -158,7 +159,7 @@ def test_every_case_that_p3_names_is_one_that_is_looked_for():
         for p in claim.parts
         for key in p.cases
     }
-    assert {key if isinstance(key, str) else key[0] for key in keys} == set(FOUND)
+    assert {key if isinstance(key, str) else key[0] for key in keys} == set(CASE_FINDERS)
 
 
 def test_a_list_reads_no_claims():
@@ -197,7 +198,7 @@ def test_a_choice_bears_on_claims_that_there_are():
 @pytest.mark.parametrize("language", ["en", "ru"])
 def test_a_choice_is_named_by_few_words_within_a_sentence(language):
     """In a list of several, and beside a figure."""
-    with speaking(language):
+    with use_language(language):
         said = [
             tr(one.asks)
             for name in registry.SHIPPED

@@ -10,8 +10,8 @@ from html import unescape
 import pytest
 
 import radarsim
-from radarsim.app import reproduce
-from radarsim.config import document as lookup
+from radarsim.api.maintenance import reproduce
+from radarsim.config import find_files
 from radarsim.errors import StoreError
 from radarsim.papers import list_claims, stored_verdicts, verdict_rule
 from radarsim.papers.claim_rows import classes_in_words, count_classes, group_by_claim, is_extension
@@ -25,7 +25,7 @@ from radarsim.papers.stored_verdicts import CLASSES, known_classes, shipped_clas
 from radarsim.papers.study_claims import paper_claims
 from radarsim.papers.verdict_classes import add_classes, class_words, rows_in_words, verdict_words
 from radarsim.papers.verdict_rule import CONFIRMED, CONTRADICTORY, DEPENDS, IMMATERIAL, REFUTED, UNDECIDED
-from radarsim.report import html
+from radarsim.report import index_page
 from tests.program import printed
 
 PAPERS = {claim.id: (of, claim) for of in paper_claims() for claim in of.claims}
@@ -78,7 +78,9 @@ def agree(out):
             assert reported(config)[claim].startswith(phrase), claim
     kinds = {claim: row["class"] for claim, row in rows.items()}
     counted, count = classes_in_words(every), sum(count_classes(every)[0].values())
-    assert f"claims   {count}: {counted}" in reproduce.summary([reproduce.Done("rls2", 1.0, "")], str(out), 1.0)
+    assert f"claims   {count}: {counted}" in reproduce.summary(
+        [reproduce.FinishedConfig("rls2", 1.0, "")], str(out), 1.0
+    )
     assert printed("claims", "--out", out).splitlines()[-2].removesuffix(" (in brackets)") == counted
     for line in _class_lines(every)[2:]:
         said, _, names = line.rpartition(": ")
@@ -133,7 +135,7 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     assert reported(tmp_path / "rls2")["P1.18"] == phrase
     assert "P1.18  depends    RLS 2" in printed("claims", "rls2", "--out", tmp_path)
     assert f"P1.18  {phrase}: RLS 2" in printed("claims", "rls2", "--parts", "--out", tmp_path)
-    html.write_index(tmp_path)
+    index_page.write_index(tmp_path)
     assert "1 confirmed, 2 depend on what the paper leaves open" in (tmp_path / "index.html").read_text()
     rows = list_claims.claims("rls2", out=tmp_path).rows
     assert drawn(rows)["P1.18"] == DEPENDS
@@ -225,6 +227,8 @@ def test_shipped_classes_are_what_interpretations_give(tmp_path):
 def test_every_shipped_config_says_one_class_of_a_claim(tmp_path):
     """Few realisations of everything, as `make reproduce-figures` does it."""
     small = ["realisations=200"]
-    done = reproduce.reproduce(lookup.stems("configs"), str(tmp_path), print, overrides=small, figures=False)
+    done = reproduce.reproduce(
+        find_files.available_stems("configs"), str(tmp_path), print, overrides=small, figures=False
+    )
     assert [one.faults for one in done if one.code not in (0, 4)] == []  # 4: an exact value, on so few
     agree(tmp_path)

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from radarsim.report import colours, figures
+from radarsim.report.drawing import colours, style
 from tests.tolerances import assert_rounded
 
 TO_XYZ = np.array(
@@ -100,7 +100,7 @@ def test_the_first_colours_lie_far_apart_in_grey():
 def test_curves_stand_out_from_light_and_dark_pages_and_their_names_can_be_read(colour):
     assert colours.contrast(colour, "#ffffff") >= 3
     assert colours.contrast(on_dark_page(colour), DARK_PAGE) >= 4.5
-    assert colours.contrast(figures.readable_colour(colour), "#ffffff") >= 4.5
+    assert colours.contrast(style.readable_colour(colour), "#ffffff") >= 4.5
 
 
 def test_contrast_is_that_of_the_standard():

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radarsim.report import compare, statistics, tables
-from radarsim.report.compare import Side
-from radarsim.report.drawing import Line
+from radarsim.report import csv_text, statistics, tables
+from radarsim.report.comparison import figures, pairs, sentences, table
+from radarsim.report.comparison.pairs import Side
+from radarsim.report.drawing.model import Line
 from radarsim.report.quantities import SIGMA, Quantity
 from tests.tolerances import assert_rounded, share_error
 
@@ -61,15 +62,15 @@ def held(rows):
 def test_intervals_cover_and_a_common_baseline_makes_them_narrower(errors):
     own, other = side("a", errors, ["base", "one"]), side("b", errors, ["base", "other"])
     renamed = {key: rows.assign(filter=rows["filter"].replace("other", "one")) for key, rows in other.tables.items()}
-    linked = compare.compared([compare.Pair(own, Side("b", "b", "b", "n", COUNT, renamed))])
+    linked = table.comparison_table([pairs.Pair(own, Side("b", "b", "b", "n", COUNT, renamed))])
     linked = linked[(linked["filter"] == "one") & (linked["quantity"] == "sigma")]
     linked = linked.assign(against_exact=RATIOS["other"])
-    assert set(linked["pairing"]) == {compare.LINKED}
+    assert set(linked["pairing"]) == {table.LINKED}
     share, width = held(linked)
     assert share > 0.95 - share_error(0.95, TIMES)
-    loose = compare.compared([compare.Pair(own, Side("b", "b", "b", "n", COUNT + 1, renamed))])
+    loose = table.comparison_table([pairs.Pair(own, Side("b", "b", "b", "n", COUNT + 1, renamed))])
     loose = loose[(loose["filter"] == "one") & (loose["quantity"] == "sigma")].assign(against_exact=RATIOS["other"])
-    assert set(loose["pairing"]) == {compare.UNLINKED}
+    assert set(loose["pairing"]) == {table.UNLINKED}
     assert held(loose)[0] > share
     assert held(loose)[1] > 1.3 * width
 
@@ -77,16 +78,16 @@ def test_intervals_cover_and_a_common_baseline_makes_them_narrower(errors):
 def test_independent_intervals_cover_95_per_cent(errors):
     rng = np.random.default_rng(8)
     apart = {f: RATIOS[f] * rng.standard_normal((TIMES, COUNT)) for f in RATIOS}
-    rows = compare.compared([compare.Pair(side("a", errors, ["one"]), side("b", apart, ["other"], noise="m"))])
+    rows = table.comparison_table([pairs.Pair(side("a", errors, ["one"]), side("b", apart, ["other"], noise="m"))])
     rows = rows[rows["quantity"] == "sigma"]
-    assert set(rows["pairing"]) == {compare.INDEPENDENT}
+    assert set(rows["pairing"]) == {table.INDEPENDENT}
     assert set(rows["against_filter"]) == {"other"}
     assert abs(held(rows)[0] - 0.95) < share_error(0.95, TIMES)
 
 
 def test_the_same_numbers_differ_by_nothing(errors):
-    rows = compare.compared([compare.Pair(side("a", errors, ["base", "one"]), side("b", errors, ["base", "one"]))])
-    assert set(rows["pairing"]) == {compare.SAME}
+    rows = table.comparison_table([pairs.Pair(side("a", errors, ["base", "one"]), side("b", errors, ["base", "one"]))])
+    assert set(rows["pairing"]) == {table.SAME}
     for column in ("difference", "difference_lo", "difference_hi"):
         assert (rows[column] == 0).all()
 
@@ -96,10 +97,10 @@ def test_the_baseline_against_another_filter_is_paired_like_a_gain(errors):
     lone = {key: rows[rows["filter"] == "base"].assign(filter="one") for key, rows in both.tables.items()}
     # The baseline of `b` has the name of the filter that it answers to.
     base = Side("b", "b", "b", "n", COUNT, lone | {"gains": both.tables["gains"].assign(baseline="one").head(1)})
-    rows = compare.compared([compare.Pair(both, base)])
+    rows = table.comparison_table([pairs.Pair(both, base)])
     rows = rows[(rows["quantity"] == "sigma") & (rows["filter"] == "one")]
     gains = both.tables["gains"]
-    assert set(rows["pairing"]) == {compare.LINKED}
+    assert set(rows["pairing"]) == {table.LINKED}
     # Equal to the first order in 1/n; a gain's interval lacks the skewness of the single ones.
     for end, of in (("percent_lo", "gain_hi"), ("percent_hi", "gain_lo")):
         apart = rows[end].to_numpy() + gains[of].to_numpy()
@@ -111,25 +112,25 @@ def test_cases_answer_to_one_another_by_their_swept_values():
         return [Side(run, case, case, None, 1, {}) for case in cases]
 
     first, second = of("a", "a q=1", "a q=2"), of("b", "b q=2", "b q=3")
-    found, alone = compare.pairs([first, second])
+    found, alone = pairs.pairs([first, second])
     assert [(pair.side.case, pair.against.case) for pair in found] == [("b q=2", "a q=2")]
     assert alone == ["b q=3: no such case in a"]
-    found, alone = compare.pairs([of("mine", "mine"), first])
+    found, alone = pairs.pairs([of("mine", "mine"), first])
     assert [pair.against.case for pair in found] == ["mine", "mine"]
     assert not alone
 
 
 def test_figures_have_all_sides_on_common_axes_and_sentences_the_exact_change(errors):
-    pair = compare.Pair(side("b", errors, ["base", "one"], noise="m"), side("a", errors, ["base", "one"]))
-    made = compare.compared([pair])
-    drawn = compare.figures([pair.against, pair.side], made)
+    pair = pairs.Pair(side("b", errors, ["base", "one"], noise="m"), side("a", errors, ["base", "one"]))
+    made = table.comparison_table([pair])
+    drawn = figures.figures([pair.against, pair.side], made)
     values, apart = drawn["sigma_r"].panels
     assert [mark.name for mark in values.marks] == ["a, base", "a, one", "b, base", "b, one"]
     assert len([mark for mark in apart.marks if isinstance(mark, Line)]) == 2
     looks = {(m.style.colour, m.style.dash) for m in values.marks}
     assert len(looks) == 4
-    assert compare.sentences(made)[1].endswith("], exactly 0 %.")
-    assert compare.percent(2886.76) == "29.9 times"
+    assert sentences.sentences(made)[1].endswith("], exactly 0 %.")
+    assert sentences.percent_text(2886.76) == "29.9 times"
 
 
 def test_a_quantity_that_both_studies_measure_has_figures_of_its_own(errors):
@@ -142,7 +143,7 @@ def test_a_quantity_that_both_studies_measure_has_figures_of_its_own(errors):
         columns = {new: one.tables["curves"][f"sigma{new[4:]}"] ** 2 for new in ("area", "area_lo", "area_hi")}
         areas = one.tables["curves"][["case", "filter", "component", "t_s"]].assign(inside=0.5, **columns)
         sides.append(replace(one, tables={**one.tables, "areas": areas}, measured=measured))
-    drawn = compare.figures(sides, compare.compared([compare.Pair(sides[1], sides[0])]))
+    drawn = figures.figures(sides, table.comparison_table([pairs.Pair(sides[1], sides[0])]))
     assert set(drawn) == {"sigma_r", "area_r"}
     values, apart = drawn["area_r"].panels
     assert (values.y.label, apart.y.label) == ("mean square error $r$, m²", "change against a, %")
@@ -151,7 +152,7 @@ def test_a_quantity_that_both_studies_measure_has_figures_of_its_own(errors):
 
 def test_tables_read_back_as_they_were_written():
     made = tables.frame({"filter": ["nan", "1", "a,b", ""], "sigma": [0.1, np.nan, 1e-300, np.inf], "n": [1, 2, 3, 4]})
-    read = tables.from_csv(tables.to_csv(made))
+    read = csv_text.from_csv(csv_text.to_csv(made))
     assert read["filter"].tolist() == ["nan", "1", "a,b", ""]
     assert read["n"].tolist() == [1, 2, 3, 4]
     np.testing.assert_array_equal(read["sigma"], made["sigma"])

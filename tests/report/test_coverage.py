@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.report import notes, statistics
+from radarsim.api.configs import load
+from radarsim.report import interval_notes, statistics
 from radarsim.studies.range_doppler import study as range_doppler
 from tests.report.coverage import HIGH, LOW, every, kept, table
 
@@ -79,7 +79,7 @@ def test_unmarked_intervals_cover_in_the_first_study():
 def test_unmarked_intervals_of_every_shipped_config_cover_and_marked_ones_do_not():
     """Of every table: docs/trust.md shows what it prints."""
     found = every()
-    found = found[found["note"].ne(str(notes.VARIES))]
+    found = found[found["note"].ne(str(interval_notes.BELIEVED_VARIES))]
     found = found.assign(marked=found["note"].ne(""))
     count, held = (found.groupby("marked")[name].sum() for name in ("intervals", "held"))
     share = held / count
@@ -111,7 +111,7 @@ def test_rare_errors_that_last_are_marked_where_a_sample_lacks_them(reach, monke
     """
     rng, runs, scans = np.random.default_rng(15), 50, 60
     if reach is not None:
-        monkeypatch.setattr(notes, "nearby", lambda curves: curves["n_eff"].to_numpy())
+        monkeypatch.setattr(interval_notes, "fewest_effective_nearby", lambda curves: curves["n_eff"].to_numpy())
     unmarked, held = np.zeros(scans, dtype=int), np.zeros(scans, dtype=int)
     truth = math.sqrt(1 + 3 / 1500 * 900)
     for _ in range(runs):
@@ -122,7 +122,7 @@ def test_rare_errors_that_last_are_marked_where_a_sample_lacks_them(reach, monke
         m2, m4 = squares.sum(axis=0), (squares**2).sum(axis=0)
         of, effective = statistics.root_mean_square(m2, m4, N), statistics.effective(m2, m4, N)
         curves = pd.DataFrame({"case": "a", "filter": "f", "component": "x", "k": range(scans), "n_eff": effective})
-        free = notes.nearby(curves) >= notes.EFFECTIVE
+        free = interval_notes.fewest_effective_nearby(curves) >= interval_notes.MIN_EFFECTIVE
         unmarked += free
         held += free & (of.lo <= truth) & (truth <= of.hi)
     share = held.sum() / max(unmarked.sum(), 1)

@@ -7,9 +7,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.axis import XAxis
 
-from radarsim.report import figures, panels, sweeps, tables
-from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.report import (
+    case_selection,
+    coinciding_lines,
+    key_labels,
+    panel_layout,
+    sweep_figures,
+    tables,
+    time_figures,
+)
+from radarsim.report.drawing import canvas as drawing_canvas
+from radarsim.report.drawing import line_names, line_points, style
+from radarsim.report.drawing.model import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.studies.range_doppler import figures as range_doppler_figures
 from radarsim.studies.range_doppler import tables as range_doppler
@@ -26,7 +37,7 @@ def line(n=20, **style):
 
 
 def drawn(figure):
-    return figures.render(figure).axes[0]
+    return drawing_canvas.render(figure).axes[0]
 
 
 def test_the_line_is_drawn_as_given():
@@ -51,11 +62,11 @@ def test_a_point_of_a_band_without_a_neighbour_has_a_whisker():
 
 def test_lines_that_never_lose_are_named_and_not_drawn():
     shares = [Line(np.arange(3.0), np.array(y), name) for y, name in (([1, 1, 1], "a"), ([1, 0.9, 0.8], "b"))]
-    (line,), said = panels.ever_lost(shares)
+    (line,), said = panel_layout.loss_lines(shares)
     assert line.label == "b"
     assert_rounded(line.y, [0, 0.1, 0.2], size=1)
     assert said == " Zero throughout, so not drawn: a. A zero has no point on this axis."
-    assert panels.ever_lost([replace(shares[1], y=np.full(3, 0.5))])[1] == ""
+    assert panel_layout.loss_lines([replace(shares[1], y=np.full(3, 0.5))])[1] == ""
 
 
 def test_markers_and_crosses_take_turns():
@@ -69,11 +80,11 @@ def test_all_kinds_of_marks_and_a_log_axis():
     heat = Heat(np.arange(3.0), np.arange(2.0), np.arange(6.0).reshape(2, 3), "value")
     bars = Bars(("a", "b"), np.array([1.0, 2.0]), np.array([0.9, 1.8]), np.array([1.1, 2.2]))
     pair = (Panel(Axis("x"), Axis("y"), (heat,)), Panel(Axis("x"), Axis("y"), (bars,)))
-    figures.save(Figure("two", "Two", "Two kinds.", pair, columns=2))
+    drawing_canvas.save(Figure("two", "Two", "Two kinds.", pair, columns=2))
     scatter = line(dash=None, marker=1)
     axis = Axis("y", "log", (0.1, None), ((0.1, "low"), (1.0, "high")))
     marks = (scatter, Reference(0.5, "x", "half"), Reference(0.5, label="half"), Note(1.0, 1.0, "here", "sw"))
-    axes = figures.render(Figure("log", "", "", (Panel(Axis("x"), axis, marks),))).axes[0]
+    axes = drawing_canvas.render(Figure("log", "", "", (Panel(Axis("x"), axis, marks),))).axes[0]
     assert [text.get_text() for text in axes.get_yticklabels()] == ["low", "high"]
     assert axes.get_yscale() == "log"
 
@@ -99,7 +110,9 @@ def curves(*values, names="abc", **more):
 
 def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
     near, far = [1.0, 2.0, 3.001], [1.0, 2.0, 3.1]
-    both = panels.joined(Figure("f", "", "Drawn.", (curves([1, 2, 3], near, [0, 0, 9]), curves([4, 5, 6], [4, 5, 6]))))
+    both = coinciding_lines.join_coinciding_lines(
+        Figure("f", "", "Drawn.", (curves([1, 2, 3], near, [0, 0, 9]), curves([4, 5, 6], [4, 5, 6])))
+    )
     assert [[mark.label for mark in panel.marks] for panel in both.panels] == [["a = b", "c"], ["a = b"]]
     assert both.caption == "Drawn. Curves that coincide are drawn once, with both names."
     for apart in (
@@ -111,34 +124,36 @@ def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
         (replace(curves([0, 0, 0], [0, 0, 0], [1, 10, 100]), y=Axis("y", "log")),),  # not drawn at all
     ):
         figure = Figure("f", "", "Drawn.", apart)
-        assert panels.joined(figure) is figure
+        assert coinciding_lines.join_coinciding_lines(figure) is figure
 
 
 def test_a_swept_value_that_joined_names_share_is_told_once():
     x = np.arange(3.0)
     names = [f"{tracker}, $P_D$ = {chance}" for chance in (0.7, 0.9) for tracker in ("nearest", "PDA")]
     lines = tuple(Line(x, x + (n > 1), name, Style(n, n, n)) for n, name in enumerate(names))
-    (panel,) = panels.joined(one(*lines)).panels
+    (panel,) = coinciding_lines.join_coinciding_lines(one(*lines)).panels
     assert [mark.label for mark in panel.marks] == ["nearest = PDA, $P_D$ = 0.7", "nearest = PDA, $P_D$ = 0.9"]
 
 
 def test_a_missing_band_is_told_of_in_its_figure_alone():
     x = np.arange(3.0)
     whole = one(Line(x, x, "a", lo=x - 1, hi=x + 1))
-    assert panels.unbanded(whole) is whole
+    assert panel_layout.with_remark_on_bands(whole) is whole
     ends = np.array([0.5, np.nan, 1.5])
-    assert panels.unbanded(one(Line(x, x, "a", lo=ends, hi=ends))).caption.endswith("a few large errors dominate.")
+    assert panel_layout.with_remark_on_bands(one(Line(x, x, "a", lo=ends, hi=ends))).caption.endswith(
+        "a few large errors dominate."
+    )
 
 
 def test_lines_that_a_legend_of_names_explains_are_joined_there_and_those_told_apart_by_dash_are_not():
-    unnamed = panels.in_legend([curves([1, 2, 3], [1, 2, 3]), curves([2, 2, 2], [2, 2, 2])])
-    joined = panels.joined(Figure("f", "", "", tuple(unnamed)))
+    unnamed = panel_layout.with_legend_cell([curves([1, 2, 3], [1, 2, 3]), curves([2, 2, 2], [2, 2, 2])])
+    joined = coinciding_lines.join_coinciding_lines(Figure("f", "", "", tuple(unnamed)))
     assert [[mark.name for mark in panel.marks] for panel in joined.panels] == [["a = b"], ["a = b"], []]
     assert [words for words, _ in joined.panels[-1].keys] == ["a = b"]
     swept = curves([1, 2, 3], [1, 2, 3])
     swept = replace(swept, marks=tuple(replace(mark, label="1", name=f"{mark.label}, 1") for mark in swept.marks))
     figure = Figure("f", "", "", (swept,))
-    assert panels.joined(figure) is figure
+    assert coinciding_lines.join_coinciding_lines(figure) is figure
 
 
 def test_words_along_the_top_lie_between_a_panel_and_its_title():
@@ -152,13 +167,13 @@ def test_words_along_the_top_lie_between_a_panel_and_its_title():
 def test_words_of_a_line_at_the_left_rim_stand_right_of_it():
     for value, side in ((1.0, "left"), (9.0, "right")):
         panel = Panel(Axis("x", limits=(0, 10)), Axis("y"), (line(), Reference(value, "x", "shipped")))
-        axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
+        axes = drawing_canvas.render(Figure("f", "", "", (panel,))).axes[0]
         assert [text.get_ha() for text in axes.texts if "shipped" in text.get_text()] == [side]
 
 
 def test_panels_of_one_column_have_their_own_heights():
     short, tall = (Panel(Axis("x"), Axis("y"), (line(),), height_mm=height) for height in (30.0, 90.0))
-    canvas = figures.render(Figure("f", "", "", (short, tall)))
+    canvas = drawing_canvas.render(Figure("f", "", "", (short, tall)))
     height = 120 + 5.5  # with the legend of the crosses
     assert_rounded(canvas.get_size_inches()[1] * 25.4, height, operations=6)
     low, high = (axes.get_window_extent().height for axes in canvas.axes)
@@ -168,7 +183,7 @@ def test_panels_of_one_column_have_their_own_heights():
 def test_a_legend_lies_on_no_curve_and_stands_once_a_figure():
     marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(9))
     panel = Panel(Axis("x"), Axis("y"), marks, direct=False)
-    canvas = figures.render(Figure("f", "", "", (panel,) * 4, columns=2))
+    canvas = drawing_canvas.render(Figure("f", "", "", (panel,) * 4, columns=2))
     (legend,) = canvas.legends
     assert len(legend.get_texts()) == 9
     box = legend.get_window_extent()
@@ -182,7 +197,7 @@ def test_a_legend_lies_on_no_curve_and_stands_once_a_figure():
 def test_panels_that_name_different_things_alike_keep_their_legends():
     first = Panel(Axis("x"), Axis("y"), (Line(np.arange(3.0), np.arange(3.0), "a", Style(0)),), direct=False)
     other = Panel(Axis("x"), Axis("y"), (Line(np.arange(3.0), np.arange(3.0), "a", Style(1)),), direct=False)
-    canvas = figures.render(Figure("f", "", "", (first, other), columns=2))
+    canvas = drawing_canvas.render(Figure("f", "", "", (first, other), columns=2))
     assert not canvas.legends
     assert all(len(axes.get_legend().get_texts()) == 1 for axes in canvas.axes)
     for axes in canvas.axes:
@@ -194,7 +209,7 @@ def test_panels_that_name_one_look_otherwise_keep_their_legends():
         Panel(Axis("x"), Axis("y"), (Line(np.arange(3.0), np.arange(3.0), name, Style(0)),), direct=False)
         for name in ("uniform 5", "uniform 30")
     )
-    canvas = figures.render(Figure("f", "", "", (one, other), columns=2))
+    canvas = drawing_canvas.render(Figure("f", "", "", (one, other), columns=2))
     assert not canvas.legends
     assert [axes.get_legend().get_texts()[0].get_text() for axes in canvas.axes] == ["uniform 5", "uniform 30"]
 
@@ -204,7 +219,7 @@ def test_log_axes_have_round_ticks():
 
     def ticks(low, high):
         values = Line(t, np.array([low, np.sqrt(low * high), high]))
-        axes = figures.render(Figure("f", "", "", (Panel(Axis("x"), Axis("y", "log"), (values,)),))).axes[0]
+        axes = drawing_canvas.render(Figure("f", "", "", (Panel(Axis("x"), Axis("y", "log"), (values,)),))).axes[0]
         low, high = axes.get_ylim()
         return [text.get_text() for text in axes.get_yticklabels() if low <= text.get_position()[1] <= high]
 
@@ -218,7 +233,9 @@ def test_log_axes_have_round_ticks():
 @pytest.mark.parametrize(("low", "high"), [(0.0015, 0.35), (1e-5, 0.1), (20, 4e5)])
 def test_numbers_at_an_axis_stand_apart_however_narrow_it_is(width, low, high):
     values = Line(np.geomspace(low, high, 5), np.arange(5.0))
-    axes = figures.render(Figure("f", "", "", (Panel(Axis("x", "log"), Axis("y"), (values,)),), width_mm=width)).axes[0]
+    axes = drawing_canvas.render(
+        Figure("f", "", "", (Panel(Axis("x", "log"), Axis("y"), (values,)),), width_mm=width)
+    ).axes[0]
     axes.figure.canvas.draw()
     left, right = axes.get_xlim()
     boxes = [t.get_window_extent() for t in axes.get_xticklabels() if left <= t.get_position()[0] <= right]
@@ -229,7 +246,7 @@ def test_numbers_at_an_axis_stand_apart_however_narrow_it_is(width, low, high):
 
 def test_a_share_is_drawn_whole_up_to_one():
     panel = Panel(Axis("x"), Axis("share", limits=(0, 1)), (Line(np.arange(3.0), np.ones(3)),))
-    axes = figures.render(Figure("f", "", "", (panel,))).axes[0]
+    axes = drawing_canvas.render(Figure("f", "", "", (panel,))).axes[0]
     assert axes.get_ylim() == (0, 1)
     assert not axes.lines[0].get_clip_on()
 
@@ -237,13 +254,15 @@ def test_a_share_is_drawn_whole_up_to_one():
 def test_maps_side_by_side_have_one_scale_of_colours():
     heats = [Heat(np.arange(2.0), np.arange(2.0), np.full((2, 2), v) + np.eye(2), "σ") for v in (1.0, 5.0)]
     both = tuple(Panel(Axis("x"), Axis("y"), (heat,)) for heat in heats)
-    axes = figures.render(Figure("f", "", "", both, columns=2)).axes[:2]
+    axes = drawing_canvas.render(Figure("f", "", "", both, columns=2)).axes[:2]
     assert {one.collections[0].get_clim() for one in axes} == {(1.0, 6.0)}
 
 
 def test_a_ground_track_has_one_scale_north_and_east():
     track = Line(np.array([0.0, 10.0]), np.array([0.0, 1.0]))
-    axes = figures.render(Figure("f", "", "", (Panel(Axis("east"), Axis("north"), (track,), equal=True),))).axes[0]
+    axes = drawing_canvas.render(Figure("f", "", "", (Panel(Axis("east"), Axis("north"), (track,), equal=True),))).axes[
+        0
+    ]
     axes.apply_aspect()
     (x0, y0), (x1, y1) = axes.transData.transform([(0.0, 0.0), (1.0, 1.0)])
     assert x1 - x0 == pytest.approx(y1 - y0, rel=0.005, abs=0)  # from where on Matplotlib leaves it
@@ -260,7 +279,7 @@ def test_labels_at_ends_do_not_overlap():
 def test_a_line_that_leaves_a_cut_axis_keeps_its_name_within_the_panel():
     low = Line(np.arange(3.0), np.array([0.0, -50.0, -3e4]), "lost")
     panel = Panel(Axis("x"), Axis("y", limits=(-100.0, 100.0)), (low, replace(low, y=np.ones(3), label="kept")))
-    canvas = figures.render(Figure("f", "", "", (panel,)))
+    canvas = drawing_canvas.render(Figure("f", "", "", (panel,)))
     (axes,) = canvas.axes
     box = axes.get_window_extent()
     assert box.height > 0.6 * canvas.bbox.height  # laid out
@@ -269,16 +288,18 @@ def test_a_line_that_leaves_a_cut_axis_keeps_its_name_within_the_panel():
 
 @pytest.mark.parametrize("wanted", [[0.0, 0.1, 0.2], [0.0, 5.0, 5.1, 9.9], [9.0, 9.1], [3.0]])
 def test_separated(wanted):
-    placed = figures.spread_positions(np.array(wanted), 1.0, 0.0, 10.0)
+    placed = line_names.spread_positions(np.array(wanted), 1.0, 0.0, 10.0)
     assert np.all(np.diff(placed) >= 1 - 1e-12)
     assert placed.min() >= 0
     assert placed.max() <= 10
     apart = np.array([1.0, 4.0, 8.0])
-    np.testing.assert_array_equal(figures.spread_positions(apart, 1.0, 0.0, 10.0), apart)
+    np.testing.assert_array_equal(line_names.spread_positions(apart, 1.0, 0.0, 10.0), apart)
 
 
 def test_same_bytes_each_time():
-    assert figures.save(one(line()), ("svg", "png", "pdf")) == figures.save(one(line()), ("svg", "png", "pdf"))
+    assert drawing_canvas.save(one(line()), ("svg", "png", "pdf")) == drawing_canvas.save(
+        one(line()), ("svg", "png", "pdf")
+    )
 
 
 def of_all_kinds():
@@ -314,24 +335,24 @@ def shared():
 @pytest.mark.parametrize("make", [of_all_kinds, narrowed, shared])
 def test_cached_ticks_change_no_picture(monkeypatch, make):
     kinds = ("png", "svg") if make is of_all_kinds else ("png", "svg", "pdf")
-    remembered = figures.save(make(), kinds)
-    monkeypatch.setattr(figures, "CACHED_METHODS", ())
-    assert figures.save(make(), kinds) == remembered
+    remembered = drawing_canvas.save(make(), kinds)
+    monkeypatch.setattr(drawing_canvas, "CACHED_METHODS", ())
+    assert drawing_canvas.save(make(), kinds) == remembered
 
 
 def test_ticks_are_placed_once_for_each_place_of_a_panel(monkeypatch):
     placed = []
-    for name in figures.CACHED_METHODS:  # of this version of Matplotlib
-        assert hasattr(figures.XAxis, name)
-    plain = figures.XAxis._update_ticks
-    monkeypatch.setattr(figures.XAxis, "_update_ticks", lambda axis: placed.append(axis) or plain(axis))
-    figures.save(one(line()), ("png", "svg"))
+    for name in drawing_canvas.CACHED_METHODS:  # of this version of Matplotlib
+        assert hasattr(XAxis, name)
+    plain = XAxis._update_ticks
+    monkeypatch.setattr(XAxis, "_update_ticks", lambda axis: placed.append(axis) or plain(axis))
+    drawing_canvas.save(one(line()), ("png", "svg"))
     assert len(placed) == 4  # by the layout twice, for each picture once
 
 
 def test_a_figure_that_is_handed_out_remembers_nothing():
     axes = drawn(one(line()))
-    assert not [side for side in (axes.xaxis, axes.yaxis) if vars(side).keys() & set(figures.CACHED_METHODS)]
+    assert not [side for side in (axes.xaxis, axes.yaxis) if vars(side).keys() & set(drawing_canvas.CACHED_METHODS)]
     axes.set_xticks([3.0])
     axes.figure.canvas.draw()
     assert [tick.get_text() for tick in axes.get_xticklabels()] == ["3"]
@@ -339,21 +360,21 @@ def test_a_figure_that_is_handed_out_remembers_nothing():
 
 @pytest.mark.slow
 def test_titles_stand_where_matplotlib_would_place_them(monkeypatch):
-    chosen = figures.save(of_all_kinds(), ("svg", "png"))
-    monkeypatch.setitem(figures.STYLE, "axes.titley", None)
-    assert figures.save(of_all_kinds(), ("svg", "png")) == chosen
+    chosen = drawing_canvas.save(of_all_kinds(), ("svg", "png"))
+    monkeypatch.setitem(style.STYLE, "axes.titley", None)
+    assert drawing_canvas.save(of_all_kinds(), ("svg", "png")) == chosen
 
 
 def test_garbage_is_collected_again_after_a_figure_whatever_comes_of_it():
     assert gc.isenabled()
-    figures.save(one(line()), ("svg",))
+    drawing_canvas.save(one(line()), ("svg",))
     assert gc.isenabled()
     with pytest.raises(KeyError, match="no format"):
-        figures.save(one(line()), ("no format",))
+        drawing_canvas.save(one(line()), ("no format",))
     assert gc.isenabled()
     gc.disable()
     try:
-        figures.save(one(line()), ("svg",))
+        drawing_canvas.save(one(line()), ("svg",))
         assert not gc.isenabled()
     finally:
         gc.enable()
@@ -361,13 +382,13 @@ def test_garbage_is_collected_again_after_a_figure_whatever_comes_of_it():
 
 def test_size_in_millimetres():
     described = one(replace(line(), exact=None))
-    width, height = figures.render(described).get_size_inches() * 25.4
+    width, height = drawing_canvas.render(described).get_size_inches() * 25.4
     assert_rounded(width, described.width_mm, operations=2)
     assert_rounded(height, described.panel_height_mm, operations=2)
 
 
 def test_long_lines_are_thinned_and_short_ones_are_whole():
-    assert len(drawn(one(line(5000))).lines[0].get_xdata()) <= figures.MAX_POINTS
+    assert len(drawn(one(line(5000))).lines[0].get_xdata()) <= line_points.MAX_POINTS
     assert len(drawn(one(line(1999))).lines[0].get_xdata()) == 1999
 
 
@@ -385,27 +406,27 @@ def test_any_name_can_be_drawn(name, expected_radar):
     shown = SimpleNamespace(stem="mine", shown_in=lambda figure: [SimpleNamespace(name=results[0].name)])
     drawn = range_doppler_figures.figures(results, made, shown)
     for figure in (drawn["sigma_r"], drawn["gain_r"]):
-        saved = figures.save(figure, ("svg",))["svg"].decode()
+        saved = drawing_canvas.save(figure, ("svg",))["svg"].decode()
         assert "<script" not in saved
-    assert panels.plain_label(results[0]) == name
+    assert key_labels.plain_case_label(results[0]) == name
 
 
 def test_numbers_for_people():
-    assert [panels.number(v, powers=True) for v in (1e-3, 0.1, 1, 250.0)] == ["10⁻³", "10⁻¹", "1", "250"]
-    assert [panels.number(v) for v in (1e-3, 0.1, 1, 100, 1000.0, 1e5, 250.0, 0.00025, -2.5, "fly_by", True)] == [
-        *("10⁻³", "0.1", "1", "100", "1000", "10⁵", "250", "0.00025", "−2.5", "fly by", "True")
-    ]
+    assert [key_labels.format_value(v, powers=True) for v in (1e-3, 0.1, 1, 250.0)] == ["10⁻³", "10⁻¹", "1", "250"]
+    assert [
+        key_labels.format_value(v) for v in (1e-3, 0.1, 1, 100, 1000.0, 1e5, 250.0, 0.00025, -2.5, "fly_by", True)
+    ] == [*("10⁻³", "0.1", "1", "100", "1000", "10⁵", "250", "0.00025", "−2.5", "fly by", "True")]
 
 
 def test_angles_given_in_radians_are_shown_in_degrees():
     result = SimpleNamespace(spec=None, swept=(("target.turn.rate_radps", 0.00873),))
-    assert panels.swept(result).endswith("= 0.5°/s")
-    assert panels.axis_of(result, "target.turn.rate_radps").endswith(", °/s")
-    x, axis = sweeps.places(result, "target.turn.rate_radps", [0.0, 0.01745])
+    assert key_labels.swept_description(result).endswith("= 0.5°/s")
+    assert key_labels.key_axis_label(result, "target.turn.rate_radps").endswith(", °/s")
+    x, axis = sweep_figures.axis_positions(result, "target.turn.rate_radps", [0.0, 0.01745])
     assert axis.label.endswith(", °/s")
     assert_rounded(x, [0, 0.01745 * 180 / np.pi], operations=2)
-    assert panels.in_degrees("rad/s2")[1] == "°/s2"
-    assert panels.with_unit("a", "°/s2") == "a, °/s²"
+    assert key_labels.degrees_factor_and_unit("rad/s2")[1] == "°/s2"
+    assert key_labels.label_with_unit("a", "°/s2") == "a, °/s²"
 
 
 def shown_together(*values, log=False):
@@ -418,15 +439,15 @@ def shown_together(*values, log=False):
 
 def test_panels_side_by_side_have_one_kind_of_scale():
     linear, log = shown_together(1.0)[0], shown_together(2.0, log=True)[0]
-    assert [panel.y.scale for panel in panels.shared([linear, log])] == ["log", "log"]
-    assert panels.shared([linear])[0].y == linear.y
+    assert [panel.y.scale for panel in panel_layout.share_y_axis([linear, log])] == ["log", "log"]
+    assert panel_layout.share_y_axis([linear])[0].y == linear.y
     others = [linear, replace(log, y=Axis("V"))]
-    assert panels.shared(others) == others
+    assert panel_layout.share_y_axis(others) == others
 
 
 @pytest.mark.parametrize(("values", "scale"), [((1.0, 3.0), "linear"), ((1.0, 300.0), "log")])
 def test_panels_of_one_quantity_share_the_axis_that_holds_all_of_them(values, scale):
-    figure = panels.in_columns(Figure("f", "F", "F.", tuple(shown_together(*values))))
+    figure = panel_layout.arrange_columns(Figure("f", "F", "F.", tuple(shown_together(*values))))
     assert figure.share_y
     (y,) = {panel.y for panel in figure.panels}
     assert y.scale == scale
@@ -434,7 +455,7 @@ def test_panels_of_one_quantity_share_the_axis_that_holds_all_of_them(values, sc
     lines = [mark for panel in figure.panels for mark in panel.marks]
     assert low < min(line.lo.min() for line in lines)
     assert high > max(line.hi.max() for line in lines)
-    axes = figures.render(figure).axes
+    axes = drawing_canvas.render(figure).axes
     assert [one.get_ylabel() for one in axes] == ["σ", ""]
     assert axes[0].get_ylim() == axes[1].get_ylim() == y.limits
 
@@ -445,7 +466,7 @@ def test_panels_of_one_quantity_share_the_axis_that_holds_all_of_them(values, sc
 def test_ticks_stand_at_scans_and_at_the_last(step, count):
     """Those between are even; no number is nearer to the next than half of that."""
     x = step * np.arange(count)
-    axes = figures.render(one(Line(x, 1.0 + x, "a"))).axes[0]
+    axes = drawing_canvas.render(one(Line(x, 1.0 + x, "a"))).axes[0]
     ticks = np.asarray(axes.get_xticks())
     assert (ticks[0], ticks[-1]) == (0.0, x[-1])
     assert_rounded(ticks / step, np.round(ticks / step), operations=2)
@@ -457,9 +478,9 @@ def test_ticks_stand_at_scans_and_at_the_last(step, count):
 
 def test_uneven_times_have_round_ticks():
     x = np.array([0.0, 1.0, 2.5, 7.1, 9.9, 13.7])
-    assert list(figures.render(one(Line(x, x, "a"))).axes[0].get_xticks()) == [0, 2.5, 5, 7.5, 10, 12.5]
+    assert list(drawing_canvas.render(one(Line(x, x, "a"))).axes[0].get_xticks()) == [0, 2.5, 5, 7.5, 10, 12.5]
     x = 523.599 * np.arange(5)  # even, but no number that is said
-    assert list(figures.render(one(Line(x, x, "a"))).axes[0].get_xticks()) == [0, 500, 1000, 1500, 2000]
+    assert list(drawing_canvas.render(one(Line(x, x, "a"))).axes[0].get_xticks()) == [0, 500, 1000, 1500, 2000]
 
 
 def test_a_line_that_ends_beyond_its_axis_is_marked_so():
@@ -470,27 +491,27 @@ def test_a_line_that_ends_beyond_its_axis_is_marked_so():
         Line(x, 90 * x, "above", Style(2, 0)),
     )
     figure = Figure("f", "F", "F.", (Panel(Axis("t"), Axis("gain", limits=(-100.0, 100.0)), lines),))
-    (axes,) = figures.render(figure).axes
+    (axes,) = drawing_canvas.render(figure).axes
     assert {text.get_text() for text in axes.texts} == {"in", "below ↓", "above ↑"}
 
 
 def test_an_axis_of_sigma_shows_no_rounding():
     sigma = Line(np.arange(4.0), np.array([1e-9, 0.5, 5.0, 50.0]))
-    axis = panels.fitting_axis("σ", [sigma])
+    axis = panel_layout.fitting_axis("σ", [sigma])
     assert axis.scale == "log"
     assert axis.limits == (0.25, None)
-    assert panels.fitting_axis("σ", [replace(sigma, y=np.array([0.0, 1.0, 2.0, 15.0]))]).scale == "linear"
+    assert panel_layout.fitting_axis("σ", [replace(sigma, y=np.array([0.0, 1.0, 2.0, 15.0]))]).scale == "linear"
 
 
 def test_cases_of_many_filters_have_a_panel_each_where_lines_would_be_too_many(expected_radar, monkeypatch):
     results = [expected_radar("rls2", 10.0**-n, f"rls2 D={n}") for n in range(1, 8)]
-    assert [len(members) for members in panels.by_panel(results).values()] == [7]  # of two filters each
-    monkeypatch.setattr(panels, "FEW_FILTERS", 1)
-    groups = panels.by_panel(results)
+    assert [len(members) for members in case_selection.group_by_panel(results).values()] == [7]  # of two filters each
+    monkeypatch.setattr(case_selection, "FEW_FILTERS", 1)
+    groups = case_selection.group_by_panel(results)
     assert [len(members) for members in groups.values()] == [1] * 7
     assert len(set(groups)) == 7
-    assert [len(members) for members in panels.by_panel(results[:6]).values()] == [6]
-    assert len(panels.by_panel(results, np.inf)) == 1
+    assert [len(members) for members in case_selection.group_by_panel(results[:6]).values()] == [6]
+    assert len(case_selection.group_by_panel(results, np.inf)) == 1
 
 
 def test_losses_far_below_are_cut_and_the_caption_says_so():
@@ -506,7 +527,7 @@ def test_losses_far_below_are_cut_and_the_caption_says_so():
         axes=SimpleNamespace(filters=("r", "v"), baseline=0),
     )
     drawn = {
-        least: panels.gain_figure(
+        least: time_figures.gain_figure(
             "gain_r", [result], {("a", "v", "r"): gains(least)}, Component("r", "m", "r", "range")
         )
         for least in (-150.0, -30000.0)
@@ -526,12 +547,12 @@ def test_scattered_points_are_all_drawn():
 
 def test_many_lines_have_their_legend_in_a_cell_of_its_own():
     marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(7))
-    whole = panels.in_legend([Panel(Axis("x"), Axis("y"), marks), Panel(Axis("x"), Axis("y"), marks)])
+    whole = panel_layout.with_legend_cell([Panel(Axis("x"), Axis("y"), marks), Panel(Axis("x"), Axis("y"), marks)])
     assert [words for words, _ in whole[-1].keys] == [f"filter {i}" for i in range(7)]
     assert not whole[-1].marks
     assert [mark.name for mark in whole[1].marks] == [f"filter {i}" for i in range(7)]
     assert not any(mark.label for panel in whole for mark in panel.marks)
-    canvas = figures.render(Figure("f", "", "", tuple(whole), columns=2))
+    canvas = drawing_canvas.render(Figure("f", "", "", tuple(whole), columns=2))
     (legend,) = canvas.legends
     assert [text.get_text() for text in legend.get_texts()] == [f"filter {i}" for i in range(7)]
     assert len(canvas.axes) == 2
@@ -539,7 +560,7 @@ def test_many_lines_have_their_legend_in_a_cell_of_its_own():
 
 @pytest.mark.parametrize(("highest", "last"), [(3, 3), (20, 20), (40, 40), (95, 80), (1000, 1000)])
 def test_counts_have_ticks_at_whole_numbers(highest, last):
-    ticks = [value for value, _ in panels.counts("n", highest).ticks]
+    ticks = [value for value, _ in panel_layout.count_axis("n", highest).ticks]
     assert all(value == int(value) for value in ticks)
     assert ticks[-1] == last
     assert len(ticks) <= 9
@@ -548,17 +569,17 @@ def test_counts_have_ticks_at_whole_numbers(highest, last):
 def test_a_sweep_is_shown_whole_in_figures_with_a_panel_for_each_config(expected_radar):
     results = [expected_radar(stem, 10.0**-n, f"{stem} D={n}") for stem in ("rls1", "rls2") for n in range(1, 6)]
     names = [result.name for result in results]
-    shown, left_out = panels.shown_families(results, names)
+    shown, left_out = case_selection.select_cases_by_panel(results, names)
     assert [result.name for result in shown] == names
     assert left_out == ""
-    some, left_out = panels.shown(results, names)
+    some, left_out = case_selection.select_cases(results, names)
     assert left_out == " Shown: 8 of 10; only in the tables: rls1 D=3 and rls2 D=3."
     assert [some[0].name, some[-1].name] == [names[0], names[-1]]
 
 
 def test_crosses_have_the_name_of_what_they_are():
     panel = Panel(Axis("x"), Axis("y"), (line(),), crosses="formula")
-    (legend,) = figures.render(Figure("f", "", "", (panel,))).legends
+    (legend,) = drawing_canvas.render(Figure("f", "", "", (panel,))).legends
     assert [text.get_text() for text in legend.get_texts()] == ["formula"]
 
 
@@ -571,27 +592,27 @@ def test_up_to_sixteen_points_measured_and_exact_stand_together():
 
 def test_titles_are_broken_after_commas_and_long_parts_between_words():
     words = "gate_probability = 0.5, sensor.detection_probability = 0.7, $D_M$ = 1"
-    assert figures.wrap(words, 200) == words
-    assert figures.wrap(words, 50) == "gate_probability = 0.5,\nsensor.detection_probability = 0.7, $D_M$ = 1"
-    assert figures.wrap("σ = 0.5°, frame of coordinates = cartesian unbiased", 26) == (
+    assert style.wrap(words, 200) == words
+    assert style.wrap(words, 50) == "gate_probability = 0.5,\nsensor.detection_probability = 0.7, $D_M$ = 1"
+    assert style.wrap("σ = 0.5°, frame of coordinates = cartesian unbiased", 26) == (
         "σ = 0.5°,\nframe of coordinates =\ncartesian unbiased"
     )
-    assert figures.wrap("", 5) == ""
+    assert style.wrap("", 5) == ""
 
 
 def test_no_two_of_many_scattered_series_look_alike():
-    looks = [figures._line_options(Style(n, None, n)) for n in range(40)]
+    looks = [style.line_options(Style(n, None, n)) for n in range(40)]
     assert len({(look["color"], look["marker"]) for look in looks}) == 40
-    assert len({look["marker"] for look in looks}) == len(figures.MARKERS)
+    assert len({look["marker"] for look in looks}) == len(style.MARKERS)
 
 
 def test_a_gain_that_is_nowhere_known_is_drawn_as_nothing_and_cuts_no_axis():
     """A filter without an error has no gain against itself: warnings are errors here."""
     nowhere, loss = (Line(np.arange(3.0), y, "f") for y in (np.full(3, np.nan), np.array([np.nan, -1e4, 5.0])))
-    axis, marks = panels._cut(Axis("gain"), [nowhere])
+    axis, marks = time_figures._cut(Axis("gain"), [nowhere])
     assert axis.limits == Axis("gain").limits
     assert marks[1:] == (nowhere,)
-    assert panels._cut(Axis("gain"), [nowhere, loss])[0].limits == (-panels.LOSS, 100.0)
+    assert time_figures._cut(Axis("gain"), [nowhere, loss])[0].limits == (-time_figures.CUT_LOSS_PERCENT, 100.0)
 
 
 @pytest.mark.parametrize(("label", "turned"), [("$\\Lambda$", 0), ("$c$", 0), ("$\\sigma$, m", 90), ("gain, %", 90)])
@@ -602,11 +623,11 @@ def test_a_letter_beside_an_axis_stands_upright(label, turned):
 
 def test_a_headline_stands_over_the_panels_and_inside_the_figure():
     described = replace(one(line(), title="panel"), headline="a sentence of $ 5 and many words, " * 6)
-    canvas = figures.render(described)
+    canvas = drawing_canvas.render(described)
     box = canvas._suptitle.get_window_extent()
     assert canvas._suptitle.get_text().count("\n") >= 3
     assert box.y0 >= canvas.axes[0].title.get_window_extent().y1 >= canvas.axes[0].get_window_extent().y1
     assert box.y1 <= canvas.bbox.height
     assert 0 <= box.x0 < box.x1 <= canvas.bbox.width
-    plain = figures.render(replace(described, headline=""))
+    plain = drawing_canvas.render(replace(described, headline=""))
     assert canvas.get_figheight() > plain.get_figheight()

@@ -2,9 +2,9 @@
 
 import pytest
 
-from radarsim import language
+from radarsim.language import current
 from radarsim.papers import report_section
-from radarsim.report import html, wording
+from radarsim.report import page_links, page_sentences, wording
 
 MADE = ("curves", "gains", "locks", "detections", "consistency")
 
@@ -12,7 +12,7 @@ MADE = ("curves", "gains", "locks", "detections", "consistency")
 def test_a_figure_has_the_tables_that_its_study_declares_or_those_of_its_name():
     declared = {"lock": ("locks",), "detection": ("detections",), "accuracy": ("curves",), "cost": ("stages",)}
     found = {
-        name: html.tables_behind_figure(name, declared, MADE)
+        name: page_links.tables_behind_figure(name, declared, MADE)
         for name in ("sigma_r", "gain_Vr", "sweep_dt", "dynamic_r", "locks", "lock_noise", "detection", "cost", "map")
     }
     assert found == {
@@ -38,17 +38,17 @@ def test_a_claim_leads_to_the_figure_of_its_component():
 
 def test_of_an_answer_so_much_stands_above_its_figure_that_both_are_seen():
     short, long = "a" * 90, "; ".join(["b" * 150] * 3)
-    assert html.split_into_clauses([short, long]) == [short, "b" * 150 + ";", "b" * 150 + ";", "b" * 150]
-    assert html.count_visible_sentences([short, short, short]) == 2
-    assert html.count_visible_sentences([long]) == 1
+    assert page_sentences.split_into_clauses([short, long]) == [short, "b" * 150 + ";", "b" * 150 + ";", "b" * 150]
+    assert page_sentences.count_visible_sentences([short, short, short]) == 2
+    assert page_sentences.count_visible_sentences([long]) == 1
 
 
-@pytest.mark.parametrize("code", language.known())
+@pytest.mark.parametrize("code", current.language_codes())
 def test_no_interval_of_an_answer_is_cut(code):
     """A decimal comma leaves intervals and rows of numbers a semicolon of their own."""
-    with language.speaking(code):
-        value, in_row = wording.estimate((98.74, 97.5, 100.0), "%"), wording.in_a_row(["0.5", "1.5"])
+    with current.use_language(code):
+        value, in_row = wording.estimate((98.74, 97.5, 100.0), "%"), wording.list_numbers(["0.5", "1.5"])
         one = f"{value} ({in_row}; {wording.interval('1', '2')})"
-        row = wording.in_a_row(map(wording.number, (700.5, 800.5)))
-        parts = html.split_into_clauses(["; ".join([one, row] * 9)])
+        row = wording.list_numbers(map(wording.number, (700.5, 800.5)))
+        parts = page_sentences.split_into_clauses(["; ".join([one, row] * 9)])
     assert [part.removesuffix(";") for part in parts] == [one, row] * 9

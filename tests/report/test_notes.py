@@ -9,25 +9,35 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import result as output
-from radarsim.config.document import SHIPPED
-from radarsim.report import notes, statistics
+from radarsim.api import result as api_result
+from radarsim.config.find_files import SHIPPED
+from radarsim.report import answer_warnings, interval_notes, statistics
 from radarsim.report.quantities import Quantity
 from radarsim.report.row_notes import has_note
 from radarsim.report.sentences import MeasuredInterval, Sentence, as_sentence
-from radarsim.report.statistics import FEW
+from radarsim.report.statistics import MIN_REALISATIONS
+from radarsim.studies import registry
 
 
 def test_effective_realisations_mark_a_row_whatever_n():
     n = np.full(5, 10_000.0)
-    fewest = np.array([notes.EFFECTIVE - 1, notes.EFFECTIVE, np.inf, np.nan, 5.0])
-    assert list(notes.heavy_tail_notes(n, fewest)) == [notes.HEAVY, "", "", "", notes.HEAVY]
+    fewest = np.array([interval_notes.MIN_EFFECTIVE - 1, interval_notes.MIN_EFFECTIVE, np.inf, np.nan, 5.0])
+    assert list(interval_notes.heavy_tail_notes(n, fewest)) == [
+        interval_notes.HEAVY_TAILS,
+        "",
+        "",
+        "",
+        interval_notes.HEAVY_TAILS,
+    ]
 
 
 @pytest.mark.parametrize("n", [20, 60, 300])
 def test_gaussian_errors_of_few_realisations_have_no_tails(n):
     """Half of them count, however few they are; those of a tenth of the realisations would."""
-    assert list(notes.heavy_tail_notes(np.full(2, float(n)), np.array([n / 2, n / 10]))) == ["", notes.HEAVY]
+    assert list(interval_notes.heavy_tail_notes(np.full(2, float(n)), np.array([n / 2, n / 10]))) == [
+        "",
+        interval_notes.HEAVY_TAILS,
+    ]
 
 
 @pytest.mark.parametrize("count", [50, 300])
@@ -41,17 +51,17 @@ def test_a_gain_rests_on_the_fewer_of_its_two_filters():
     curves = pd.DataFrame([{**rows, "filter": "one", "n_eff": 2000.0}, {**rows, "filter": "two", "n_eff": 20.0}])
     gain = {"baseline": "two", "gain_percent": 0.5, "gain_lo": 0.0, "gain_hi": 1.0, "exact_percent": np.nan}
     gains = pd.DataFrame([{**rows, "filter": "one", **gain}])
-    noted = notes.add_notes({"curves": curves, "gains": gains.drop(columns="n")}, [])
-    assert list(noted["curves"]["note"]) == ["", notes.HEAVY]
-    assert list(noted["gains"]["note"]) == [notes.HEAVY]
+    noted = interval_notes.add_notes({"curves": curves, "gains": gains.drop(columns="n")}, [])
+    assert list(noted["curves"]["note"]) == ["", interval_notes.HEAVY_TAILS]
+    assert list(noted["gains"]["note"]) == [interval_notes.HEAVY_TAILS]
 
 
 def test_a_scan_near_one_with_heavy_tails_is_marked_too():
     of = [{"case": "a", "component": c, "k": k, "n": 5000, "filter": f} for f in "fg" for c in "xy" for k in range(60)]
     curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
     curves.loc[(curves["filter"] == "g") & (curves["component"] == "x") & (curves["k"] == 20), "n_eff"] = 30.0
-    noted = notes.add_notes({"curves": curves}, [])["curves"].set_index(["filter", "component", "k"])["note"]
-    near = noted[noted == notes.HEAVY].index.tolist()
+    noted = interval_notes.add_notes({"curves": curves}, [])["curves"].set_index(["filter", "component", "k"])["note"]
+    near = noted[noted == interval_notes.HEAVY_TAILS].index.tolist()
     assert near == [("g", "x", k) for k in range(14, 27)]  # a tenth of 60 scans on either side
     assert (noted == "").sum() == 240 - 13
 
@@ -65,8 +75,8 @@ def test_gains_of_filters_that_err_nearly_alike_are_marked(half, exact, alike):
     curves = pd.DataFrame([{**row, "filter": name, "n_eff": 2500.0} for name in ("one", "two")])
     gain = {"gain_percent": 0.0, "gain_lo": -half, "gain_hi": half, "exact_percent": exact}
     gains = pd.DataFrame([{**row, "filter": "one", "baseline": "two", **gain}]).drop(columns="n")
-    noted = notes.add_notes({"curves": curves, "gains": gains}, [])["gains"]
-    assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
+    noted = interval_notes.add_notes({"curves": curves, "gains": gains}, [])["gains"]
+    assert list(noted.get("note", [""])) == [interval_notes.ALIKE_FILTERS if alike else ""]
 
 
 @pytest.mark.parametrize(("value", "alike"), [(0.0, True), (-95.0, False), (95.0, True)])
@@ -77,8 +87,8 @@ def test_a_paired_quantity_that_a_study_declares_is_marked_likewise(value, alike
     above = {"above_percent": value, "above_lo": value - 0.3, "above_hi": value + 0.3}
     table = pd.DataFrame([{**row, "filter": "one", **above}]).drop(columns="n")
     declared = Quantity("above", "above", "apart", "above_percent|above", kind="signed", unit="%", paired=True)
-    noted = notes.add_notes({"curves": curves, "apart": table}, [], quantities=[declared])["apart"]
-    assert list(noted.get("note", [""])) == [notes.ALIKE if alike else ""]
+    noted = interval_notes.add_notes({"curves": curves, "apart": table}, [], quantities=[declared])["apart"]
+    assert list(noted.get("note", [""])) == [interval_notes.ALIKE_FILTERS if alike else ""]
 
 
 @pytest.mark.parametrize("share", [1.0, 0.002])
@@ -93,7 +103,7 @@ def test_a_gain_is_marked_where_few_realisations_differ_and_covers_where_all_do(
     gain = statistics.gain(*sums, (e**2 * b**2).sum(1), n)
     differ = e**2 - b**2
     square, fourth = ((differ**power).sum(1)[:, None, None] for power in (2, 4))
-    marked = notes.few_differ(square, fourth, np.full((runs, 1, 1), float(n))).ravel()
+    marked = interval_notes.rests_on_few_differences(square, fourth, np.full((runs, 1, 1), float(n))).ravel()
     inside = (gain.lo < true) & (true < gain.hi)
     if share == 1:
         assert marked.mean() < 0.03
@@ -109,7 +119,7 @@ def test_a_gain_of_all_there_is_divides_by_nothing():
     gain = {"gain_percent": 100.0, "gain_lo": 100.0, "gain_hi": 100.0, "exact_percent": np.nan}
     gains = pd.DataFrame([{**row, "filter": "one", "baseline": "two", **gain}]).drop(columns="n")
     with np.errstate(all="raise"):
-        noted = notes.add_notes({"curves": curves, "gains": gains}, [])["gains"]
+        noted = interval_notes.add_notes({"curves": curves, "gains": gains}, [])["gains"]
     assert list(noted.get("note", [""])) == [""]
 
 
@@ -119,9 +129,9 @@ def test_a_table_keeps_the_notes_that_it_brings():
     )
     table = table.assign(ratio=1.0, ratio_lo=0.9, ratio_hi=1.1)
     made = {"curves": pd.DataFrame(), "ratios": table.assign(note=["own", ""])}
-    assert list(notes.add_notes(made, [])["ratios"]["note"]) == ["own", ""]
+    assert list(interval_notes.add_notes(made, [])["ratios"]["note"]) == ["own", ""]
     assert list(made["ratios"]["note"]) == ["own", ""]
-    assert "note" not in notes.add_notes(made | {"ratios": table.assign(note="")}, [])["ratios"]
+    assert "note" not in interval_notes.add_notes(made | {"ratios": table.assign(note="")}, [])["ratios"]
 
 
 @pytest.mark.parametrize("exact", [True, False])
@@ -131,8 +141,8 @@ def test_no_note_stands_beside_an_exact_value(exact):
     curves = pd.DataFrame(
         [{**row, "k": k, "n_eff": 20.0, "exact_sigma": of} for k, of in enumerate((1.0, 5.0, np.nan))]
     )
-    noted = notes.add_notes({"curves": curves}, [], exact)["curves"]
-    assert list(noted["note"]) == ["" if exact else notes.HEAVY] * 2 + [notes.HEAVY]
+    noted = interval_notes.add_notes({"curves": curves}, [], exact)["curves"]
+    assert list(noted["note"]) == ["" if exact else interval_notes.HEAVY_TAILS] * 2 + [interval_notes.HEAVY_TAILS]
 
 
 S_BAND = (
@@ -160,47 +170,64 @@ def test_warning_is_about_the_intervals_that_the_answer_rests_on():
     of = [{"case": "a", "component": "x", "k": k, "n": 5000, "filter": f} for f in "fg" for k in range(60)]
     curves = pd.DataFrame(of).assign(sigma=1.0, sigma_lo=0.9, sigma_hi=1.1, n_eff=2500.0)
     curves.loc[20, "n_eff"] = 30.0
-    made = notes.add_notes({"curves": curves, "gains": pd.DataFrame()}, results)
+    made = interval_notes.add_notes({"curves": curves, "gains": pd.DataFrame()}, results)
     assert has_note(made["curves"]).sum() == 13
-    assert not notes.answer_warnings(results, made, [sigma_of(0, 59, 80)])
-    (line,) = notes.answer_warnings(results, made, [sigma_of(0, 14, 80)])
+    assert not answer_warnings.answer_warnings(results, made, [sigma_of(0, 59, 80)])
+    (line,) = answer_warnings.answer_warnings(results, made, [sigma_of(0, 14, 80)])
     assert line.startswith("1 interval of the answer is too narrow")
     assert "(f): run with -n 2e4" in line  # 5000 × 100/30
-    (line,) = notes.answer_warnings(results, made, [sigma_of(14), sigma_of(15, 26, 27), sigma_of(14)])
+    (line,) = answer_warnings.answer_warnings(results, made, [sigma_of(14), sigma_of(15, 26, 27), sigma_of(14)])
     assert line.startswith("3 intervals of the answer are too narrow")
-    (line,) = notes.answer_warnings([SimpleNamespace(name="a", count=FEW - 1)], made, [sigma_of(14)])
-    assert f"{FEW - 1} realisations are rough" in line
+    (line,) = answer_warnings.answer_warnings(
+        [SimpleNamespace(name="a", count=MIN_REALISATIONS - 1)], made, [sigma_of(14)]
+    )
+    assert f"{MIN_REALISATIONS - 1} realisations are rough" in line
 
 
 def test_note_on_one_interval_gives_no_warning_of_another():
     row = {"case": "a", "filter": "f", "n": 5000, "sigma_lo": 0.9, "sigma_hi": 1.1, "gain_lo": 1.0, "gain_hi": 3.0}
-    made = {"stages": pd.DataFrame([row | {"note": notes.HEAVY.about("gain")}]), "curves": pd.DataFrame()}
+    made = {
+        "stages": pd.DataFrame([row | {"note": interval_notes.HEAVY_TAILS.about("gain")}]),
+        "curves": pd.DataFrame(),
+    }
     results = [SimpleNamespace(name="a", count=5000)]
     assert str(made["stages"]["note"][0]).startswith("gain: under 100 effective")
-    assert not notes.answer_warnings(results, made, [Sentence("", (MeasuredInterval("stages", 0, "sigma"),))])
-    (line,) = notes.answer_warnings(results, made, [Sentence("", (MeasuredInterval("stages", 0, "gain"),))])
+    assert not answer_warnings.answer_warnings(results, made, [Sentence("", (MeasuredInterval("stages", 0, "sigma"),))])
+    (line,) = answer_warnings.answer_warnings(results, made, [Sentence("", (MeasuredInterval("stages", 0, "gain"),))])
     assert "may be too narrow" in line
     assert "(f)" in line
 
 
 def test_note_on_what_an_interval_leaves_out_gives_no_warning():
-    row = {"case": "a", "filter": "f", "n": 5000, "ratio_lo": 0.9, "ratio_hi": 1.1, "note": notes.VARIES}
+    row = {
+        "case": "a",
+        "filter": "f",
+        "n": 5000,
+        "ratio_lo": 0.9,
+        "ratio_hi": 1.1,
+        "note": interval_notes.BELIEVED_VARIES,
+    }
     made = {"believed": pd.DataFrame([row]), "curves": pd.DataFrame()}
     results = [SimpleNamespace(name="a", count=5000)]
-    assert not notes.answer_warnings(results, made, [Sentence("", (MeasuredInterval("believed", 0, "ratio"),))])
+    assert not answer_warnings.answer_warnings(
+        results, made, [Sentence("", (MeasuredInterval("believed", 0, "ratio"),))]
+    )
 
 
 def test_words_of_notes_and_sentences_change_no_number_and_no_mark(monkeypatch):
     """The same tables, but for the notes' texts, and the same warnings, whatever is written in either."""
-    result = radarsim.run("orders", realisations=FEW)
+    result = radarsim.run("orders", realisations=MIN_REALISATIONS)
     (warning,) = (line for line in result.warnings if "of the answer" in line)
-    other_text = replace(notes.HEAVY, text="rarely large")
-    monkeypatch.setattr(notes, "HEAVY", other_text)
-    from radarsim.studies.ambiguous_doppler import words
+    other_text = replace(interval_notes.HEAVY_TAILS, text="rarely large")
+    for module in (answer_warnings, interval_notes):
+        monkeypatch.setattr(module, "HEAVY_TAILS", other_text)
+    from radarsim.studies.ambiguous_doppler import answer as ambiguous_doppler_answer
 
-    answer = words.answer
-    monkeypatch.setattr(words, "answer", lambda *of: [one.with_text("nothing") for one in answer(*of)])
-    again = output.Result(result.experiment, result.cases, result.facts)
+    answer = ambiguous_doppler_answer.answer
+    monkeypatch.setattr(
+        ambiguous_doppler_answer, "answer", lambda *of: [one.with_text("nothing") for one in answer(*of)]
+    )
+    again = api_result.Result(result.experiment, result.cases, result.facts)
     assert set(again.answer) == {"nothing"}
     assert list(again.warnings) == list(result.warnings)
     assert warning in again.warnings
@@ -223,8 +250,8 @@ def test_plain_text_of_a_user_study_rests_on_every_filter_at_the_last_scan():
 
 def check_notes_and_warning(config):
     """Of a shipped config: no note beside an exact value; a warning at most, on intervals that are in the answer."""
-    result = radarsim.run(config, realisations=FEW)
-    study, made = output.study(result.experiment.study), result.tables
+    result = radarsim.run(config, realisations=MIN_REALISATIONS)
+    study, made = registry.study(result.experiment.study), result.tables
     for table in made.values():
         exact = [name for name in table if name in ("exact_sigma", "exact_percent", "exact_right")]
         if "note" in table and exact and study.exact_errors:
@@ -238,7 +265,7 @@ def check_notes_and_warning(config):
         columns = [column for column in made[table] if str(column).startswith(name)]
         assert {f"{name}_lo", f"{name}_hi"} <= set(columns) or {"lo", "hi"} <= set(made[table])
         assert row in made[table].index
-    rows = notes.affected_rows(result._tables, answer).values()
+    rows = answer_warnings.affected_rows(result._tables, answer).values()
     assert bool(warnings) == bool(rows)
     for line in warnings:
         assert int(re.match(r"[\d,]+", line)[0].replace(",", "")) == sum(map(len, rows))
@@ -263,11 +290,11 @@ def test_warning_is_true_of_the_answer_of_every_shipped_config(config):
 def test_notes_say_what_their_rows_have():
     """Under a hundred: each marked row has so few, there or within a tenth of the run, and no other has."""
     made = radarsim.run("multimodel_1hz", realisations=1000).curves
-    fewest = notes.nearby(made)
-    np.testing.assert_array_equal(made["note"] != "", fewest < notes.EFFECTIVE)
-    assert set(made["note"]) == {"", str(notes.HEAVY)}
+    fewest = interval_notes.fewest_effective_nearby(made)
+    np.testing.assert_array_equal(made["note"] != "", fewest < interval_notes.MIN_EFFECTIVE)
+    assert set(made["note"]) == {"", str(interval_notes.HEAVY_TAILS)}
 
 
 def test_filters_whose_names_hold_a_comma_are_told_apart():
-    results = [SimpleNamespace(name=name, count=FEW - 1) for name in ("PDA", "PDA, 4 of 6")]
-    assert notes.few_realisations_warning(results)[0].startswith("PDA and “PDA, 4 of 6”: ")
+    results = [SimpleNamespace(name=name, count=MIN_REALISATIONS - 1) for name in ("PDA", "PDA, 4 of 6")]
+    assert answer_warnings.few_realisations_warning(results)[0].startswith("PDA and “PDA, 4 of 6”: ")

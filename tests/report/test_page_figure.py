@@ -6,13 +6,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from radarsim.language import speaking
-from radarsim.report import figures, page_figure
-from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Panel, Style
+from radarsim.language.current import use_language
+from radarsim.report.drawing import canvas, page_figure, page_values
+from radarsim.report.drawing.model import Axis, Bars, Figure, Heat, Line, Panel, Style
 
 
 def page_svg(*panels, prefix="p", **figure):
-    drawn = figures.draw(Figure("one", "One", "A figure.", panels, **figure))
+    drawn = canvas.draw(Figure("one", "One", "A figure.", panels, **figure))
     return page_figure.embed(drawn, prefix)
 
 
@@ -76,7 +76,7 @@ def test_bars_and_categories_are_named_and_cells_of_a_large_map():
 
 
 def test_a_crowd_of_points_has_no_titles():
-    crowd = curve(figures.MAX_VALUE_MARKS + 1, dash=None)
+    crowd = curve(page_values.MAX_VALUE_MARKS + 1, dash=None)
     assert titles(page_svg(panel(crowd, curve(2)))) == titles(page_svg(panel(curve(2))))
 
 
@@ -89,7 +89,7 @@ def test_ids_are_those_that_are_used_and_begin_with_the_prefix():
 
 
 def test_the_headline_is_in_the_file_alone():
-    drawn = figures.draw(Figure("one", "One", "A figure.", (panel(curve()),), headline="The answer."))
+    drawn = canvas.draw(Figure("one", "One", "A figure.", (panel(curve()),), headline="The answer."))
     svg = page_figure.embed(drawn, "p")
     assert b"The answer." in drawn.files["svg"]
     assert "The answer." not in svg
@@ -102,7 +102,7 @@ def test_the_headline_is_in_the_file_alone():
 def test_text_stays_text_and_is_escaped():
     hostile = "<script>&\"'"
     named = Panel(Axis(hostile), Axis(hostile), (curve(label=hostile),), hostile, remark=hostile)
-    svg = page_figure.embed(figures.draw(Figure("f", hostile, hostile, (named,))), "p")
+    svg = page_figure.embed(canvas.draw(Figure("f", hostile, hostile, (named,))), "p")
     assert "<script" not in svg
     assert svg.count("&lt;script&gt;") >= 8
     assert "<metadata" not in svg
@@ -115,14 +115,14 @@ def test_control_characters_are_replaced():
 
 def test_the_page_is_drawn_from_the_bytes_of_the_file():
     described = Figure("one", "One", "A figure.", (panel(curve()),))
-    drawn = figures.draw(described, ("svg", "pdf"))
-    assert drawn.files == figures.save(described, ("svg", "pdf"))
+    drawn = canvas.draw(described, ("svg", "pdf"))
+    assert drawn.files == canvas.save(described, ("svg", "pdf"))
     assert drawn.svg is drawn.files["svg"]
-    assert figures.draw(described, ("png",)).svg == drawn.svg
+    assert canvas.draw(described, ("png",)).svg == drawn.svg
 
 
 def test_titles_are_in_the_language_of_the_page():
     line = Line(np.zeros(1), np.array([0.5]), "a", exact=np.array([0.25]))
-    with speaking("ru"):
+    with use_language("ru"):
         (title,) = titles(page_svg(panel(line)))
     assert title.endswith("0,5, точно 0,25")

@@ -5,10 +5,11 @@ from dataclasses import replace
 import pytest
 
 import radarsim
-from radarsim.app import configs
-from radarsim.app import result as output
-from radarsim.config.check import models_in
-from radarsim.config.fields import Display, Model
+from radarsim.api import configs, result_content
+from radarsim.config.find_files import SHIPPED
+from radarsim.config.marks import DisplayMark
+from radarsim.config.model import Model
+from radarsim.config.validate import models_in
 from radarsim.papers.claims_table import NOT_JUDGED
 from radarsim.papers.paper_cases import case_keys, paper_members
 from radarsim.papers.result_claims import unjudged_claims
@@ -83,7 +84,7 @@ def test_every_key_but_the_declared_ones_makes_another_experiment(config):
 def test_only_the_declared_keys_are_for_display(study):
     def marked(model, path=()):
         for name, info in model.model_fields.items():
-            if any(isinstance(mark, Display) for mark in info.metadata):
+            if any(isinstance(mark, DisplayMark) for mark in info.metadata):
                 yield ".".join((*path, name))
             for inner in models_in(info.annotation):
                 yield from marked(inner, (*path, name))
@@ -128,7 +129,7 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     """A config of a shipped one's name in the working directory changes neither what is judged nor how."""
     (tmp_path / "scenarios").mkdir()
     (tmp_path / "scenarios" / "polynomial.yaml").write_text("kind: polynomial\ncoefficients: [5e4, -100]\n")
-    text = (configs.document.SHIPPED / "configs" / "rls1.yaml").read_text()
+    text = (SHIPPED / "configs" / "rls1.yaml").read_text()
     (tmp_path / "rls1.yaml").write_text(text.replace("sigma_range_m: 25", "sigma_range_m: 30"))
     monkeypatch.chdir(tmp_path)
     configs.shipped.cache_clear()
@@ -137,8 +138,8 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     assert found["class"].eq(NOT_JUDGED).all()
     why = "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 25"
     assert found["why"].str.startswith(why).all()
-    unchanged = radarsim.run(configs.document.SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
-    assert not output.case_tables(unchanged)["claims"].empty
+    unchanged = radarsim.run(SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
+    assert not result_content.case_tables(unchanged)["claims"].empty
 
 
 HELD_TOO = {stem: ids for of in paper_claims() for stem, ids in of.held_too.items()}
@@ -150,7 +151,7 @@ QUICK = ("rls1", "rls2", "rls3", "manoeuvre_variance", "discriminator_as_printed
     "config",
     [
         pytest.param(path.stem, marks=() if path.stem in QUICK else pytest.mark.slow)
-        for path in sorted((configs.document.SHIPPED / "configs").glob("*.yaml"))
+        for path in sorted((SHIPPED / "configs").glob("*.yaml"))
     ],
 )
 def test_a_config_holds_the_claims_that_it_is_said_to_hold(config):

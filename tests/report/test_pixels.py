@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from radarsim.report import figures
-from radarsim.report.drawing import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.report.drawing import canvas as drawing_canvas
+from radarsim.report.drawing.model import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 
 FOLDER = Path(__file__).parent / "pixels"
 VERSION = "3.11"  # of Matplotlib, that drew them
@@ -31,7 +31,7 @@ KINDS = {
 def picture(kind):
     """A small picture (height, width, 3) of a kind."""
     panel = Panel(Axis("x, s"), Axis("$\\sigma$ of $y$, m"), KINDS[kind], "panel")
-    canvas = figures.render(Figure(kind, "", "", (panel,)))
+    canvas = drawing_canvas.render(Figure(kind, "", "", (panel,)))
     out = io.BytesIO()
     canvas.savefig(out, format="png", dpi=70)
     return Image.open(out).convert("RGB")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from radarsim.report.drawing import Axis, Heat, Panel
-from radarsim.report.scales import Scale, heat_scales
+from radarsim.report.drawing.model import Axis, Heat, Panel
+from radarsim.report.drawing.scales import Scale, heat_scales
 
 
 @pytest.mark.parametrize(

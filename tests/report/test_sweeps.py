@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radarsim.app import result as output
-from radarsim.app import run
-from radarsim.language import speaking
+from radarsim.api import result_content, run
+from radarsim.language.current import use_language
 from radarsim.papers.claim_rows import measured_words
-from radarsim.report import figures, panels, sweeps, tables, wording
-from radarsim.report.drawing import Line
+from radarsim.report import case_selection, figure_lines, key_labels, math_text, sweep_figures, tables
+from radarsim.report.drawing import canvas, legend_placement
+from radarsim.report.drawing.model import Line
 
 
 def swept(config, *overrides, n=200):
     result = run.run(config, realisations=n, overrides=overrides)
-    return result, output.case_figures(result.cases, result.tables, result.experiment)
+    return result, result_content.case_figures(result.cases, result.tables, result.experiment)
 
 
 def test_one_key_is_a_family_of_curves():
@@ -24,7 +24,7 @@ def test_one_key_is_a_family_of_curves():
     result, drawn = swept("rls2", f"sweep.{key}=[1,40,5,15]")
     figure = drawn["sweep_sigma_velocity_mps"]
     assert [panel.x.scale for panel in figure.panels] == ["log"] * 3
-    rows = tables.groups(result.curves, "case", "filter", "component")
+    rows = tables.group_by(result.curves, "case", "filter", "component")
     for panel, component in zip(figure.panels, ("r", "Vr", "ar"), strict=True):
         for mark, name in zip(panel.marks, ("r", "r+Vr"), strict=True):
             np.testing.assert_array_equal(mark.x, [1, 5, 15, 40])
@@ -39,14 +39,14 @@ def test_one_key_is_a_family_of_curves():
     [("r", "r"), ("Vr", "V_r"), ("b", "β"), ("vb", "v_β"), ("ab", "a_β"), ("ve", "v_ε"), ("speed", "speed")],
 )
 def test_axes_name_components_by_their_letters(component, words):
-    assert wording.spoken(panels.letter(component)) == words
+    assert math_text.plain_text(key_labels.component_symbol(component)) == words
 
 
 def test_two_keys_are_a_map():
     result, drawn = swept("rls2", "sweep.scans=[15,10]", "sweep.radar.sigma_range_m=[50,100,250]")
     figure = drawn["sweep_scans_sigma_range_m"]
     assert [panel.title for panel in figure.panels] == ["r", "r+Vr"]
-    rows = tables.groups(result.curves, "case", "filter", "component")
+    rows = tables.group_by(result.curves, "case", "filter", "component")
     heat = figure.panels[1].marks[0]
     for i, r in enumerate((50, 100, 250)):
         for j, k in enumerate((10, 15)):
@@ -94,7 +94,7 @@ def test_values_that_are_no_numbers_are_points_from_least_to_largest():
 
 
 def test_no_sweep_no_figure(expected_radar):
-    assert sweeps.figures([expected_radar("rls2")], {}) == {}
+    assert sweep_figures.sweep_figures([expected_radar("rls2")], {}) == {}
 
 
 def test_measured_values_are_written_to_two_figures_of_their_half_width():
@@ -116,16 +116,16 @@ def test_two_keys_make_a_panel_a_value_and_a_map_and_leave_nothing_out():
         assert [panel.title for panel in described[name].panels] == [f"$σ_V$ = {v} m/s" for v in (1, 5, 15)], name
         lines = [[mark for mark in panel.marks if isinstance(mark, Line)] for panel in described[name].panels]
         assert {len(own) for own in lines} == {3 if name == "gain_r" else 6}
-    plan = figures.plan_legends(described["sigma_r"])
+    plan = legend_placement.plan_legends(described["sigma_r"])
     assert plan.at_ends == (True,) * 3
-    assert {line.label for line in figures.named_lines(plan.panels[0])} == {"10⁻⁴", "10⁻³", "10⁻²"}
+    assert {line.label for line in legend_placement.named_lines(plan.panels[0])} == {"10⁻⁴", "10⁻³", "10⁻²"}
     assert list(plan.common.keys) == ["r", "r+Vr", "exact"]
     assert plan.common.title == "at the lines: $D_M$, (m/s³)²"
     assert described["sweep_sigma_velocity_mps_manoeuvre_variance"].panels[0].marks[0].values.shape == (3, 3)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # of a layout that finds no room
         for figure in described.values():
-            figures.save(figure, ("svg",))
+            canvas.save(figure, ("svg",))
 
 
 @pytest.mark.slow
@@ -141,14 +141,14 @@ def test_of_very_many_cases_the_caption_says_how_many_are_left_out():
 
 
 def test_lists_and_long_names_at_an_axis_and_in_titles():
-    assert panels.number((1000.0, 1200.0)) == "1000, 1200"
+    assert key_labels.format_value((1000.0, 1200.0)) == "1000, 1200"
     result = run.run("ambiguous_turns", realisations=8, figures=False)
     first, second = result.cases[:2]
     key = first.swept[0][0]
-    assert panels.swept(first) == "$F_r$ = 1000, 1200 Hz"
-    _, axis = sweeps.places(first, key, [dict(one.swept)[key] for one in (first, second)])
+    assert key_labels.swept_description(first) == "$F_r$ = 1000, 1200 Hz"
+    _, axis = sweep_figures.axis_positions(first, key, [dict(one.swept)[key] for one in (first, second)])
     assert [words for _, words in axis.ticks] == ["1000, 1200", "1000, 1200,\n1400"]
-    _, axis = sweeps.places(first, key, ["aeroballistic_gentle", "weaving"])
+    _, axis = sweep_figures.axis_positions(first, key, ["aeroballistic_gentle", "weaving"])
     assert [words for _, words in axis.ticks] == ["aeroballistic\ngentle", "weaving"]
 
 
@@ -158,13 +158,13 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     targets = [past, past | {"speed_mps": 100.0, "sigma_position_m": 800.0}, {"kind": "recorded", "file": "flight.csv"}]
     words = ["fly by, speed 280 m/s", "fly by, speed 100 m/s, σ of the first position 800 m", "recorded"]
     result = run.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
-    assert [panels.in_short(result, "target", one, targets) for one in targets] == words
+    assert [key_labels.shorten_mapping(result, "target", one, targets) for one in targets] == words
     whole = "distance of closest approach 15000 m, speed 280 m/s, range at the first plot 40000 m"
-    assert panels.swept(replace(result, swept=(("target", past),))) == f"target = fly by, {whole}"
-    x, axis = sweeps.places(result, "target", targets)
+    assert key_labels.swept_description(replace(result, swept=(("target", past),))) == f"target = fly by, {whole}"
+    x, axis = sweep_figures.axis_positions(result, "target", targets)
     assert x.tolist() == [0, 1, 2]
     assert [" ".join(shown.split()) for _, shown in axis.ticks] == words
-    lines = panels.lines_of(
+    lines = figure_lines.case_lines(
         [replace(result, name=f"rls2 {n}", swept=(("target", one),)) for n, one in enumerate(targets)],
         {(f"rls2 {n}", "r", "r"): tables.frame({"x": [n], "y": [n]}) for n in range(3)},
         *("r", ("x", "y"), ["r"]),
@@ -174,16 +174,16 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
 
 def test_panels_of_several_configs_that_would_be_called_the_same_are_told_by_their_config():
     result = run.run("ambiguous_stagger", realisations=8, figures=False)
-    plain, *swept = panels.by_panel(result.cases)
+    plain, *swept = case_selection.group_by_panel(result.cases)
     assert [plain, *swept] == ["RLS 4", "RLS 4, $F_r$ = 1000, 1200 Hz", "RLS 4, $F_r$ = 1000, 1200, 1400 Hz"]
     again = [*result.cases, replace(result.cases[0], name="other")]
-    assert list(panels.by_panel(again)) == ["ambiguous_rls4, RLS 4", *swept, "other, RLS 4"]
+    assert list(case_selection.group_by_panel(again)) == ["ambiguous_rls4, RLS 4", *swept, "other, RLS 4"]
 
 
 def test_a_filter_looks_the_same_in_all_panels_of_a_figure():
     """Of ambiguous_stagger the second config has a filter more, before others that both have."""
     result = run.run("ambiguous_stagger", realisations=30, figures=False)
-    drawn = output.case_figures(result.cases, result.tables, result.experiment)
+    drawn = result_content.case_figures(result.cases, result.tables, result.experiment)
     styles = {}
     for one in (mark for panel in drawn["sigma_r"].panels for mark in panel.marks):
         styles.setdefault(one.label, set()).add(one.style)
@@ -195,6 +195,6 @@ def test_a_filter_looks_the_same_in_all_panels_of_a_figure():
 def test_an_angle_is_told_in_degrees_in_every_language(code, words):
     key = "target.turns.0.rate_radps"
     result = run.run("sonar_manoeuvre_turning", realisations=8, overrides=[f"sweep.{key}=[0.01745]"], figures=False)
-    with speaking(code):
-        assert panels.swept(result.cases[0], without=["frame"]) == words
-        assert panels.axis_of(result.cases[0], key).partition(", ")[2] == words[-3:]
+    with use_language(code):
+        assert key_labels.swept_description(result.cases[0], without=["frame"]) == words
+        assert key_labels.key_axis_label(result.cases[0], key).partition(", ")[2] == words[-3:]

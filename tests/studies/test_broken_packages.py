@@ -37,7 +37,7 @@ PACKAGES = {  # study: source of its module, what is said
     "greedy": (
         WHOLE.format(
             name="greedy",
-            keys="from radarsim.config.fields import Study as Keys; "
+            keys="from radarsim.config.study_keys import StudyKeys as Keys; "
             "return type('Greedy', (Keys,), {'__annotations__': {'seed': int}})",
         ),
         "has keys that every config has already: seed",

@@ -18,10 +18,10 @@ import pytest
 import yaml
 
 import radarsim
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load, schema_json
-from radarsim.config import load as reading
-from radarsim.config.document import Faults
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load, schema_json
+from radarsim.config import yaml_io
+from radarsim.config.error_list import ErrorList
 from radarsim.errors import ConfigError
 from tests.program import command, csv_bytes, record
 from tests.tolerances import assert_rounded
@@ -82,7 +82,7 @@ def written(stem, *further, like="rls2", **keys):
 
 
 def shipped(stem):
-    return reading.read(ROOT / f"configs/{stem}.yaml", Faults()).data
+    return yaml_io.read_document(ROOT / f"configs/{stem}.yaml", ErrorList()).data
 
 
 def identity(config="mine.yaml", *overrides):
@@ -791,8 +791,8 @@ def test_studies_without_plots_refuse_it(place):
 
 def test_the_schema_admits_it(place):
     definitions = json.loads(schema_json())["$defs"]
-    assert {"$ref": "#/$defs/OwnCode"} in definitions["range_doppler"]["properties"]["filters"]["items"]["oneOf"]
-    own = definitions["OwnCode"]
+    assert {"$ref": "#/$defs/UserFilterKeys"} in definitions["range_doppler"]["properties"]["filters"]["items"]["oneOf"]
+    own = definitions["UserFilterKeys"]
     assert own["required"] == ["name", "python"]
     assert own["additionalProperties"] is True
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import result as output
-from radarsim.app.case_work import CaseWork
-from radarsim.report.drawing import GREY, Line
+from radarsim.api import result_content
+from radarsim.api.case_work import CaseWork
+from radarsim.report.drawing.model import GREY, Line
 from radarsim.studies import registry
 from radarsim.studies.interface import Study
 from tests.tolerances import assert_rounded, column_sizes, rounding
@@ -104,7 +104,7 @@ def drawn_of(mark, part, columns):
 def test_lines_of_sigma_and_gains_are_rows_of_their_table(study):
     """Whole: times, values, both ends and exact values of one case, filter and component; angles in degrees."""
     result = radarsim.run(CASES[study].loaded(FEW.get(study, 300)))
-    drawn = output.case_figures(result.cases, result.tables, result.experiment)
+    drawn = result_content.case_figures(result.cases, result.tables, result.experiment)
     known = set(registry.study(result.cases[0].study).keys().figure_names)
     assert {name for name in drawn if not name.startswith("sweep_")} <= known
     looked = 0

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from radarsim import failures
-from radarsim.app.solve import NEAR_ENOUGH
+from radarsim import user_code_errors
+from radarsim.api.design.solve import TARGET_TOLERANCE
 from tests.program import csv_bytes
 from tests.studies import outside
 
@@ -35,7 +35,7 @@ def radarsim(place, warm):
     return outside.beside(warm, place / "site", place)
 
 
-LINES = {"chirp": 120, "bearings": 200, "learned": 260}  # at most, of its file
+LINES = {"chirp": 113, "bearings": 191, "learned": 247}  # at most, of its file, without imports
 
 
 @pytest.mark.slow
@@ -56,7 +56,7 @@ def test_the_long_tests_of_what_is_learned_pass(radarsim):
 @pytest.mark.parametrize("name", LINES)
 def test_its_file_is_short(name):
     text = (EXAMPLES / name / "src" / name / "__init__.py").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= LINES[name]
+    assert sum(not line.startswith(("from ", "import ")) for line in text.splitlines()) <= LINES[name]
 
 
 @pytest.mark.slow
@@ -118,7 +118,7 @@ def test_the_chirps_questions_and_recorded_plots(radarsim, tmp_path):
     radarsim(*curve, f"radar.slope_hz_per_s={solved['value']!r}")
     up = [line for line in (tmp_path / "chirp/last.csv").read_text().splitlines() if line.startswith("chirp,up,r,")]
     last, limit = map(float, up[0].split(",")[-2:])
-    assert last == pytest.approx(27, rel=NEAR_ENOUGH)
+    assert last == pytest.approx(27, rel=TARGET_TOLERANCE)
     ask = ("solve", "chirp", "radar.slope_hz_per_s", "--limit", "r", "--filter", "up", "--equals", 27, "--json")
     # Long settled: as near as that, times twenty where sigma changes by over a twentieth of what the slope does.
     settled = pytest.approx(solved["value"], rel=20 * abs(limit / last - 1))
@@ -201,7 +201,7 @@ def test_a_claims_fault_is_found_before_the_run_and_its_measures_after_the_table
         assert "/chirp/__init__.py:" in line
         assert ": no filter 'upp'; there are " in line
     assert not (tmp_path / "results").exists()
-    measure = "def own(seen, case):\n    return None\n\n\n"
+    measure = "def own(evidence, case):\n    return None\n\n\n"
     other = whole.replace("{gain: {filter: up, component: r}}", "own", 1).replace("\n\nSTUDY", f"\n\n{measure}STUDY")
     file.write_text(other, encoding="utf-8")
     line = command(*run, code=1).stderr.splitlines()[-1]
@@ -224,7 +224,7 @@ def test_what_the_compiler_refuses_is_its_reason_and_the_line_that_it_names():
     for wrong in (unnamed, untyped):
         with pytest.raises(Exception, match="nothing" if wrong is untyped else "yy") as caught:
             wrong(1.0)
-        said.append(failures.summary(caught.value))
+        said.append(user_code_errors.error_summary(caught.value))
     assert said[0].startswith("TypingError: NameError: name 'yy' is not defined (")
     assert said[1].startswith("TypingError: Unknown attribute 'nothing' of type float64")
     line = int(said[1].rpartition(":")[2].rstrip(")"))

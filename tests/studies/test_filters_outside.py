@@ -13,8 +13,8 @@ from tests.studies import outside
 
 ROOT = Path(__file__).parents[2]
 N = 9000  # two whole blocks and a partial one
-BASE = "import numpy as np\nfrom typing import Literal; from radarsim.config.fields import key\n"
-BASE += "from radarsim.studies.range_doppler.given import GivenGains\n"
+BASE = "import numpy as np\nfrom typing import Literal; from radarsim.config.key_types import key\n"
+BASE += "from radarsim.studies.range_doppler.package_filters import GivenGains\n"
 CLASS = (
     BASE
     + """
@@ -147,7 +147,7 @@ def test_it_is_solved_and_followed(ran, radarsim, tmp_path):
 
 @pytest.mark.slow
 def test_an_edit_of_the_package_begins_anew_its_own_cases_alone(ran, place, radarsim, tmp_path):
-    program = "import sys\nfrom radarsim.app.configs import load\nfrom radarsim.studies.identity import identity\n"
+    program = "import sys\nfrom radarsim.api.configs import load\nfrom radarsim.studies.identity import identity\n"
     program += "import pickle\nfor config in sys.argv[1:]:\n    (case,) = load(config).cases\n"
     program += "    assert pickle.loads(pickle.dumps(case)) == case  # as it travels to workers\n"
     program += "    print(identity(case))\n"

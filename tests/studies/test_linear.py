@@ -8,11 +8,14 @@ from scipy.linalg import solve_discrete_are
 from scipy.stats import multivariate_normal
 
 from radarsim.config.experiment import Case
-from radarsim.config.fields import Member, Model, Positive, Probability, key
+from radarsim.config.key_types import Positive, Probability, key
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member
 from radarsim.errors import ConfigError
+from radarsim.report.quantities import Component
 from radarsim.studies.interface import Paper
 from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Component, Measured
+from radarsim.studies.onefile import Measured
 from tests.tolerances import Z, assert_rounded, column_sizes, rounding, scaled_condition
 
 SCANS = 25

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from radarsim.config.experiment import Case, Experiment
-from radarsim.config.fields import Member, Model, NonNegative, Positive, key
+from radarsim.config.key_types import NonNegative, Positive, key
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.papers import one_file_measures
@@ -18,9 +20,11 @@ from radarsim.papers.claims_table import claims_table, failed_measures
 from radarsim.papers.evidence import MissingEvidence, UnknownName
 from radarsim.papers.study_claims import check_declarations, claim_faults, claims_of, interpretations_of
 from radarsim.report import tables
-from radarsim.studies.interface import Paper, true_column
+from radarsim.report.quantities import Component
+from radarsim.studies.interface import Paper
 from radarsim.studies.noise import noise_key
-from radarsim.studies.onefile import Component, Measured, OneFile
+from radarsim.studies.onefile import Measured, OneFile
+from radarsim.studies.plot_arrays import true_column
 from tests.answers import answer_texts
 from tests.tolerances import assert_rounded
 
@@ -220,7 +224,7 @@ WRONG = {
     "asks": (None, r"test_onefile\.py: Wrong\.asks must be given: the question, one sentence; got nothing"),
     "components": ((Component("x", ""),), "components: .* must be Component.*, with a unit"),
     "paper": ("Kalman", r"paper: must be Paper\(…\), got 'Kalman'"),
-    "Filter": (Sensor, r"Filter must be a subclass of radarsim\.config\.fields\.Member, got .*Sensor"),
+    "Filter": (Sensor, r"Filter must be a subclass of radarsim\.config\.study_keys\.Member, got .*Sensor"),
     "scan_period": ("sensor.period_s", r"scan_period: there is no key sensor\.period_s"),
     "scan_period ": ("gain", r"scan_period: gain must be a key of a part, PART\.KEY"),
     "measured": ((Measured("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
@@ -297,10 +301,10 @@ def test_what_a_claim_names_and_is_not_there_is_known_without_a_run(what):
 def failing(what):
     """A measure that gives this, or raises it."""
 
-    def measure(seen):
+    def measure(evidence):
         if isinstance(what, BaseException):
             raise what
-        return what(seen) if callable(what) else what
+        return what(evidence) if callable(what) else what
 
     return MeasureCall("own", measure, (), {}, "file.py:7:1")
 
@@ -313,8 +317,8 @@ def failing(what):
         (ValueError("boom"), "ValueError: boom \\("),
         (SystemExit(0), "SystemExit: 0 \\("),
         (UnknownName("no filter 'quikc'; there are slow"), "no filter 'quikc'; there are slow \\("),
-        (lambda seen: seen.curve({}, "quick", "x").at(41), "no such scans; there are 1 to 40 \\("),
-        (lambda seen: seen.gain({}, "quick", "x").since(50), "no such scans; there are 1 to 40 \\("),
+        (lambda evidence: evidence.curve({}, "quick", "x").at(41), "no such scans; there are 1 to 40 \\("),
+        (lambda evidence: evidence.gain({}, "quick", "x").since(50), "no such scans; there are 1 to 40 \\("),
     ],
 )
 def test_a_measure_that_fails_is_one_line_and_the_other_claims_are_judged(made, what, said):

@@ -169,7 +169,8 @@ def test_recorded_plots_and_a_config_of_ones_own(radarsim, tmp_path):
 
 
 def test_the_tab_key_completes_its_configs(radarsim, tmp_path):
-    program = "from radarsim.cli.group import completed\nprint(*(one.value for one in completed(0, 0, 'fifth_')))\n"
+    program = "from radarsim.cli.options import complete_config\n"
+    program += "print(*(item.value for item in complete_config(0, 0, 'fifth_')))\n"
     (tmp_path / "tab.py").write_text(program)
     assert radarsim(module="tab", cwd=tmp_path).stdout == "fifth_step\n"
 

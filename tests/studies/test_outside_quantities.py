@@ -8,8 +8,9 @@ import click
 import pandas as pd
 import pytest
 
-from radarsim.app.solve import NEAR_ENOUGH, solve
-from radarsim.cli import design, main
+from radarsim.api.design.solve import TARGET_TOLERANCE, solve
+from radarsim.cli import design
+from radarsim.cli.command_group import main
 from radarsim.errors import ConfigError
 from radarsim.report import quantities
 from radarsim.report.quantities import Quantity
@@ -17,7 +18,7 @@ from radarsim.studies import registry
 from tests.studies import outside
 from tests.tolerances import assert_rounded, rounding
 
-PRECISION = 10 * NEAR_ENOUGH  # of a root, where the quantity changes by a tenth of what the key does
+PRECISION = 10 * TARGET_TOLERANCE  # of a root, where the quantity changes by a tenth of what the key does
 STUDY = '''
 from radarsim.report.quantities import Quantity
 from radarsim.report.quantities import COMMON
@@ -245,7 +246,7 @@ def test_a_name_that_another_option_has_is_refused_where_it_is_declared():
     context = click.Context(command, parent=main.make_context("radarsim", [], resilient_parsing=True))
     params = click.Command.get_params(command, context)
     options = {name for param in params for name in param.opts if name.startswith("--")}
-    assert options == quantities.TAKEN
+    assert options == quantities.RESERVED_OPTIONS
     with pytest.raises(ConfigError, match="quantity 'at_k': --at-k is another option of `radarsim solve`; rename it"):
         Quantity("at_k", "rate", "slips", "rate")
     with pytest.raises(ConfigError, match="quantity 'at first': its name must be of small letters, digits and _"):
@@ -254,12 +255,12 @@ def test_a_name_that_another_option_has_is_refused_where_it_is_declared():
 
 def test_one_name_in_two_units_is_listed_with_both():
     depth, share = Quantity("slip", "slip", "slips", "slip", unit="m"), Quantity("slip", "slip", "s", "s", kind="share")
-    option = design._option({"one": depth, "other": share, "third": depth}, everywhere=False)
+    option = design._option({"one": depth, "other": share, "third": depth}, in_all_studies=False)
     assert option.help == "Slip, m (one, third), % (other)."
-    assert design._option({"one": depth}, everywhere=True).help == "Slip, m."
+    assert design._option({"one": depth}, in_all_studies=True).help == "Slip, m."
     ratio, error = Quantity("ratio", "ratio", "r", "r"), Quantity("error", "error", "e", "e", per="component")
-    assert design._option({"one": ratio}, everywhere=False).help == "Ratio (one)."
-    assert design._option({"one": error}, everywhere=False).help == "Error, in the component's unit (one)."
+    assert design._option({"one": ratio}, in_all_studies=False).help == "Ratio (one)."
+    assert design._option({"one": error}, in_all_studies=False).help == "Error, in the component's unit (one)."
 
 
 @pytest.mark.parametrize("given", [7, (7,), None])

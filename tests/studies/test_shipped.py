@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.config.fields import Study as Keys
+from radarsim.config.study_keys import StudyKeys as Keys
 from radarsim.papers.claim import PaperClaims
 from radarsim.papers.evidence import Evidence
 from radarsim.papers.paper_keys import paper_key
 from radarsim.papers.study_claims import claims_of
 from radarsim.studies import registry
-from radarsim.studies.interface import RecordedPlots, Study
+from radarsim.studies.interface import Study
+from radarsim.studies.recording_interface import RecordingInterface
 
 ROOT = Path(__file__).parents[2]
 STUDIES = [registry.study(name) for name in registry.SHIPPED]
@@ -34,7 +35,7 @@ def test_keys_claims_and_recorded_plots_are_of_the_declared_types(study):
     assert isinstance(claims, PaperClaims)
     assert issubclass(claims.evidence, Evidence)
     assert {claim.id.partition(".")[0] for claim in claims.claims} == {paper_key(study)}
-    assert isinstance(study.recording_interface(), RecordedPlots | None)
+    assert isinstance(study.recording_interface(), RecordingInterface | None)
 
 
 def test_declared_studies_load_nothing_that_computes():

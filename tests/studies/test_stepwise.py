@@ -9,15 +9,19 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from radarsim.config.fields import Member, Model, Positive, Probability, key
+from radarsim.config.key_types import Positive, Probability, key
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.kernels.traced import elimination, sqrt, updated, where
+from radarsim.kernels.small_matrices import eliminate, update
+from radarsim.kernels.tracing import sqrt, where
 from radarsim.papers import one_file_measures
-from radarsim.recorded import page
-from radarsim.recorded.follow import START_ESTIMATES, Followed
+from radarsim.recordings.report import tables
+from radarsim.recordings.tracking_result import START_ESTIMATES, TrackingResult
+from radarsim.report.quantities import Component
 from radarsim.studies import stepwise
-from radarsim.studies.onefile import Component, Measured
+from radarsim.studies.onefile import Measured
 from radarsim.studies.stepwise import Steps, StepStudy
 from tests.tolerances import assert_rounded, column_sizes, mean_error, sigma_error
 
@@ -218,11 +222,11 @@ def test_a_filter_without_a_covariance_is_told_of_beside_recorded_plots():
     study = Walk()
     case = case_of(study)
     columns = dict(study.recording_interface().simulated(case, 1))
-    track, found = study.tracker(case).feed(columns), Followed(case)
+    track, found = study.tracker(case).feed(columns), TrackingResult(case)
     truth = {name: columns.pop(name) for name in list(columns) if name.startswith("true_")}
     found.add(columns, track)
     found.add_errors(track, columns["t_s"], truth)
-    for f, own in enumerate(page.errors(found)):
+    for f, own in enumerate(tables.error_table(found)):
         error = (track.estimate[f, :, 0] - truth["true_x_m"])[START_ESTIMATES:]
         assert_rounded(own["RMS error"], np.sqrt(np.mean(error**2)), operations=SCANS)
         assert np.isnan(own["of own σ"]) == (f == 1)
@@ -290,7 +294,7 @@ def drawn_by_python(s, z, u, c):
 
 
 def of_negative_variance(s, z, u, c):
-    x, P = updated((s[0],), (s[1],), (1.0,), z[0] - s[0], -(c.sigma**2))
+    x, P = update((s[0],), (s[1],), (1.0,), z[0] - s[0], -(c.sigma**2))
     return x[0], P[0]
 
 
@@ -317,7 +321,7 @@ FAULTS = [
     ("update", root_of_minus_one, 1, "root_of_minus_one: gives nan in every realisation"),
     ("estimate", a_constant, 0, "a_constant: gives inf, which is no number to calculate with"),
     ("update", compared_with_itself, 1, r"a test for NaN cannot be made; test what would make it, e\.g\. where"),
-    ("update", by_numpy, 1, r"by_numpy: .* radarsim\.kernels\.traced has sqrt"),
+    ("update", by_numpy, 1, r"by_numpy: .* radarsim\.kernels\.formula_functions has exp"),
     ("update", drawn_by_python, 0, "gives another formula each time: draw by normals"),
     ("update", a_list, 0, "a_list: must give a tuple of numbers, got a list"),
     ("update", nothing, 0, "nothing: must give a tuple of numbers, got nothing"),
@@ -394,7 +398,7 @@ def test_a_covariance_that_is_not_positive_is_no_result():
 
 def test_a_matrix_that_is_not_positive_has_positive_variances_too():
     P, e = (1.0, 2.0, 1.0), (0.5, 0.25)
-    assert elimination(P, e)[1] < 0 < elimination((1.0, 0.5, 1.0), e)[1]
+    assert eliminate(P, e)[1] < 0 < eliminate((1.0, 0.5, 1.0), e)[1]
 
 
 ON_PLOTS = [  # what a step gives over recorded plots; the row

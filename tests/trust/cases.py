@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from radarsim.app.configs import load
-from radarsim.app.doctor import KNOWN
+from radarsim.api.configs import load
+from radarsim.api.maintenance.self_test import KNOWN_FOLDER
 from radarsim.config.experiment import Experiment
 
 
@@ -27,7 +27,7 @@ class Small(NamedTuple):
 
 def known(study: str, realisations: int, longer: int) -> Small:
     """The case that `radarsim doctor` knows."""
-    return Small(str(KNOWN / f"{study}.yaml"), (), realisations, longer)
+    return Small(str(KNOWN_FOLDER / f"{study}.yaml"), (), realisations, longer)
 
 
 DETECTORS = "{name: a, plots: 5, threshold_k: [1, 2]}, {name: b, plots: 4, test_every: 4, threshold_k: [2]}"

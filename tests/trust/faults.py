@@ -95,20 +95,18 @@ def names_in_the_identity(right):
     return lambda case: right(case)[:32] + repr(case.spec)
 
 
-@fault("app.case_work:CaseWork.simulate", f"{P1_STUDY}::test_every_sigma_is_exact_within_its_statistical_error")
+@fault("api.case_work:CaseWork.simulate", f"{P1_STUDY}::test_every_sigma_is_exact_within_its_statistical_error")
 def every_block_is_the_first(right):
     return lambda work, first, count: right(work, 0, count)
 
 
 # ---- sums and stored blocks ---------------------------------------------------------------------------------------
-@fault(
-    "engine.results:Sums.__add__", "engine/test_blocks.py::test_sums_are_a_commutative_monoid_where_addition_is_exact"
-)
+@fault("engine.sums:Sums.__add__", "engine/test_blocks.py::test_sums_are_a_commutative_monoid_where_addition_is_exact")
 def realisations_of_one_side_counted(right):
     return lambda one, other: type(one)(one.count, right(one, other).values)
 
 
-@fault("engine.blocks:added", "engine/test_blocks.py::test_an_overflow_between_blocks_is_no_result")
+@fault("engine.blocks:add_sums", "engine/test_blocks.py::test_an_overflow_between_blocks_is_no_result")
 def sums_that_overflow_pass(right):
     return lambda left, right_, first: left + right_
 
@@ -118,7 +116,7 @@ def shares_overlap(right):
     return lambda blocks, number, of: min(right(blocks, number, of) + (number > 0), blocks)
 
 
-@fault("engine.results:Layout.unpack", "trust/test_faults.py::test_what_is_packed_is_unpacked")
+@fault("engine.sums:Layout.unpack", "trust/test_faults.py::test_what_is_packed_is_unpacked")
 def arrays_of_sums_in_another_order(right):
     def unpacked(layout, values):
         names = sorted(layout.shapes, reverse=True)
@@ -196,17 +194,19 @@ def measured_values_hide_exact_ones(right):
     return lambda rows, value, exact: right(rows, value, value)
 
 
-@fault("report.tables:realisations", "report/test_tables.py::test_fewer_estimates_than_realisations")
+@fault("report.tables:realisation_counts", "report/test_tables.py::test_fewer_estimates_than_realisations")
 def estimates_divided_by_all_realisations(right):
     return lambda result: right(SimpleNamespace(axes=result.axes, count=result.count, sums={}))
 
 
-@fault("report.tables:components", "report/test_tables.py::test_rows_in_order_and_only_where_there_is_an_estimate")
+@fault(
+    "report.tables:component_columns", "report/test_tables.py::test_rows_in_order_and_only_where_there_is_an_estimate"
+)
 def rows_under_another_component(right):
     return lambda result, c: right(result, len(result.axes.components) - 1 - c)
 
 
-@fault("report.notes:is_exact", "report/test_notes.py::test_no_note_stands_beside_an_exact_value")
+@fault("report.interval_notes:is_exact", "report/test_notes.py::test_no_note_stands_beside_an_exact_value")
 def notes_beside_exact_values(right):
     return lambda table: right(table) & False
 
@@ -222,18 +222,18 @@ def exact_values_judged_by_their_sample(right):
 
 
 # ---- worlds and exact values --------------------------------------------------------------------------------------
-@fault("physics:rotation", "physics/test_frames.py::test_rotation_is_a_right_hand_turn")
+@fault("physics.frames:rotation", "physics/test_frames.py::test_rotation_is_a_right_hand_turn")
 def a_left_hand_turn(right):
     return lambda azimuth, elevation: right(-azimuth, elevation)
 
 
-@fault("physics:transition", "physics/test_targets.py::test_transition_is_the_papers_matrix")
+@fault("physics.motion:transition", "physics/test_targets.py::test_transition_is_the_papers_matrix")
 def acceleration_moves_nothing(right):
     return lambda dt, size=3: right(dt, size) * [[abs(i - j) < 2 for j in range(size)] for i in range(size)]
 
 
 @fault(
-    "studies.range_doppler.filters:error_recursion",
+    "studies.range_doppler.error_recursion:error_recursion",
     f"{P1_EXACT}::test_a_quadratic_truth_leaves_no_bias_and_a_cubic_one_does",
 )
 def bias_of_the_first_estimate_lost(right):
@@ -245,12 +245,12 @@ def bias_of_the_first_estimate_lost(right):
     return started
 
 
-@fault("studies.range_doppler.filters:steady_state", f"{P1_EXACT}::test_settles_to_the_steady_state")
+@fault("studies.range_doppler.steady_state:steady_state", f"{P1_EXACT}::test_settles_to_the_steady_state")
 def what_a_filter_believes_is_true(right):
     return lambda *given: (right(*given)[0],) * 2
 
 
-@fault("studies.range_doppler.filters:error_recursion", f"{P1_EXACT}::test_agrees_with_an_outside_calculation")
+@fault("studies.range_doppler.error_recursion:error_recursion", f"{P1_EXACT}::test_agrees_with_an_outside_calculation")
 def gains_of_a_filter_without_process_noise(right):
     return lambda one, *more: right(dataclasses.replace(one, noise=(0.0,) * len(one.noise)), *more)
 

@@ -14,7 +14,7 @@ from unittest import mock
 
 import numpy as np
 
-from radarsim.kernels import compile
+from radarsim.kernels import compiler
 
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 WIDTH = 8
@@ -145,12 +145,16 @@ def uncompiled():
     """Put the plain floats in place of the registers, before any kernel is imported."""
     np.seterr(over="ignore")  # words of random numbers overflow by design
     for name in ("kernel", "part", "summing"):
-        setattr(compile, name, recorded(getattr(compile, name)))
+        setattr(compiler, name, recorded(getattr(compiler, name)))
     from radarsim.kernels import lanes
 
-    for name, plain in LANES.items():
-        setattr(lanes, name, plain)
-    package = Path(compile.__file__).parents[1]
+    for name in LANES.keys() & vars(lanes).keys():
+        setattr(lanes, name, LANES[name])
+    from radarsim.kernels import lane_programs  # which imports those of lanes
+
+    for name in LANES.keys() - vars(lanes).keys():
+        setattr(lane_programs, name, LANES[name])
+    package = Path(compiler.__file__).parents[1]
     every = (*package.rglob("kernels/[a-z]*.py"), *package.rglob("kernels.py"))
     for file in sorted(file for file in every if "template" not in file.parts):
         name = ".".join(file.relative_to(package.parent).with_suffix("").parts)
@@ -267,8 +271,8 @@ class Work:
 
 def work(config, overrides):
     """The last case of a config; a search for rare losses takes one turn, a window few blocks, each is cured."""
-    from radarsim.app.configs import load
-    from radarsim.studies.discriminator import nearest, study
+    from radarsim.api.configs import load
+    from radarsim.studies.discriminator import nearest_loss, study
 
     few = mock.patch.multiple(
         study,
@@ -276,7 +280,7 @@ def work(config, overrides):
         IMAGE_BLOCKS_PER_WINDOW=dict.fromkeys(study.BLOCKS_PER_WINDOW, 8),
         SEARCH_MARGIN=0.0,
     )
-    with few, mock.patch.object(nearest, "MOST_TURNS", 1):
+    with few, mock.patch.object(nearest_loss, "MAX_TURNS", 1):
         return Work(load(config, overrides).cases[-1])
 
 
@@ -294,7 +298,7 @@ def bursts(config, overrides, count):
 
     Their sums are of bursts that lock and others: see `burst_sums`.
     """
-    from radarsim.studies.discriminator import study
+    from radarsim.studies.discriminator import importance_sampling, study
 
     plan = work(config, overrides).plan
     size = plan.layout.shapes["error"][2]
@@ -302,7 +306,7 @@ def bursts(config, overrides, count):
     if plan.mixture is None:
         errors, arrays["passes"] = study.estimate(plan, 8, count)
     else:
-        errors, arrays["passes"], arrays["weights"], _ = study.weighted_estimates(plan, 8, count)
+        errors, arrays["passes"], arrays["weights"], _ = importance_sampling.weighted_estimates(plan, 8, count)
     arrays["bursts"] = errors[..., :size] / plan.potential[..., :size]
     arrays["condition"] = burst_condition(plan)
     return arrays
@@ -316,11 +320,11 @@ def burst_condition(plan):
     drawn by the root of their covariance: of one that is nearly singular, the least pivot being r² of its variance,
     the root is off by 1/2r as much, and the errors, of one σ together, are sums over √n σ of normals.
     """
-    from radarsim.bursts.kernels import scoring
+    from radarsim.bursts.kernels import signal
 
     physics, size = plan.world.physics, plan.layout.shapes["error"][2]
     noise = 0.0
-    if physics["mode"] == scoring.BLOCK_SUMS:
+    if physics["mode"] == signal.BLOCK_SUMS:
         root = np.zeros((len(plan.world.factor), 4, 4))
         root[:, *np.tril_indices(4)] = plan.world.factor
         pivots = np.diagonal(root, axis1=1, axis2=2) / np.linalg.norm(root, axis=2)
@@ -338,83 +342,86 @@ def burst_condition(plan):
 
 def burst_sums():
     """Sums over bursts whose errors are given: locked or not, no search has its end in them."""
-    from radarsim.studies.discriminator import kernels
+    from radarsim.studies.discriminator.kernels import sums as kernels_sums
 
     plan = work(*RUNS["discriminator on block sums"][:2]).plan
     draw = np.random.default_rng(5)
     errors = plan.potential * draw.standard_normal((40, *plan.potential.shape)) * draw.choice([1, 3], (40, 1, 1, 1))
     weights = draw.uniform(0.1, 2, len(errors))
-    arrays = {name: np.zeros(plan.layout.shapes[name]) for name in kernels.Sums._fields}
-    losses = np.zeros((*plan.potential.shape[:2], len(kernels.LOCKS), 4))
-    kernels.accumulate(errors, plan.options, plan.potential, plan.posterior, kernels.Sums(**arrays))
-    kernels.accumulate_losses(errors, plan.options, plan.potential, plan.posterior, weights, losses)
+    arrays = {name: np.zeros(plan.layout.shapes[name]) for name in kernels_sums.Sums._fields}
+    losses = np.zeros((*plan.potential.shape[:2], len(kernels_sums.LOCKS), 4))
+    kernels_sums.accumulate(errors, plan.options, plan.potential, plan.posterior, kernels_sums.Sums(**arrays))
+    kernels_sums.accumulate_losses(errors, plan.options, plan.potential, plan.posterior, weights, losses)
     return arrays | {"losses": losses}
 
 
 def tracks():
     """Plots that are drawn by themselves, and estimates over recorded ones."""
-    from radarsim.kernels import linear
-    from radarsim.studies.ambiguous_doppler import track as ambiguous_plots
-    from radarsim.studies.ambiguous_doppler.kernels import sums as folds
+    from radarsim.kernels import second_order
+    from radarsim.studies.ambiguous_doppler.kernels import realisations
+    from radarsim.studies.ambiguous_doppler.recorded_plots import FoldedRecordedPlots
     from radarsim.studies.multimodel import study as multimodel
-    from radarsim.studies.multimodel import track as multimodel_plots
-    from radarsim.studies.range_doppler import track as range_doppler_plots
-    from radarsim.studies.sonar.clutter import track as sonar_clutter_plots
+    from radarsim.studies.multimodel import tracking as multimodel_tracking
+    from radarsim.studies.multimodel.recorded_plots import FlightRecordedPlots
+    from radarsim.studies.range_doppler import plot_likelihood
+    from radarsim.studies.range_doppler import tracking as range_doppler_tracking
+    from radarsim.studies.range_doppler.recorded_plots import RangeDopplerRecordedPlots
+    from radarsim.studies.sonar.clutter import tracking as clutter_tracking
 
     made = {}
     plan = work(*RUNS["linear"][:2]).plan
-    plots = linear.simulate_plots(plan.problem, 7, 3)
+    plots = second_order.simulate_plots(plan.problem, 7, 3)
     made["linear plots"] = plots
-    made["linear estimates"] = np.nan_to_num(linear.estimate(plan.problem, plots))
+    made["linear estimates"] = np.nan_to_num(second_order.estimate(plan.problem, plots))
     one = work(*RUNS["linear"][:2])
-    tracker = range_doppler_plots.Tracker(one.case)
-    recorded = range_doppler_plots.Recorded().simulated(one.case, 3)
+    tracker = range_doppler_tracking.Tracker(one.case)
+    recorded = RangeDopplerRecordedPlots().simulated(one.case, 3)
     made["linear track"] = np.nan_to_num(tracker.feed(recorded).estimate)
-    missed = range_doppler_plots.Recorded().simulated(work(*RUNS["linear with misses"][:2]).case, 3)
+    missed = RangeDopplerRecordedPlots().simulated(work(*RUNS["linear with misses"][:2]).case, 3)
     made["plots with misses"] = np.nan_to_num(np.stack([missed["range_m"], missed["true_r_m"]]))
     one = work(*RUNS["folds missed"][:2])
-    folded = ambiguous_plots.Recorded().simulated(one.case, 3)
+    folded = FoldedRecordedPlots().simulated(one.case, 3)
     made["folded plots"] = np.nan_to_num(folded["velocity_mps"])
-    made["folds of one"] = np.nan_to_num(folds.simulate_hypotheses(one.plan.world, one.plan.banks, 0)[1])
+    made["folds of one"] = np.nan_to_num(realisations.simulate_hypotheses(one.plan.world, one.plan.banks, 0)[1])
     measured = {name: folded[name] for name in ("t_s", "range_m", "velocity_mps")}
     for options in one.case.spec.filters:
-        if likelihood := ambiguous_plots.Recorded().likelihood(one.case, options.name, [measured]):
+        if likelihood := FoldedRecordedPlots().likelihood(one.case, options.name, [measured]):
             made[f"folded likelihood {options.name}"] = np.array([likelihood(likelihood.stated)])
     one = work(*RUNS["linear"][:2])
-    likelihood = range_doppler_plots.PlotLikelihood(one.case, None, [recorded])
+    likelihood = plot_likelihood.PlotLikelihood(one.case, None, [recorded])
     made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])
     one = work(*RUNS["multimodel families"][:2])
     z, R, _ = multimodel.simulate_plots(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R
-    made["multimodel drawn"] = np.stack(list(multimodel_plots.drawing(one.case)(0, 3).columns.values()))
+    made["multimodel drawn"] = np.stack(list(multimodel_tracking.drawing(one.case)(0, 3).columns.values()))
     r = np.linalg.norm(z[:, :, 0], axis=1)
     angles = np.arcsin(z[:, 1, 0] / r), np.arcsin(z[:, 2, 0] / r)
     columns = (0.5 * np.arange(len(r)), r, *angles)
     recorded = dict(zip(("t_s", "range_m", "elevation_rad", "azimuth_rad"), columns, strict=True))
-    track = multimodel_plots.track(one.case, recorded)
+    track = multimodel_tracking.track(one.case, recorded)
     made["multimodel track"] = np.nan_to_num(track.estimate)
-    likelihood = multimodel_plots.Recorded().likelihood(one.case, None, [recorded])
+    likelihood = FlightRecordedPlots().likelihood(one.case, None, [recorded])
     made["multimodel likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1)])
     one = work(*RUNS["sonar clutter"][:2])
-    recorded = sonar_clutter_plots.drawing(one.case)(3, 1).rows(0)
+    recorded = clutter_tracking.simulated_plots(one.case)(3, 1).rows(0)
     made["clutter plots"] = np.stack([np.nan_to_num(recorded[name]) for name in ("t_s", "range_m", "bearing_rad")])
     measured = {name: recorded[name] for name in ("t_s", "range_m", "bearing_rad")}
-    made["clutter track"] = np.nan_to_num(sonar_clutter_plots.Tracker(one.case).feed(measured).estimate)
+    made["clutter track"] = np.nan_to_num(clutter_tracking.Tracker(one.case).feed(measured).estimate)
     return made
 
 
 def alike():
     """Exact means over patterns of plots, of which the alike are merged, or all are followed to the end."""
-    from radarsim.kernels.algebra import pack
-    from radarsim.physics import process_noise
-    from radarsim.studies.range_doppler import patterns
-    from radarsim.studies.range_doppler.filters import Plots
+    from radarsim.kernels.kalman_algebra import pack
+    from radarsim.physics.motion import process_noise
+    from radarsim.studies.range_doppler import missed_plot_patterns
+    from radarsim.studies.range_doppler.error_recursion import Plots
 
     truth, dt = work(*RUNS["linear with misses"][:2]).plan.problem.truth, 5.0
     plots = Plots(np.array([25.0, 5.0]), np.zeros(2), np.array([10.0, 0.0]), 0.7)
-    design = patterns.Design(2, 2, pack(process_noise("white_jerk", 1.0, dt)))
-    made = {"merged": patterns.mixture(design, plots, truth, dt, 32)}
-    made["in pieces"] = patterns.mixture(design, plots, truth[:9], dt, 16, follow_all=True)
+    design = missed_plot_patterns.Design(2, 2, pack(process_noise("white_jerk", 1.0, dt)))
+    made = {"merged": missed_plot_patterns.mixture(design, plots, truth, dt, 32)}
+    made["in pieces"] = missed_plot_patterns.mixture(design, plots, truth[:9], dt, 16, follow_all=True)
     names = "moment", "bias", "believed", "nees"
     return {f"{how} {name}": np.nan_to_num(getattr(one, name)) for how, one in made.items() for name in names}
 
@@ -439,9 +446,9 @@ def matrices():
 
 def given():
     """Sums of a filter of a package, whose gains are given, beside one whose covariance is each realisation's own."""
-    from radarsim.physics import process_noise
+    from radarsim.physics.motion import process_noise
     from radarsim.studies.range_doppler import study
-    from radarsim.studies.range_doppler.given import GivenGains
+    from radarsim.studies.range_doppler.package_filters import GivenGains
 
     class Own(GivenGains):
         """The Kalman filter's gains, given."""

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app import run
+from radarsim.api import run
 from radarsim.engine.cluster import Cluster
-from radarsim.report.tables import to_csv
+from radarsim.report.csv_text import to_csv
 from tests.engine.test_collect import Shuffled
 from tests.program import csv_bytes
 from tests.trust.cases import CASES, MORE

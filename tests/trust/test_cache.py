@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.doctor import KNOWN
+from radarsim.api.maintenance.self_test import KNOWN_FOLDER
 from tests.kernels.test_compile import USE, house  # noqa: F401
 
 ROOT = Path(__file__).parents[2]
@@ -42,11 +42,11 @@ def test_eight_cold_starts_at_once(house, start):  # noqa: F811
 @pytest.mark.slow
 def test_eight_cold_runs_of_the_command_at_once(tmp_path):
     options = ["-n", "5000", "--no-figures", "--quiet", "--out", str(tmp_path)]
-    program = [sys.executable, "-m", "radarsim", "run", str(KNOWN / "range_doppler.yaml"), *options]
+    program = [sys.executable, "-m", "radarsim", "run", str(KNOWN_FOLDER / "range_doppler.yaml"), *options]
     at_once(program, RADARSIM_CACHE_DIR=str(tmp_path / "cache"))
     for name in ("curves", "gains"):
         made = (tmp_path / "range_doppler" / f"{name}.csv").read_bytes()
-        assert made == (KNOWN / f"range_doppler.{name}.csv").read_bytes()
+        assert made == (KNOWN_FOLDER / f"range_doppler.{name}.csv").read_bytes()
 
 
 @pytest.mark.slow
@@ -54,7 +54,8 @@ def test_a_home_that_cannot_be_written(tmp_path):
     """The kernels are kept in the temporary directory then; nothing is said and nothing is lost."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("XDG_", "RADARSIM_"))}
     environment |= {"HOME": "/dev/null", "TMPDIR": str(tmp_path)}
-    program = [sys.executable, "-m", "radarsim", "run", str(KNOWN / "range_doppler.yaml"), "--no-figures", "--quiet"]
+    config = str(KNOWN_FOLDER / "range_doppler.yaml")
+    program = [sys.executable, "-m", "radarsim", "run", config, "--no-figures", "--quiet"]
     done = subprocess.run([*program, "--out", str(tmp_path / "r")], cwd=ROOT, env=environment, capture_output=True)
     assert (done.returncode, done.stderr) == (0, b"")
     assert list(tmp_path.glob("radarsim-*/kernels-*"))
@@ -74,7 +75,7 @@ HOOKED = """if True:
 
     if __name__ == "__main__":
         sys.addaudithook(refuse)
-        from radarsim.cli import main
+        from radarsim.cli.command_group import main
         main(sys.argv[1:])
 """
 
@@ -83,15 +84,15 @@ HOOKED = """if True:
 @pytest.mark.parametrize("more", [[], ["--workers", "2"]])
 def test_a_run_forks_nothing(tmp_path, more):
     options = ["-n", "50000", "--no-figures", "--quiet", "--out", str(tmp_path), *more]
-    program = [sys.executable, "-c", HOOKED, "run", str(KNOWN / "range_doppler.yaml"), *options]
+    program = [sys.executable, "-c", HOOKED, "run", str(KNOWN_FOLDER / "range_doppler.yaml"), *options]
     done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 SUMS = """
 import sys
-from radarsim.app.configs import load
-from radarsim.app.case_work import CaseWork
+from radarsim.api.configs import load
+from radarsim.api.case_work import CaseWork
 for stem in sys.argv[1:]:
     print(CaseWork(load(stem).cases[0]).simulate(0, 72).tobytes().hex())
 """

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import pytest
 
 import radarsim
-from radarsim.report.tables import to_csv
+from radarsim.report.csv_text import to_csv
 from tests.warm import Start
 
 # The time of day, as every call of the C library tells it, moved by STEP_S seconds once the file STEP_ONCE is there.

@@ -12,13 +12,13 @@ from tests.warm import Start
 
 ROOT = Path(__file__).parents[2]
 SIZES = (900, 9_000, 60_000)  # less than a block of realisations, some blocks, many
-PATHS = ("radarsim/kernels/linear.py", "radarsim/kernels/random.py")
+PATHS = ("radarsim/kernels/second_order.py", "radarsim/kernels/random.py")
 EDITS = 200
 RUN = """
 import json, sys
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
-from radarsim.engine.run import collect
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
+from radarsim.engine.collect import collect
 work = CaseWork(load("rls2").cases[0])
 for size in json.loads(sys.argv[2]):
     answers = []

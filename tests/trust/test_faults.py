@@ -5,8 +5,8 @@ import importlib
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.engine.results import Layout
+from radarsim.api.configs import load
+from radarsim.engine.sums import Layout
 from radarsim.studies.noise import noise_key
 from tests.trust import faults
 

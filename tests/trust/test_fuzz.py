@@ -14,10 +14,10 @@ import time
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.cli import main
-from radarsim.config.document import SHIPPED
+from radarsim.api.configs import load
+from radarsim.cli.command_group import main
 from radarsim.config.experiment import Experiment
+from radarsim.config.find_files import SHIPPED
 from radarsim.errors import ConfigError
 
 CASES, RELEASE = 200, 100_000

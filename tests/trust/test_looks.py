@@ -13,11 +13,13 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import run
-from radarsim.app.configs import load
-from radarsim.app.run import RunOptions, SimulatedCases
-from radarsim.engine.results import Axes, Layout
-from radarsim.engine.run import Collected
+from radarsim.api import case_results, precision_target, simulate_cases
+from radarsim.api.configs import load
+from radarsim.api.simulate_cases import RunOptions, SimulatedCases
+from radarsim.engine import results
+from radarsim.engine.dispatch import CollectedSums
+from radarsim.engine.results import Axes
+from radarsim.engine.sums import Layout
 from radarsim.papers import decide
 from radarsim.papers.claim import Claim, PaperClaims, Part
 from radarsim.papers.claim_outcome import claim_outcome
@@ -26,7 +28,7 @@ from radarsim.papers.evidence import Evidence, MissingEvidence
 from radarsim.papers.expected_ranges import ExpectedRange
 from radarsim.papers.verdict_rule import (
     CONFIRMED,
-    LOOKS,
+    MAX_LOOKS,
     PRINT,
     REFUTED,
     UNDECIDED,
@@ -37,12 +39,18 @@ from radarsim.papers.verdict_rule import (
     widening_factor,
 )
 from radarsim.report import statistics
-from radarsim.report.precision import FIRST, FLOOR, FLOOR_OF_TAILS, MOST, looks
+from radarsim.report.precision import (
+    FIRST_LOOK,
+    MAX_REALISATIONS,
+    MIN_REALISATIONS,
+    MIN_REALISATIONS_WITH_TAILS,
+    look_counts,
+)
 from radarsim.report.quantities import LOST, SIGMA
 from radarsim.studies import registry
 
 Z = widening_factor(1) * Z95
-EVERY = (1000, *looks(MOST))  # the looks that may be taken
+EVERY = (1000, *look_counts(MAX_REALISATIONS))  # the looks that may be taken
 
 
 # ---- claims --------------------------------------------------------------------------------------------------------
@@ -67,22 +75,22 @@ def test_the_recursion_gives_what_is_known_of_equal_steps(count, known):
     assert crossed(np.arange(1.0, count + 1), Z95) == pytest.approx(known, abs=6e-4)
 
 
-@pytest.mark.parametrize("most", [2000, 8000, 100_000, 128_000, 10**6, 10**8, MOST])
+@pytest.mark.parametrize("most", [2000, 8000, 100_000, 128_000, 10**6, 10**8, MAX_REALISATIONS])
 def test_however_often_one_looks_at_most_5_per_cent_of_true_claims_fall(most):
     """At 95 % a look it would be 5, 8, 20 … 65 %; the looks are those that `--decide` and `interpretations` take."""
-    places = np.array([1000.0, *looks(most)])
+    places = np.array([1000.0, *look_counts(most)])
     assert crossed(places, Z) <= 0.05
     assert crossed(places, Z95) > 0.07
-    if most == MOST:
-        assert len(EVERY) == LOOKS
+    if most == MAX_REALISATIONS:
+        assert len(EVERY) == MAX_LOOKS
         assert crossed(places, Z) > 0.038  # nor is it much wider than it has to be
 
 
 def walk(rng, most, parts=1):
     """Means of Gaussian numbers of variance 1 at every look, (looks, parts)."""
-    n = np.array([*looks(most)], dtype=float)
+    n = np.array([*look_counts(most)], dtype=float)
     steps = rng.standard_normal((len(n), parts)) * np.sqrt(np.diff(n, prepend=0.0))[:, None]
-    return dict(zip(looks(most), np.cumsum(steps, axis=0) / n[:, None], strict=True))
+    return dict(zip(look_counts(most), np.cumsum(steps, axis=0) / n[:, None], strict=True))
 
 
 def outcome(means, n, borders):
@@ -116,7 +124,7 @@ def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypa
             {"paper": "p", "claim": "P9.1", "as_shipped": said.kind, "extension": False, "n": 1.0, "needed": needed}
         ]
 
-    monkeypatch.setattr(decide.run, "simulate", simulated)
+    monkeypatch.setattr(simulate_cases, "simulate", simulated)
     monkeypatch.setattr(decide, "_claim_rows", rows_of)
     for _ in range(runs):
         means = walk(rng, most, len(borders))
@@ -127,7 +135,7 @@ def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypa
 
 def test_claims_far_from_a_border_cost_no_more():
     """At twelve standard errors of the first look its interval decides, of however many looks it is one."""
-    rng, n = np.random.default_rng(4), FIRST
+    rng, n = np.random.default_rng(4), FIRST_LOOK
     far = 12 / math.sqrt(n)
     assert all(outcome(walk(rng, n), n, (far,)).kind == CONFIRMED for _ in range(200))
 
@@ -172,10 +180,10 @@ def test_a_real_claim_at_the_border_is_refuted_in_few_runs_that_decide(monkeypat
         curves = tables["curves"]
         return curves[np.logical_and.reduce([curves[key] == value for key, value in place.items()])].iloc[0]
 
-    def measure(seen):
-        return statistics.Estimate(*(row(seen.tables)[name] for name in ("sigma", "sigma_lo", "sigma_hi")))
+    def measure(evidence):
+        return statistics.Estimate(*(row(evidence.tables)[name] for name in ("sigma", "sigma_lo", "sigma_hi")))
 
-    def unknown(seen):
+    def unknown(evidence):
         raise MissingEvidence("nobody knows")
 
     truth = row(radarsim.run("rls2", realisations=2000).tables)["exact_sigma"]
@@ -251,7 +259,7 @@ class Synthetic:
             if n > last:
                 held[n] = held[last] + self.draw(rng, n - last)
             square, fourth = held[n]
-            return Collected(
+            return CollectedSums(
                 n,
                 np.array([0.0, square, 0.0, fourth, fourth]),
                 asked=n,
@@ -269,12 +277,12 @@ class Synthetic:
             relabelled=lambda axes, case: axes,
             quantities=lambda spec: (SIGMA, LOST),
         )
-        monkeypatch.setattr(run, "CaseWork", lambda case: self)
-        monkeypatch.setattr(run, "collect", collect)
-        monkeypatch.setattr(run, "study", lambda name: study)
-        monkeypatch.setattr(registry, "study", lambda name: study)
+        monkeypatch.setattr(simulate_cases, "CaseWork", lambda case: self)
+        monkeypatch.setattr(simulate_cases, "collect", collect)
+        for module in (case_results, precision_target, registry):
+            monkeypatch.setattr(module, "study", lambda name: study)
         experiment = SimpleNamespace(cases=(self.case,), study="synthetic")
-        found = run.simulate(experiment, RunOptions(out="nowhere"), precision=percent, of=of)
+        found = simulate_cases.simulate(experiment, RunOptions(out="nowhere"), precision=percent, quantity_name=of)
         ((_, _, done),) = found.cases
         sigma = statistics.root_mean_square(done.values[1], done.values[3], done.count)
         return sigma, done.count, done.values
@@ -302,15 +310,15 @@ SEEDS = 400
 def test_sigma_with_rare_large_errors_is_covered_where_a_precision_ends(monkeypatch, share, times):
     """69 and 23 % were covered while runs ended at the first narrow interval; at so many realisations 94 and 92 %."""
     draw, truth = rare(share, times)
-    held, ends = Synthetic(draw, False, MOST).covered(monkeypatch, truth, 3.0, SEEDS)
+    held, ends = Synthetic(draw, False, MAX_REALISATIONS).covered(monkeypatch, truth, 3.0, SEEDS)
     assert held >= at_least(0.90, SEEDS)
-    assert np.median(ends) == FLOOR_OF_TAILS
-    assert ends.min() >= FLOOR
+    assert np.median(ends) == MIN_REALISATIONS_WITH_TAILS
+    assert ends.min() >= MIN_REALISATIONS
 
 
-@pytest.mark.parametrize(("gaussian", "end"), [(True, 4000), (False, FLOOR)])
+@pytest.mark.parametrize(("gaussian", "end"), [(True, 4000), (False, MIN_REALISATIONS)])
 def test_gaussian_errors_are_covered_and_cost_the_least_where_they_are_known_to_be(monkeypatch, gaussian, end):
-    held, ends = Synthetic(rare(0.0, 1.0)[0], gaussian, MOST).covered(monkeypatch, 1.0, 3.0, SEEDS // 4)
+    held, ends = Synthetic(rare(0.0, 1.0)[0], gaussian, MAX_REALISATIONS).covered(monkeypatch, 1.0, 3.0, SEEDS // 4)
     assert held >= at_least(0.95, SEEDS // 4)
     assert np.median(ends) == end
 
@@ -326,19 +334,19 @@ def test_a_rate_is_covered_where_a_precision_ends(monkeypatch):
         return {"locks": pd.DataFrame([{"case": "case", "filter": "only", "k": 1, "n": result.count} | kept])}
 
     share = 6e-3
-    lossy = Synthetic(lambda rng, n: np.array([rng.binomial(n, share), 0.0]), False, MOST)
+    lossy = Synthetic(lambda rng, n: np.array([rng.binomial(n, share), 0.0]), False, MAX_REALISATIONS)
     seen = [lossy.run(np.random.default_rng((seed, 8)), monkeypatch, 20.0, "lost", locks)[1:] for seed in range(SEEDS)]
     held = [of.lo <= share <= of.hi for n, values in seen for of in (statistics.rate(values[1], n),)]
     assert np.mean(held) >= at_least(0.94, SEEDS)
-    assert max(n for n, _ in seen) < FLOOR
+    assert max(n for n, _ in seen) < MIN_REALISATIONS
 
 
 @pytest.mark.slow
 def test_heavy_tails_of_every_size_are_covered_where_a_precision_ends(monkeypatch):
     """Student's t with five degrees of freedom, whose e⁴ has no variance."""
-    held, ends = Synthetic(student, False, MOST).covered(monkeypatch, math.sqrt(5 / 3), 3.0, SEEDS)
+    held, ends = Synthetic(student, False, MAX_REALISATIONS).covered(monkeypatch, math.sqrt(5 / 3), 3.0, SEEDS)
     assert held >= at_least(0.90, SEEDS)
-    assert np.median(ends) == FLOOR_OF_TAILS
+    assert np.median(ends) == MIN_REALISATIONS_WITH_TAILS
 
 
 @pytest.mark.slow
@@ -348,7 +356,7 @@ def test_a_real_study_is_covered_where_a_precision_ends():
     for seed in range(seeds):
         with_gaps = ["radar.detection_probability=0.9"]
         of = radarsim.run("rls2", realisations=1e7, seed=1 + seed, precision=5, overrides=with_gaps)
-        assert of.cases[0].count >= FLOOR_OF_TAILS
+        assert of.cases[0].count >= MIN_REALISATIONS_WITH_TAILS
         rows = study.curves(of.cases)
         held.append((rows["sigma_lo"] <= rows["exact_sigma"]) & (rows["exact_sigma"] <= rows["sigma_hi"]))
     share = np.mean(held, axis=0)
@@ -365,18 +373,20 @@ def test_n_itself_ends_a_run_below_the_floor(monkeypatch):
 
 def test_where_a_run_ends_is_foretold(monkeypatch):
     """By the same floors: from sums as a pilot has them, with rare errors and without."""
-    from radarsim.report.precision import needed
+    from radarsim.report.precision import needed_realisations
 
-    for share, floor in ((0.0, FLOOR), (1e-3, FLOOR_OF_TAILS)):
+    for share, floor in ((0.0, MIN_REALISATIONS), (1e-3, MIN_REALISATIONS_WITH_TAILS)):
         draw, _ = rare(share, 10)
-        synthetic = Synthetic(draw, False, MOST)
+        synthetic = Synthetic(draw, False, MAX_REALISATIONS)
         square, fourth = draw(np.random.default_rng(2), 16_000)
         values = np.array([0.0, square, 0.0, fourth, fourth])
-        pilot = run.CaseResult(
+        pilot = results.CaseResult(
             "case", "synthetic", None, {}, 16_000, synthetic.plan.layout.unpack(values), synthetic.plan.axes, 0.0
         )
-        told = [needed(pilot, percent, curves, SIGMA, MOST, curves) for percent in (30.0, 3.0, 0.3)]
+        told = [
+            needed_realisations(pilot, percent, curves, SIGMA, MAX_REALISATIONS, curves) for percent in (30.0, 3.0, 0.3)
+        ]
         ends = [synthetic.run(np.random.default_rng(3), monkeypatch, percent)[1] for percent in (30.0, 3.0, 0.3)]
         assert told[:2] == ends[:2] == [floor, floor]
         assert 0.5 <= told[2] / ends[2] <= 2
-        assert needed(pilot, 30.0, curves, SIGMA, 10_000, curves) == 10_000
+        assert needed_realisations(pilot, 30.0, curves, SIGMA, 10_000, curves) == 10_000

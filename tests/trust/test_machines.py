@@ -11,8 +11,8 @@ import sys
 import numpy as np
 import pytest
 
-from radarsim.app.doctor import TOLERANCES
-from radarsim.bursts.kernels.scoring import triangular_root
+from radarsim.api.maintenance.self_test import TOLERANCES
+from radarsim.bursts.kernels.signal import triangular_root
 from radarsim.engine.machine import _processor_flags
 from tests.tolerances import assert_rounded
 from tests.trust.processors import FEATURES, PROCESSORS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from radarsim.cli import main
+from radarsim.cli.command_group import main
 from radarsim.studies import registry
 
 MANOEUVRE = ("scans=12", "uses.at_s=[35]")

@@ -179,7 +179,7 @@ def test_a_record_that_may_not_be_read_is_not_taken_for_a_damaged_one(command, m
     assert done.stderr == f"{record}: cannot be read: Permission denied\n"
 
 
-UNDER = "import os, sys; os.umask(int(os.environ['UMASK'], 8)); from radarsim.cli import main; main()"
+UNDER = "import os, sys; os.umask(int(os.environ['UMASK'], 8)); from radarsim.cli.command_group import main; main()"
 WRITTEN = (
     ("run", "rls2", "-n", "2000", "--out", "results", "--set", "figures=[gain_r]"),
     ("new", "mine", "--like", "rls2"),

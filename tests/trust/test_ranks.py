@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from radarsim.app.configs import load
-from radarsim.kernels import linear as kernels
-from radarsim.physics import transition
+from radarsim.api.configs import load
+from radarsim.kernels import second_order
+from radarsim.physics.motion import transition
 from radarsim.studies.discriminator import study
-from radarsim.studies.range_doppler import filters
-from radarsim.studies.sonar import filters as banks
-from radarsim.studies.sonar.world import step_correlations
+from radarsim.studies.range_doppler import filter_design
+from radarsim.studies.sonar import filter_design as sonar_filter_design
+from radarsim.studies.sonar.plot_errors import step_correlations
 from tests.studies.multimodel.test_kernels import DT, run_kernel
 
 DRAWS, SCANS, TRACKS = 99, 14, 4000
@@ -65,12 +65,12 @@ def random_track(rng, size, variance, dt, scans, first, tracks=TRACKS):
 def p1(observes, start, variance, believed_variance=None):
     """p-values of the P1 filter on a random jerk; the believed one may be another than the true."""
     sigma, dt, rng = np.array([250.0, 15.0]), 10.0, np.random.default_rng(observes)
-    design = filters.design(observes, start, believed_variance or variance, sigma, dt, SCANS)
+    design = filter_design.design(observes, start, believed_variance or variance, sigma, dt, SCANS)
     truth = random_track(rng, 3, variance, dt, SCANS, start)
     plots = truth[:, :, :2] + sigma * rng.normal(size=(TRACKS, SCANS, 2))
     own = [observes], [start], design.weights[None], design.gains[None]
-    problem = kernels.Problem((0, 0), truth[0], sigma, dt, *own)
-    found = kernels.estimate(problem, plots)[:, 0]
+    problem = second_order.Problem((0, 0), truth[0], sigma, dt, *own)
+    found = second_order.estimate(problem, plots)[:, 0]
     looks = [start - 1, start, start + 3, SCANS - 1]
     return np.concatenate([calibrated(truth[:, k], found[:, k], design.believed[k], k) for k in looks])
 
@@ -130,8 +130,8 @@ def test_sonar_filters(kind, size, length, variance, rho):
     period, sigma, rng = 5.0, 30.0, np.random.default_rng(size)
     t, detected = np.arange(SCANS) * period, np.ones((1, SCANS))
     detected[0, 8] = 0
-    spec = banks.FilterSpec(kind, size, length, np.array([variance]), np.array([rho]))
-    made = banks.design_filter(spec, 0, banks.Plots(t, detected, period, sigma))
+    spec = sonar_filter_design.FilterSpec(kind, size, length, np.array([variance]), np.array([rho]))
+    made = sonar_filter_design.design_filter(spec, 0, sonar_filter_design.Plots(t, detected, period, sigma))
     truth = random_track(rng, size, variance, period, SCANS, size)
     z = np.where(detected > 0, sonar_plots(rng, truth, rho, sigma, period, t), 0.0)
     found = sonar_estimates(made, z)

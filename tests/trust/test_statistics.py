@@ -89,7 +89,7 @@ def slack(repetitions):
 @pytest.mark.parametrize("kind", KINDS)
 def test_coverage_at_the_least_sizes_without_a_note(kind):
     low, high = GAUSSIAN
-    assert low - slack(500) / 2 <= coverage(kind, gaussian, statistics.FEW, 500) <= high + slack(500) / 2
+    assert low - slack(500) / 2 <= coverage(kind, gaussian, statistics.MIN_REALISATIONS, 500) <= high + slack(500) / 2
     assert coverage(kind, student5, FEW_HEAVY, 500) >= HEAVY[0] - slack(500) / 2
 
 
@@ -98,7 +98,7 @@ def test_coverage_at_the_least_sizes_without_a_note(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_gaussian_coverage_over_two_thousand_repetitions(kind, n):
     low, high = GAUSSIAN
-    assert low <= coverage(kind, gaussian, n * statistics.FEW, MANY) <= high
+    assert low <= coverage(kind, gaussian, n * statistics.MIN_REALISATIONS, MANY) <= high
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_rates_cover_exactly(n):
     """No simulation: Wilson's coverage is a sum of binomial chances, at every rate whose expected count is no few."""
     count = np.arange(n + 1)
     of = statistics.rate(count, n)
-    for p in np.linspace(statistics.FEW_EVENTS / n, min(0.5, 200 / n), 300):
+    for p in np.linspace(statistics.MIN_EVENTS / n, min(0.5, 200 / n), 300):
         near = slice(max(0, int(n * p) - 400), int(n * p) + 400)
         chance = binom.pmf(count[near], n, p)
         covered = chance[(of.lo[near] <= p) & (p <= of.hi[near])].sum()
@@ -128,7 +128,7 @@ def test_rates_of_few_events_cover_too():
     n = 1000
     count = np.arange(n + 1)
     of = statistics.rate(count, n)
-    p = np.geomspace(0.01, statistics.FEW_EVENTS, 400) / n
+    p = np.geomspace(0.01, statistics.MIN_EVENTS, 400) / n
     share = np.array([binom.pmf(count, n, one)[(of.lo <= one) & (one <= of.hi)].sum() for one in p])
     assert share.min() > 0.83  # Wilson's dip, where the one event that came is five times too many (Brown et al. 2001)
     assert share[p * n > 0.3].min() > 0.89
@@ -142,7 +142,7 @@ def test_mean_probabilities_are_covered(shape):
     p = rng.beta(*shape, size=(REPETITIONS, n))
     of = statistics.probability(p.sum(axis=-1), np.square(p).sum(axis=-1), n)
     truth = shape[0] / sum(shape)
-    assert n * truth > statistics.FEW_EVENTS
+    assert n * truth > statistics.MIN_EVENTS
     assert GAUSSIAN[0] <= np.mean((of.lo <= truth) & (truth <= of.hi)) <= GAUSSIAN[1]
 
 
@@ -179,13 +179,15 @@ def test_bounds_of_dependent_looks_keep_more():
 
 def test_antithetic_pairs_double_the_variance():
     """Why they are not offered: a linear filter errs on mirrored noise by the same, mirrored: one square for two."""
-    from radarsim.app.configs import load
-    from radarsim.kernels import linear
+    from radarsim.api.configs import load
+    from radarsim.kernels import second_order
     from radarsim.studies.range_doppler import study
 
     problem = study.prepare(load("rls2", ["scans=8"]).cases[0]).problem
-    truth, plots = problem.truth, linear.simulate_plots(problem, 0, 20_000)
-    error, mirrored = (linear.estimate(problem, p)[:, :, -1] - truth[-1] for p in (plots, 2 * truth[:, :2] - plots))
+    truth, plots = problem.truth, second_order.simulate_plots(problem, 0, 20_000)
+    error, mirrored = (
+        second_order.estimate(problem, p)[:, :, -1] - truth[-1] for p in (plots, 2 * truth[:, :2] - plots)
+    )
     # Estimates, of ranges of 100 km, are rounded by ten operations a scan; a square's difference is twice the error's.
     off = rounding(operations=80) * np.abs(truth[:, 0]).max() / problem.dt.max() ** np.arange(3)
     assert (np.abs(error**2 - mirrored**2) <= 4 * np.abs(error).max(axis=0) * off).all()

@@ -6,9 +6,9 @@ import random
 import numpy as np
 import pytest
 
-from radarsim.app.case_work import CaseWork
+from radarsim.api.case_work import CaseWork
 from radarsim.engine.blocks import Forest, Node
-from radarsim.engine.results import Sums
+from radarsim.engine.sums import Sums
 from tests.tolerances import rounding
 from tests.trust.cases import CASES
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
 from radarsim.engine.blocks import Node
 from radarsim.engine.store.store import Store
 

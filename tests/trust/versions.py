@@ -35,7 +35,7 @@ TESTS = (
     "tests/config/test_identity.py",
     "tests/config/test_lookup.py",
     "tests/config/test_kinds.py",
-    "tests/recorded/formats",
+    "tests/recordings/formats",
 )
 BUILDER = "builder"  # the environment that builds the distributions
 QUIET = "--quiet", "--disable-pip-version-check"

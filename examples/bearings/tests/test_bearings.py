@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import radarsim
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 
 from bearings import STUDY
 

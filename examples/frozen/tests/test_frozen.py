@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app.configs import load
-from radarsim.physics import process_noise, transition
+from radarsim.api.configs import load
+from radarsim.physics.motion import process_noise, transition
 from radarsim.studies.range_doppler.study import prepare
 
 CONFIG = Path(__file__).parents[1] / "frozen.yaml"

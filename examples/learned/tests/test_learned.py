@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import radarsim
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 
 from learned import STUDY
 from learned.network import COLUMNS, Inner, Network

@@ -2,33 +2,30 @@
 
 An estimate x (6,) is the phase's coefficients in turns over the whole burst; a window that is the share r of it sees
 b_j = x_j r^j. The step of (6) is (Φ_θ + R_pr⁻¹)⁻¹ ∂P/∂θ; it ends a window when it is shorter than ε, measured in that
-matrix. The windows are gone through in lanes: eight bursts known by block sums (`strip`), or here one by its samples.
-"""
+matrix. The windows are gone through in lanes: eight bursts known by block sums (`sequence_lanes`), or here one by its
+samples."""
 
 import math
 
 import numpy as np
 
-from radarsim.bursts.kernels import lanes as at
-from radarsim.bursts.kernels.lanes import copy, lane, log_posterior, step
+from radarsim.bursts.kernels import scoring_lanes
 from radarsim.bursts.kernels.scoring import (
-    DEMODULATED,
-    SAMPLES,
     SIZE,
     STATE,
     TURN,
-    demodulate,
-    draw_samples,
     score_blocks,
     score_complex_samples,
     score_image,
     score_samples,
 )
-from radarsim.kernels.compile import inline, kernel, part
+from radarsim.bursts.kernels.scoring_lanes import copy, lane, log_posterior, step
+from radarsim.bursts.kernels.signal import DEMODULATED, SAMPLES, demodulate, draw_samples
+from radarsim.kernels.compiler import inline, kernel, kernel_part
 from radarsim.kernels.lanes import WIDTH, address, any_greater, full, get, put, where_greater
 from radarsim.kernels.random import normals
 
-LEAST_COHERENCE = 0.25  # taken into account; below it the main lobe is lost
+MIN_COHERENCE = 0.25  # taken into account; below it the main lobe is lost
 
 WINDOW = np.dtype(
     [
@@ -84,103 +81,115 @@ def evaluate(physics, samples, sums, window, state):
             score_samples(samples, first, window.pulses, step, offset, state.amplitude, state)
 
 
-# ---- windows, in lanes: `evaluate` alone tells bursts known by their samples from those known by sums ---------------
+# The kernels below process windows in lanes, of bursts given by samples or by block sums: only `evaluate` differs.
 # evaluate(physics, work, sums, source, window, state) leaves L, the coherent sum and the gradient at the estimate in
-# work. What a burst is known by is all in sums, source and state; of samples there is one burst, in all lanes.
-def searching(evaluate):
+# work. The data of a burst are in sums, source and state; if they are samples, one burst is in all lanes.
+def search_kernel(evaluate):
     """The kernel that searches for a lost main lobe at a hand-over."""
 
-    @part
+    @kernel_part
     def search(physics, amplitude, work, sums, source, state, window, options, needed):
         """Moves the lanes that need it to the best of the points along the direction in which hand-overs err."""
         weight, half, points = amplitude / physics.sigma**2, full(0.5), options.search
-        copy(work, at.X, at.BEGUN)
-        put(work, at.BEST, log_posterior(work, window, weight))
-        put(work, at.CHOSEN, full(0.0))
+        copy(work, scoring_lanes.X, scoring_lanes.START)
+        put(work, scoring_lanes.BEST, log_posterior(work, window, weight))
+        put(work, scoring_lanes.BEST_POINT, full(0.0))
         for point in range(-points, points + 2):
             last = point > points
-            away = options.spacing * get(work, at.CHOSEN) if last else full(options.spacing * point)
+            distance = options.spacing * get(work, scoring_lanes.BEST_POINT) if last else full(options.spacing * point)
             for j in range(SIZE):
-                put(work, at.X + j, get(work, at.BEGUN + j) + window.direction[j] * away)
+                put(work, scoring_lanes.X + j, get(work, scoring_lanes.START + j) + window.direction[j] * distance)
             if point == 0:
                 continue
             evaluate(physics, work, sums, source, window, state)
             if not last:
-                found, best = log_posterior(work, window, weight), get(work, at.BEST)
-                better = where_greater(found, best, needed, full(0.0))
-                put(work, at.BEST, where_greater(better, half, found, best))
-                put(work, at.CHOSEN, where_greater(better, half, full(float(point)), get(work, at.CHOSEN)))
-        put(work, at.PASSES, get(work, at.PASSES) + (2.0 * points + 1.0) * needed)
+                value, best = log_posterior(work, window, weight), get(work, scoring_lanes.BEST)
+                better = where_greater(value, best, needed, full(0.0))
+                put(work, scoring_lanes.BEST, where_greater(better, half, value, best))
+                put(
+                    work,
+                    scoring_lanes.BEST_POINT,
+                    where_greater(better, half, full(float(point)), get(work, scoring_lanes.BEST_POINT)),
+                )
+        put(work, scoring_lanes.PASSES, get(work, scoring_lanes.PASSES) + (2.0 * points + 1.0) * needed)
 
     return search
 
 
-def scoring(evaluate):
+def scoring_kernel(evaluate):
     """The kernel that scores within a window."""
-    search = searching(evaluate)
+    search = search_kernel(evaluate)
 
-    @part
+    @kernel_part
     def scored(physics, amplitude, work, sums, source, state, window, options, searches):
         """Scoring within a window until its stop rule; lanes that are done stay where they are."""
         numbers = window.pulses * physics.samples_per_pulse
         share = 1.0 if physics.complex_samples else 0.5
         level, weight = share * numbers * amplitude, amplitude / physics.sigma**2
         error = physics.sigma * math.sqrt(share * numbers) / level
-        zero, one, least = full(0.0), full(1.0), full(LEAST_COHERENCE)
-        put(work, at.LIVE, one)
+        zero, unit, min_coherence = full(0.0), full(1.0), full(MIN_COHERENCE)
+        put(work, scoring_lanes.LIVE, unit)
         for number in range(options.steps):
             evaluate(physics, work, sums, source, window, state)
-            put(work, at.PASSES, get(work, at.PASSES) + get(work, at.LIVE))
+            put(work, scoring_lanes.PASSES, get(work, scoring_lanes.PASSES) + get(work, scoring_lanes.LIVE))
             if number == 0 and searches:
-                enough = full(1.0 - options.margin * error)
-                needed = where_greater(enough, (1.0 / level) * get(work, at.COHERENT), one, zero)
+                sufficient_coherence = full(1.0 - options.margin * error)
+                needed = where_greater(
+                    sufficient_coherence, (1.0 / level) * get(work, scoring_lanes.COHERENT), unit, zero
+                )
                 if any_greater(needed, zero):
                     search(physics, amplitude, work, sums, source, state, window, options, needed)
-            coherence = one
+            coherence = unit
             if options.coherent:
-                coherence = (1.0 / level) * get(work, at.COHERENT) + 3.0 * error  # with a margin for noise
-                coherence = where_greater(one, coherence, coherence, one)
-                coherence = where_greater(coherence, least, coherence, least)
+                coherence = (1.0 / level) * get(work, scoring_lanes.COHERENT) + 3.0 * error  # with a margin for noise
+                coherence = where_greater(unit, coherence, coherence, unit)
+                coherence = where_greater(coherence, min_coherence, coherence, min_coherence)
             step(work, window, weight, options.coherent, coherence)
-            live = where_greater(get(work, at.SQUARED), full(options.tolerance**2), get(work, at.LIVE), zero)
-            put(work, at.LIVE, live)
+            live = where_greater(
+                get(work, scoring_lanes.SQUARED), full(options.tolerance**2), get(work, scoring_lanes.LIVE), zero
+            )
+            put(work, scoring_lanes.LIVE, live)
             if not any_greater(live, zero):
                 break
 
     return scored
 
 
-def following(evaluate, scored):
+def window_kernel(evaluate, scored):
     """The kernel that takes an estimate through a window, the first one of its estimator or a later one."""
 
-    @part
+    @kernel_part
     def first_phase(physics, work, sums, source, state, window):
         """Puts the phase, the rest as forecast, at the argument of Σ u e^{-jψ}, where the likelihood is largest."""
         evaluate(physics, work, sums, source, window, state)
         # Without the image, L is the real part of the sum and ∂L/∂ψ its imaginary one.
         for n in range(WIDTH):
-            work[lane(at.X, n)] += math.atan2(work[lane(at.SLOPES, n)], work[lane(at.COHERENT, n)]) / TURN
-        put(work, at.PASSES, get(work, at.PASSES) + 1.0)
+            work[lane(scoring_lanes.X, n)] += (
+                math.atan2(work[lane(scoring_lanes.SLOPES, n)], work[lane(scoring_lanes.COHERENT, n)]) / TURN
+            )
+        put(work, scoring_lanes.PASSES, get(work, scoring_lanes.PASSES) + 1.0)
 
-    @part
+    @kernel_part
     def best_of_phases(physics, amplitude, work, sums, source, state, window, options):
         """The window scored from equally spaced phases; the end with the largest posterior is kept."""
-        copy(work, at.X, at.BEGUN)
-        put(work, at.BEST, full(-math.inf))
+        copy(work, scoring_lanes.X, scoring_lanes.START)
+        put(work, scoring_lanes.BEST, full(-math.inf))
         for phase in range(options.phases):
-            copy(work, at.BEGUN, at.X)
-            put(work, at.X, get(work, at.X) + phase / options.phases)
+            copy(work, scoring_lanes.START, scoring_lanes.X)
+            put(work, scoring_lanes.X, get(work, scoring_lanes.X) + phase / options.phases)
             scored(physics, amplitude, work, sums, source, state, window, options, False)
             evaluate(physics, work, sums, source, window, state)
-            put(work, at.PASSES, get(work, at.PASSES) + 1.0)
-            found, best = log_posterior(work, window, amplitude / physics.sigma**2), get(work, at.BEST)
+            put(work, scoring_lanes.PASSES, get(work, scoring_lanes.PASSES) + 1.0)
+            value, best = log_posterior(work, window, amplitude / physics.sigma**2), get(work, scoring_lanes.BEST)
             for j in range(SIZE):
-                better = where_greater(found, best, get(work, at.X + j), get(work, at.KEPT + j))
-                put(work, at.KEPT + j, better)
-            put(work, at.BEST, where_greater(found, best, found, best))
-        copy(work, at.KEPT, at.X)
+                better = where_greater(
+                    value, best, get(work, scoring_lanes.X + j), get(work, scoring_lanes.BEST_ESTIMATE + j)
+                )
+                put(work, scoring_lanes.BEST_ESTIMATE + j, better)
+            put(work, scoring_lanes.BEST, where_greater(value, best, value, best))
+        copy(work, scoring_lanes.BEST_ESTIMATE, scoring_lanes.X)
 
-    @part
+    @kernel_part
     def follow(physics, amplitude, work, sums, source, state, window, options, first):
         """One window of an estimator: the estimate in work moves."""
         starts = first and not options.from_truth
@@ -195,53 +204,52 @@ def following(evaluate, scored):
     return follow
 
 
-# ---- one burst, by its samples --------------------------------------------------------------------------------------
-@part
+@kernel_part
 def evaluate_in_lanes(physics, work, sums, samples, window, state):
     """`evaluate` of the one burst that is in all lanes."""
-    estimate_of(work, state)
+    copy_estimate(work, state)
     evaluate(physics, samples, sums, window, state)
     for j in range(state.out.size):
-        put(work, at.VALUE + j, full(state.out[j]))
+        put(work, scoring_lanes.VALUE + j, full(state.out[j]))
 
 
 @inline
-def estimate_of(work, state):
+def copy_estimate(work, state):
     """Write the estimate of the one burst in all lanes to state.x."""
     for j in range(SIZE):
-        state.x[j] = work[lane(at.X + j, 0)]
+        state.x[j] = work[lane(scoring_lanes.X + j, 0)]
 
 
-scored = scoring(evaluate_in_lanes)
-follow = following(evaluate_in_lanes, scored)
+score_window = scoring_kernel(evaluate_in_lanes)
+process_window = window_kernel(evaluate_in_lanes, score_window)
 
 
 @inline
 def put_errors(work, truth, errors):
     """Write the errors (6,) of the one burst in all lanes, in turns over the burst."""
     for j in range(SIZE):
-        error = work[lane(at.X + j, 0)] - truth[j]
+        error = work[lane(scoring_lanes.X + j, 0)] - truth[j]
         errors[j] = error - np.rint(error) if j == 0 else error
 
 
 @kernel
 def run_sequence(physics, edges, samples, sums, windows, options, state, errors):
     """All windows (K,) of an estimator on one burst; writes errors (K, 6) in turns over the burst, returns passes."""
-    room = np.zeros(at.ROWS * WIDTH)
+    room = np.zeros(scoring_lanes.ROWS * WIDTH)
     work, ready = address(room), 0
     for j in range(SIZE):
-        put(work, at.PRIOR + j, full(state.prior[j]))
-        put(work, at.X + j, full(state.truth[j] if options.from_truth else state.prior[j]))
-    estimate_of(work, state)
+        put(work, scoring_lanes.PRIOR + j, full(state.prior[j]))
+        put(work, scoring_lanes.X + j, full(state.truth[j] if options.from_truth else state.prior[j]))
+    copy_estimate(work, state)
     for k in range(options.windows):
         window = windows[k]
         if physics.mode == DEMODULATED:
             demodulate(physics, edges, samples, state.x, ready, window.blocks, sums)
             ready = window.blocks
-        follow(physics, state.amplitude, work, sums, samples, state, window, options, k == 0)
-        estimate_of(work, state)
+        process_window(physics, state.amplitude, work, sums, samples, state, window, options, k == 0)
+        copy_estimate(work, state)
         put_errors(work, state.truth, errors[k])
-    return int(work[lane(at.PASSES, 0)])
+    return int(work[lane(scoring_lanes.PASSES, 0)])
 
 
 @kernel
@@ -290,12 +298,12 @@ def estimate_block(physics, edges, clean, blank, windows, options, keys, first, 
 @kernel
 def polish(physics, samples, windows, options, start, truth, errors):
     """Scoring on the samples of a burst in its last window from a start (6,), without prior; as `run_sequence`."""
-    state, room, sums = np.zeros(1, STATE)[0], np.zeros(at.ROWS * WIDTH), np.zeros((1, 1))
+    state, room, sums = np.zeros(1, STATE)[0], np.zeros(scoring_lanes.ROWS * WIDTH), np.zeros((1, 1))
     work, last = address(room), options.windows - 1
     for j in range(SIZE):
-        put(work, at.PRIOR + j, full(start[j]))
-        put(work, at.X + j, full(start[j]))
+        put(work, scoring_lanes.PRIOR + j, full(start[j]))
+        put(work, scoring_lanes.X + j, full(start[j]))
     state.amplitude = physics.amplitude
-    scored(physics, physics.amplitude, work, sums, samples, state, windows[last], options, False)
+    score_window(physics, physics.amplitude, work, sums, samples, state, windows[last], options, False)
     put_errors(work, truth, errors[last])
-    return int(work[lane(at.PASSES, 0)])
+    return int(work[lane(scoring_lanes.PASSES, 0)])

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, added, gaps, maximal, widest
-from radarsim.engine.results import Sums
+from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, add_sums, gaps, maximal_nodes, widest_node
 from radarsim.engine.store.block_file import (
     Damage,
     block_path,
@@ -19,7 +18,8 @@ from radarsim.engine.store.block_file import (
     piece_named,
     read_file,
 )
-from radarsim.engine.store.store import folder_fault, mixture
+from radarsim.engine.store.store import folder_fault, mixture_warning
+from radarsim.engine.sums import Sums
 from radarsim.errors import StoreError
 from radarsim.private_files import UntrustedFileError
 
@@ -63,7 +63,7 @@ def audit_blocks(path: Path, reported: int | None = None) -> Audit:
         return audit
     platforms = {name for header, _ in audit.pieces.values() for name in header["platforms"]}
     if len(platforms) > 1:
-        audit.notes.append(f"{path}: {mixture(platforms)}")
+        audit.notes.append(f"{path}: {mixture_warning(platforms)}")
     if reported is not None and Total(reported) not in audit.pieces:
         _report_missing(audit, Total(reported))
     _note_gaps(audit)
@@ -102,7 +102,7 @@ def _note_gaps(audit: Audit) -> None:
     """Note missing realisations before stored ones, as where a share was not copied."""
     nodes = audit.nodes()
     end = max((node.stop for node in nodes), default=0)
-    for first, stop in gaps(maximal(nodes, end), end):
+    for first, stop in gaps(maximal_nodes(nodes, end), end):
         block = audit.pieces[nodes[0]][0]["block"]
         span = f"realisations {first * block:,} to {stop * block - 1:,}"
         audit.notes.append(f"{audit.path}: {span} are not stored, but later ones are")
@@ -120,14 +120,14 @@ def _check_total(audit: Audit, total: Total) -> None:
     full, partial = divmod(total.count, header["block"])
     nodes = audit.nodes()
     forest = Forest(header["block"], values.size)
-    inner = maximal(nodes, full)
+    inner = maximal_nodes(nodes, full)
     for node in inner:
         forest.add(node, audit.sums(node))
     for first, stop in forest.gaps(full):
         if any(node.first <= first and stop <= node.stop for node in nodes):
             continue
         while first < stop:
-            _report_missing(audit, node := widest(first, stop, 62))
+            _report_missing(audit, node := widest_node(first, stop, 62))
             first = node.stop
     cut = Partial(full, partial)
     if partial and cut not in audit.pieces and not any(node in audit.pieces for node in cut.above(64)):
@@ -136,7 +136,7 @@ def _check_total(audit: Audit, total: Total) -> None:
         return  # nothing to add up: a larger run has merged them
     sums = forest.total()
     if partial:
-        sums = added(sums, audit.sums(cut), 0) if full else audit.sums(cut)
+        sums = add_sums(sums, audit.sums(cut), 0) if full else audit.sums(cut)
     parts: list[Piece] = [total, *inner, *([cut] if partial else [])]
     platforms = {name for piece in parts for name in audit.pieces[piece][0]["platforms"]}
     if sums.count != total.count or not agree(sums.values, values, platforms):

@@ -4,7 +4,7 @@ import os
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from radarsim.engine.blocks import Node, Partial, Total, Work, gaps, maximal, share_bound, share_of
+from radarsim.engine.blocks import Node, Partial, Total, Work, gaps, maximal_nodes, share_bound, share_of
 from radarsim.engine.store.store import Store
 
 CHANCE_LIMIT = 0.2  # probability at which missing blocks that end where shares do may do so by chance
@@ -35,7 +35,7 @@ def take_inventory(
     requested, full = (stop - first) * block + partial, realisations // block
     if Total(realisations) in pieces:
         return Inventory(requested, requested, (), None, loose=False)
-    nodes = maximal([piece for piece in pieces if isinstance(piece, Node)], full)
+    nodes = maximal_nodes([piece for piece in pieces if isinstance(piece, Node)], full)
     runs, blocks = gaps(nodes, stop, first), full + (realisations % block > 0)
     if partial and Partial(full, partial) not in pieces:
         runs.append((runs.pop()[0] if runs and runs[-1][1] == full else full, blocks))

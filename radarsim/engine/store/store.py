@@ -21,9 +21,8 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from radarsim.engine.blocks import REQUEST_DIGITS, Forest, Node, Piece, Work, maximal
+from radarsim.engine.blocks import REQUEST_DIGITS, Forest, Node, Piece, Work, maximal_nodes
 from radarsim.engine.machine import versions
-from radarsim.engine.results import Sums
 from radarsim.engine.store.block_file import (
     Damage,
     block_path,
@@ -34,6 +33,7 @@ from radarsim.engine.store.block_file import (
     piece_named,
     read_file,
 )
+from radarsim.engine.sums import Sums
 from radarsim.errors import StoreError
 from radarsim.private_files import (
     UntrustedFileError,
@@ -178,7 +178,7 @@ class Store:
         for _ in range(ATTEMPTS):
             forest, lost = Forest(self._work.block, self._work.size), False
             candidates = self.pieces() - self._unusable
-            for node in maximal([piece for piece in candidates if isinstance(piece, Node)], blocks):
+            for node in maximal_nodes([piece for piece in candidates if isinstance(piece, Node)], blocks):
                 sums = self.read(node)
                 if sums is None:
                     # Another run merged it, and the parent is there; or it was damaged, and a part of it may be there.
@@ -214,7 +214,7 @@ def is_other_source(folder: Path, reference: Path) -> bool:
     return same_request and len(folder.name) == len(reference.name) > REQUEST_DIGITS and folder.name != reference.name
 
 
-def mixture(platforms: Collection[str]) -> str:
+def mixture_warning(platforms: Collection[str]) -> str:
     """A note on sums from several platforms; the same line for every case of a run."""
     names = "; ".join(f"({number}) {name}" for number, name in enumerate(sorted(platforms), start=1))
     return (

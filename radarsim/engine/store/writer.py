@@ -5,8 +5,8 @@ import time
 from collections.abc import Mapping
 
 from radarsim.engine.blocks import Node, Piece
-from radarsim.engine.results import Sums
 from radarsim.engine.store.store import ATTEMPTS, Store
+from radarsim.engine.sums import Sums
 from radarsim.threads import forbidden
 
 PERIOD_S = 1.0

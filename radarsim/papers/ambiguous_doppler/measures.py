@@ -2,24 +2,24 @@
 
 from typing import TYPE_CHECKING, Literal
 
-from radarsim.papers import evidence
 from radarsim.papers.evidence import Curve, MissingEvidence, ratio
+from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.report.statistics import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-class Evidence(evidence.Evidence):
+class Evidence(GeneralEvidence):
     """Finds the shipped experiments' cases by their names."""
 
     def above_oracle(self, key: str, name: str) -> Curve:
         """By how much σ of the velocity is above that of unfolded velocity, %, by scan."""
         gains = self.tables["gains"]
         columns = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
-        return self._of(gains[gains["component"] == "Vr"], key, name, columns)
+        return self._curve_of_rows(gains[gains["component"] == "Vr"], key, name, columns)
 
-    def _of(self, table: "pd.DataFrame", key: str, name: str, columns: tuple[str, ...]) -> Curve:
+    def _curve_of_rows(self, table: "pd.DataFrame", key: str, name: str, columns: tuple[str, ...]) -> Curve:
         rows = table[(table["case"] == self.case(key).name) & (table["filter"] == name)]
         if not len(rows):
             raise MissingEvidence(key)
@@ -27,17 +27,17 @@ class Evidence(evidence.Evidence):
         return Curve(k, t, value, lo, hi)
 
 
-def velocity_gain(seen: Evidence, key: str, name: str, scan: int | Literal["last"]) -> Estimate:
+def velocity_gain(evidence: Evidence, key: str, name: str, scan: int | Literal["last"]) -> Estimate:
     """Gain of a filter in σ of the velocity against range alone at a scan, %."""
-    found = seen.gain(key, name, "Vr")
-    return found.at(scan) if isinstance(scan, int) else found.last()
+    gains = evidence.gain(key, name, "Vr")
+    return gains.at(scan) if isinstance(scan, int) else gains.last()
 
 
-def above_at_the_end(seen: Evidence, key: str, name: str) -> Estimate:
+def above_at_the_end(evidence: Evidence, key: str, name: str) -> Estimate:
     """σ of the velocity above that of unfolded velocity at the last scan, %."""
-    return seen.above_oracle(key, name).last()
+    return evidence.above_oracle(key, name).last()
 
 
-def worst_to_worst(seen: Evidence, key: str, name: str, single: str) -> Estimate:
+def worst_to_worst(evidence: Evidence, key: str, name: str, single: str) -> Estimate:
     """The largest σ of range over the scans, of a combination over that of a single order."""
-    return ratio(seen.curve(key, name, "r").largest(), seen.curve(key, single, "r").largest())
+    return ratio(evidence.curve(key, name, "r").largest(), evidence.curve(key, single, "r").largest())

@@ -12,12 +12,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from radarsim.bursts import burst
+from radarsim.bursts import window_schedule
 from radarsim.config.experiment import Case
 from radarsim.papers.claim import Claim, PaperClaims, Part
 from radarsim.papers.claim_files import load_choices
 from radarsim.papers.discriminator import burst_versions, measures
-from radarsim.papers.discriminator.burst_versions import BURST, LEAST_RATIO, PRINTED_PRIOR, Version
+from radarsim.papers.discriminator.burst_versions import BURST, MIN_ENERGY_RATIO, PRINTED_PRIOR, Version
 from radarsim.papers.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
 from radarsim.papers.evidence import Evidence, exact_number
 from radarsim.papers.interpretations import (
@@ -32,8 +32,8 @@ from radarsim.report.statistics import Estimate
 SHIPPED_NOISE = measures.INTERPRETATIONS[COMPUTED][0]
 OTHER_THRESHOLD = {0.5: 1.0, 1.0: 0.5}
 ITERATIONS = "12"  # the number of the part that counts windows
-EXACT = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
-WINDOWS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
+EXACT_CLAIMS = ("P4.1", "P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
+WINDOW_CLAIMS = ("P4.2", "P4.3", "P4.8", "P4.11", "P4.12", "P4.13", "P4.20")
 NO_ROOT = "(15) has no root: with the phase in it, its left side exceeds c at every length"
 
 
@@ -46,18 +46,18 @@ class Interpretations(PaperInterpretations):
     max_realisations = 1_024_000  # P4.4: σ of the locked bursts is up to 0.6 % off, of the 1 % that it may be
 
     def is_exact(self, claim: Claim, interpretation: Interpretation) -> bool:
-        return claim.id in EXACT
+        return claim.id in EXACT_CLAIMS
 
     def for_claim(self, claim: str) -> list[Interpretation]:
         """All combinations of E and U for exact claims; for claims that need runs, of the choices that bear on them."""
-        own = [choice for choice in self.choices if choice.bears_on(claim)]
+        choices = [choice for choice in self.choices if choice.bears_on(claim)]
         singly = [
-            self.interpretation(**{choice.key: one.name})
-            for choice in own
-            for one in choice.alternatives
-            if one.kind == AGAINST
+            self.interpretation(**{choice.key: alternative.name})
+            for choice in choices
+            for alternative in choice.alternatives
+            if alternative.kind == AGAINST
         ]
-        return list(dict.fromkeys([*self.combined(own), *singly]))
+        return list(dict.fromkeys([*self.combined(choices), *singly]))
 
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
         """Of parts that stand there in both shipped interpretations, those of one: the interpretation takes its
@@ -72,24 +72,33 @@ class Interpretations(PaperInterpretations):
         for."""
         keys = {key for part in claim.parts for key in part.cases if isinstance(key, tuple)}
         noise = case.spec.burst.noise_variance
-        wanted = any(_is_swept(case, *key) for key in keys) if case.swept else noise == SHIPPED_NOISE
-        if not wanted:
+        is_needed = any(_is_swept(case, *key) for key in keys) if case.swept else noise == SHIPPED_NOISE
+        if not is_needed:
             return None
-        own = version(interpretation)
-        given = {"sigma": own.sigma, "spread_over_potential": None if own.sigma else BURST.multiples}
+        burst_version = version(interpretation)
+        forecast = {
+            "sigma": burst_version.sigma,
+            "spread_over_potential": None if burst_version.sigma else BURST.multiples,
+        }
         changes = {
-            "burst": case.spec.burst.model_copy(update={"noise_variance": noise * own.noise_variance / SHIPPED_NOISE}),
-            "prior": case.spec.prior.model_copy(update=given),
-            "estimators": tuple(_changed(one, own) for one in case.spec.estimators),
+            "burst": case.spec.burst.model_copy(
+                update={"noise_variance": noise * burst_version.noise_variance / SHIPPED_NOISE}
+            ),
+            "prior": case.spec.prior.model_copy(update=forecast),
+            "estimators": tuple(_changed(estimator, burst_version) for estimator in case.spec.estimators),
         }
         return replace(case, spec=case.spec.model_copy(update=changes))
 
     def evidence(
-        self, claim: Claim, interpretation: Interpretation, seen: ChangedResults | None, of: PaperClaims
+        self,
+        claim: Claim,
+        interpretation: Interpretation,
+        changed_results: ChangedResults | None,
+        paper_claims: PaperClaims,
     ) -> Evidence:
-        if seen is None:
+        if changed_results is None:
             return ExactEvidence(interpretation)
-        return super().evidence(claim, interpretation, seen, of)
+        return super().evidence(claim, interpretation, changed_results, paper_claims)
 
 
 def _is_swept(case: Case, key: str, value: float) -> bool:
@@ -97,7 +106,7 @@ def _is_swept(case: Case, key: str, value: float) -> bool:
     return len(case.swept) == 1 and case.swept[0][0] == key and math.isclose(float(str(case.swept[0][1])), value)
 
 
-def _changed(estimator: Any, own: Version) -> Any:
+def _changed(estimator: Any, burst_version: Version) -> Any:
     """An estimator as an interpretation has it: its threshold, and the windows that no key of a config asks for.
 
     Those of which no claim speaks are cut to one window: they are not looked at."""
@@ -106,9 +115,9 @@ def _changed(estimator: Any, own: Version) -> Any:
         return estimator.model_copy(update={"first_windows": 1, "phases": 0, "steps": 5, "density": 1})
     if estimator.schedule != "designed":
         return estimator
-    changes: dict[str, Any] = {"main_lobe_threshold": own.threshold}
-    if own.curvature != "next":
-        lengths = tuple(n * BURST.period_s for n in windows(own))
+    changes: dict[str, Any] = {"main_lobe_threshold": burst_version.threshold}
+    if burst_version.curvature != "next":
+        lengths = tuple(n * BURST.period_s for n in windows(burst_version))
         changes |= {"schedule": lengths[: estimator.first_windows], "first_windows": None}
     return estimator.model_copy(update=changes)
 
@@ -117,7 +126,7 @@ def _counted(part: Part, interpretation: Interpretation) -> Part:
     """A part that counts windows, of all of them where an interpretation counts the first too."""
     if part.number != ITERATIONS or interpretation["counted"] != "in all":
         return part
-    return replace(part, measure=lambda seen: exact_number(len(seen.windows(COMPUTED))))
+    return replace(part, measure=lambda evidence: exact_number(len(evidence.windows(COMPUTED))))
 
 
 def version(interpretation: Interpretation) -> Version:
@@ -141,32 +150,44 @@ SCALES = (10.0, 1.0, 0.1, 0.01, 0.001)  # of the forecast, in P4.8
 @cache
 def _designed() -> Mapping[Version, tuple[np.ndarray, list[int] | None]]:
     """Spreads and windows of every version that a declared interpretation asks for, all at once."""
-    of = Interpretations()
-    plain = {version(one) for claim in ("P4.1", *WINDOWS) for one in of.for_claim(claim)}
-    found = burst_versions.designed(BURST, every := list(plain))
-    return {one: (spreads, own) for one, spreads, own in zip(every, found.spreads, found.windows, strict=True)}
+    interpretations = Interpretations()
+    distinct = {
+        version(interpretation)
+        for claim in ("P4.1", *WINDOW_CLAIMS)
+        for interpretation in interpretations.for_claim(claim)
+    }
+    versions = list(distinct)
+    designs = burst_versions.design_windows(BURST, versions)
+    return {
+        burst_version: (spreads, lengths)
+        for burst_version, spreads, lengths in zip(versions, designs.spreads, designs.windows, strict=True)
+    }
 
 
 @cache
 def _scaled() -> Mapping[tuple[Version, float], int | None]:
     """The first windows with the forecast's spreads times each of SCALES."""
-    plain = {version(one) for one in Interpretations().for_claim("P4.8")}
-    every = [(one, scale) for one in plain for scale in SCALES]
-    asked = []
-    for one, scale in every:
-        sigma = one.sigma or tuple(np.array(BURST.multiples) * _designed()[one][0])
-        asked.append(one._replace(sigma=tuple(scale * float(value) for value in sigma)))
-    first = burst_versions.first_windows(BURST, asked)
-    return {key: int(n) or None for key, n in zip(every, first, strict=True)}
+    distinct = {version(interpretation) for interpretation in Interpretations().for_claim("P4.8")}
+    scaled = [(burst_version, scale) for burst_version in distinct for scale in SCALES]
+    versions = []
+    for burst_version, scale in scaled:
+        sigma = burst_version.sigma or tuple(np.array(BURST.multiples) * _designed()[burst_version][0])
+        versions.append(burst_version._replace(sigma=tuple(scale * float(value) for value in sigma)))
+    first = burst_versions.first_windows(BURST, versions)
+    return {key: int(n) or None for key, n in zip(scaled, first, strict=True)}
 
 
-def windows(own: Version) -> list[int]:
-    """The windows of a version in pulses; raises Unreadable where there are none."""
-    known = _designed()
-    found = known[own][1] if own in known else burst_versions.designed(BURST, [own]).windows[0]
-    if found is None:
+def windows(burst_version: Version) -> list[int]:
+    """The windows of a version in pulses; raises ImpossibleInterpretation where there are none."""
+    designs = _designed()
+    lengths = (
+        designs[burst_version][1]
+        if burst_version in designs
+        else burst_versions.design_windows(BURST, [burst_version]).windows[0]
+    )
+    if lengths is None:
         raise ImpossibleInterpretation(NO_ROOT)
-    return found
+    return lengths
 
 
 class ExactEvidence(measures.Evidence):
@@ -192,8 +213,8 @@ class ExactEvidence(measures.Evidence):
 
     def worst_handover(self, key: Any) -> Estimate:
         """The largest probability over the hand-overs that Z passes c, by its own law; the last one is cut short."""
-        weights = burst_versions.handovers(BURST, self._version, windows(self._version)[:-1])
-        return exact_number(max(burst.tail_probability(one, self._lobe) for one in weights))
+        weights = burst_versions.handover_weights(BURST, self._version, windows(self._version)[:-1])
+        return exact_number(max(window_schedule.tail_probability(form_weights, self._lobe) for form_weights in weights))
 
     def phase_offsets(self, key: Any) -> np.ndarray:
         return burst_versions.phase_offsets(BURST, self._version, windows(self._version))
@@ -201,4 +222,4 @@ class ExactEvidence(measures.Evidence):
     def shortest_window(self, key: Any, amplitude: float) -> Estimate:
         """T_min (17), ms: one sample a pulse."""
         noise = self._version.noise_variance
-        return exact_number(1e3 * 4 * LEAST_RATIO * noise * BURST.period_s / amplitude**2)
+        return exact_number(1e3 * 4 * MIN_ENERGY_RATIO * noise * BURST.period_s / amplitude**2)

@@ -11,14 +11,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from radarsim.bursts import burst as model
+from radarsim.bursts import fisher as bursts_fisher
+from radarsim.bursts import window_schedule
 from radarsim.bursts.burst import balanced_inverse
 from radarsim.engine.results import CaseResult
-from radarsim.papers import evidence
+from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.papers.evidence import MissingEvidence, exact_number
 from radarsim.report.statistics import Estimate, difference, root_mean_square
-from radarsim.studies.discriminator import nearest, study
-from radarsim.studies.discriminator.kernels import LOCKS
+from radarsim.studies.discriminator import lock_ceiling, scenario
+from radarsim.studies.discriminator.kernels.sums import LOCKS
 
 COMPUTED, PRINTED = "computed", "printed"
 INTERPRETATIONS = {COMPUTED: (2.25, 1.0), PRINTED: (9.0, 0.5)}  # noise variance, threshold c
@@ -26,10 +27,10 @@ DOPPLER = (10e3, 180e3, -750e3, 1000e3)
 COMPONENTS = ("phi0", "f0", "f1", "f2", "f3")
 Key = str | tuple[str, float]  # an interpretation, or a swept key and its value
 PER_HANDOVER = 0.99  # P_Δ
-ESTIMATE = 1.17  # the paper's own estimate of the amplitude, which it puts into (17)
+PRINTED_AMPLITUDE_ESTIMATE = 1.17  # the paper's own estimate of the amplitude, which it puts into (17)
 
 
-class Evidence(evidence.Evidence):
+class Evidence(GeneralEvidence):
     """Finds the paper's experiment in its two interpretations, its swept variants, and the estimators, by their
     settings."""
 
@@ -87,9 +88,9 @@ class Evidence(evidence.Evidence):
 
     def potential(self, key: Key, component: str) -> Estimate:
         """Potential spread by the discrete sum over the pulses l = 0 … n − 2, which gives the paper's digits."""
-        burst = study.burst_of(self.case(key).spec)
-        found = model.spreads(model.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
-        return exact_number(found[COMPONENTS.index(component)])
+        burst = scenario.configured_burst(self.case(key).spec)
+        spreads = bursts_fisher.spreads(bursts_fisher.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
+        return exact_number(spreads[COMPONENTS.index(component)])
 
     def as_far(self, key: Key, amplitude: float, power: int = 1) -> float:
         """Share of bursts whose (7), the square of the amplitude, lies as far from its mean as a printed one's power.
@@ -105,12 +106,12 @@ class Evidence(evidence.Evidence):
         """How far ln L of the signal falls from its maximum to the mean level of its side lobes, over 2μ. Without noise
         it falls by Σ(s − s')²/2σ²; a side lobe's s' is as strong, and of any phase: its mean square is A²/2 a sample
         and its mean product with s nil. Σs² is that of the true phase."""
-        burst = study.burst_of(self.case(key).spec)
+        burst = scenario.configured_burst(self.case(key).spec)
         samples = burst.pulses * burst.samples_per_pulse
         level = burst.amplitude**2 / burst.noise_variance
-        of_sines = model.fisher_sums(burst, 1, [burst.pulses], np.array([0.0, *DOPPLER]))[0][0, 0]
+        of_sines = bursts_fisher.fisher_sums(burst, 1, [burst.pulses], np.array([0.0, *DOPPLER]))[0][0, 0]
         fall = (level * samples - of_sines + level * samples / 2) / 2
-        return exact_number(fall / (2 * model.energy_ratio(burst, burst.duration_s)))
+        return exact_number(fall / (2 * bursts_fisher.energy_ratio(burst, burst.duration_s)))
 
     def robust(self, key: Key) -> Estimate:
         """Lock of the sequence over what its design allows: 0.99 of each hand-over, the first window's too."""
@@ -121,22 +122,27 @@ class Evidence(evidence.Evidence):
         """What an efficient estimator would score in `always`, over the windows of the sequence."""
         result, i = self.case(key), self.estimator(key, "sequence")
         forecast = tuple(map(float, result.axes.prior_sigma))
-        return nearest.always_within(study.burst_of(result.spec), tuple(result.axes.pulses[i]), forecast)
+        return lock_ceiling.share_within_bounds(
+            scenario.configured_burst(result.spec), tuple(result.axes.pulses[i]), forecast
+        )
 
     def worst_handover(self, key: str) -> Estimate:
         """The largest probability over the hand-overs that Z passes c: of the form's own law, not of a Gaussian."""
         designer, times = self._designer(key)
         threshold = designer.condition.threshold
         forms = [designer.handover(before)(after) for before, after in pairwise(times[:-1])]  # the last is cut short
-        return exact_number(max(model.tail_probability(form.values, threshold) for form in forms))
+        return exact_number(max(window_schedule.tail_probability(form.values, threshold) for form in forms))
 
-    def _designer(self, key: str) -> tuple[model.Designer, np.ndarray]:
+    def _designer(self, key: str) -> tuple[window_schedule.Designer, np.ndarray]:
         """What designed the sequence, and its windows in s."""
         result, i = self.case(key), self.estimator(key, "sequence")
-        burst, condition = study.burst_of(result.spec), model.Condition(threshold=INTERPRETATIONS[key][1])
-        fisher = partial(model.fisher, burst, len(COMPONENTS))
+        burst, condition = (
+            scenario.configured_burst(result.spec),
+            window_schedule.Condition(threshold=INTERPRETATIONS[key][1]),
+        )
+        fisher = partial(bursts_fisher.fisher, burst, len(COMPONENTS))
         times = burst.pulse_period_s * np.array(result.axes.pulses[i])
-        return model.Designer(burst, result.axes.prior_sigma, fisher, condition), times
+        return window_schedule.Designer(burst, result.axes.prior_sigma, fisher, condition), times
 
     def phase_offsets(self, key: str) -> np.ndarray:
         """How far the best phase lies from the start's, rad, one σ: from the forecast, then at each hand-over."""
@@ -148,11 +154,11 @@ class Evidence(evidence.Evidence):
             error = after
         return np.array(offsets)
 
-    def phase_lost(self, key: str, at: Literal["first", "later"]) -> float:
+    def phase_lost(self, key: str, window: Literal["first", "later"]) -> float:
         """Probability that the starting phase is over a quarter turn off the best: at first, or largest afterwards.
         Over the phase alone the likelihood is a cosine, so that from nearer scoring finds its maximum."""
         first, *later = (math.erfc(math.pi / 2 / sigma / math.sqrt(2)) for sigma in self.phase_offsets(key))
-        return first if at == "first" else max(later)
+        return first if window == "first" else max(later)
 
     def spare_window(self, key: Key, amplitude: float) -> Estimate:
         """First window less the shortest allowed at an amplitude, ms."""
@@ -163,43 +169,43 @@ class Evidence(evidence.Evidence):
         return exact_number(1e3 * self.case(key).axes.shortest_window_s / amplitude**2)
 
 
-def first_window(seen: Evidence, key: Key) -> float:
+def first_window(evidence: Evidence, key: Key) -> float:
     """The first window of the sequence, ms."""
-    return float(1e3 * seen.windows(key)[0])
+    return float(1e3 * evidence.windows(key)[0])
 
 
-def windows_counted(seen: Evidence, key: Key, first: bool) -> float:
+def windows_counted(evidence: Evidence, key: Key, first: bool) -> float:
     """How many windows the sequence has, with the first or after it."""
-    return len(seen.windows(key)) - (not first)
+    return len(evidence.windows(key)) - (not first)
 
 
-def window_growth(seen: Evidence, better: Key, worse: Key) -> float:
+def window_growth(evidence: Evidence, better: Key, worse: Key) -> float:
     """The first window of one case over that of another."""
-    return float(seen.windows(better)[0] / seen.windows(worse)[0])
+    return float(evidence.windows(better)[0] / evidence.windows(worse)[0])
 
 
-def closed_over_sum(seen: Evidence, key: Key, component: str) -> float:
+def closed_over_sum(evidence: Evidence, key: Key, component: str) -> float:
     """Potential spread of a component by the closed form over that by the sum over the pulses."""
-    closed = seen.case(key).axes.potential_closed_form[COMPONENTS.index(component)]
-    return float(closed / seen.potential(key, component).value)
+    closed = evidence.case(key).axes.potential_closed_form[COMPONENTS.index(component)]
+    return float(closed / evidence.potential(key, component).value)
 
 
-def lock_above(seen: Evidence, key: Key, kind: str, other: str) -> Estimate:
+def lock_above(evidence: Evidence, key: Key, kind: str, base: str) -> Estimate:
     """Lock of one estimator less that of another."""
-    return difference(seen.lock(key, kind), seen.lock(key, other))
+    return difference(evidence.lock(key, kind), evidence.lock(key, base))
 
 
-def lock_loss(seen: Evidence, key: Key, other: Key, kind: str) -> Estimate:
+def lock_loss(evidence: Evidence, key: Key, base: Key, kind: str) -> Estimate:
     """Lock of one case less that of another."""
-    return difference(seen.lock(key, kind), seen.lock(other, kind))
+    return difference(evidence.lock(key, kind), evidence.lock(base, kind))
 
 
-def forecast_spread(seen: Evidence, key: Key, component: str) -> float:
+def forecast_spread(evidence: Evidence, key: Key, component: str) -> float:
     """Printed potential spread times the printed factor."""
     return float(SPREADS[component][0]) * FACTORS[component]
 
 
-def doppler_of_polynomial(seen: Evidence, key: Key, t_s: float) -> float:
+def doppler_of_polynomial(evidence: Evidence, key: Key, t_s: float) -> float:
     """Doppler frequency of the printed derivatives at a time, kHz."""
     f0, f1, f2, f3 = DOPPLER
     return 1e-3 * (f0 + f1 * t_s + f2 * t_s**2 / 2 + f3 * t_s**3 / 6)
@@ -215,12 +221,12 @@ FACTORS = {"phi0": 100, "f0": 150, "f1": 500, "f2": 1000, "f3": 2000}
 def kind_of(estimator: Any, threshold: float) -> str:
     """What an estimator is, at the interpretation's threshold c; "other" for variants."""
     e = estimator
-    plain = e.method == "sequence" and e.amplitude == "known" and e.density == 1 and e.tail == "gaussian"
-    if not plain or e.steps < 40 or e.phases:
+    is_plain = e.method == "sequence" and e.amplitude == "known" and e.density == 1 and e.tail == "gaussian"
+    if not is_plain or e.steps < 40 or e.phases:
         return "other"
     if e.schedule != "designed":
-        whole = len(e.schedule) == 1 and np.isclose(e.schedule[0], 0.3)
-        return {"truth": "truth", "prior": "narrow"}[e.start] if whole else "other"
+        is_whole_burst = len(e.schedule) == 1 and np.isclose(e.schedule[0], 0.3)
+        return {"truth": "truth", "prior": "narrow"}[e.start] if is_whole_burst else "other"
     if e.main_lobe_threshold != threshold or e.lock_probability != PER_HANDOVER or e.start != "prior":
         return "other"
     if e.first_windows == 1:

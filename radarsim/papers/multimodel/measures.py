@@ -1,5 +1,4 @@
-"""How P2's claims are measured: which case and filter are the paper's, and the numbers taken from the sums of the
-stages.
+"""How P2's claims are measured: the paper's cases and filters, and numbers from the sums of the stages.
 
 Cases are found by target, scan period and what their filters are, whatever their names; filters by family, merging rule
 and bank."""
@@ -10,10 +9,10 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.papers import evidence
+from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.papers.evidence import MissingEvidence
 from radarsim.report.statistics import Estimate
-from radarsim.studies.multimodel import cost, tables, world
+from radarsim.studies.multimodel import cost, model_bank, tables
 
 BANK_122 = ("uniform 0.05", "accelerated 0.05", "accelerated 30")
 BANK_11 = ("uniform 5", "uniform 30")
@@ -34,132 +33,138 @@ def is_flight(target: Any, flight: str) -> bool:
     return tuple((stage.name, stage.end_s) for stage in target.stages) == STAGES[flight]
 
 
-class Evidence(evidence.Evidence):
+class Evidence(GeneralEvidence):
     """Finds cases by (target's stages and kind, scan period), and filters by their settings."""
 
     def case(self, key: Any) -> CaseResult:
         """key: (name of the flight, scan period, filters that must be there)."""
-        flight, period, wanted = key
+        flight, period, filter_keys = key
         for result in self.results:
-            seen = is_flight(result.spec.target, flight) and np.isclose(result.spec.sensor.scan_period_s, period)
-            if seen and all(self._index(result, own) is not None for own in wanted):
+            is_case = is_flight(result.spec.target, flight) and np.isclose(result.spec.sensor.scan_period_s, period)
+            if is_case and all(self._index(result, filter_key) is not None for filter_key in filter_keys):
                 return result
         raise MissingEvidence(key)
 
-    def _index(self, result: CaseResult, wanted: tuple) -> int | None:
+    def _index(self, result: CaseResult, filter_key: tuple) -> int | None:
         """The number of a case's filter (family, rule, bank[, matrix]); the paper's matrix where none is named."""
-        family, rule, bank, *matrix = wanted
+        family, rule, bank, *matrix = filter_key
         printed = {BANK_122: MATRIX_122, BANK_11: MATRIX_11}.get(bank)
-        for f, of in self.members(result):
-            same = of.family == family and world.labels(of.models) == bank and (not rule or of.merge == rule)
+        for f, filter_keys in self.members(result):
+            is_same = (
+                filter_keys.family == family
+                and model_bank.model_labels(filter_keys.models) == bank
+                and (not rule or filter_keys.merge == rule)
+            )
             expected = matrix[0] if matrix else printed
-            T = world.transition_matrix(of.transition)
-            fits = expected is None or (np.shape(expected) == T.shape and np.allclose(expected, T, atol=1e-9))
-            if same and fits and of.covariance_at == "plot":
+            T = model_bank.transition_matrix(filter_keys.transition)
+            has_matrix = expected is None or (np.shape(expected) == T.shape and np.allclose(expected, T, atol=1e-9))
+            if is_same and has_matrix and filter_keys.covariance_at == "plot":
                 return f
         return None
 
-    def filter(self, key: tuple, wanted: tuple) -> int:
-        """The number of a filter in a case; raises Missing."""
-        found = self._index(self.case(key), wanted)
-        if found is None:
-            raise MissingEvidence(wanted)
-        return found
+    def filter(self, key: tuple, filter_key: tuple) -> int:
+        """The number of a filter in a case; raises MissingEvidence."""
+        index = self._index(self.case(key), filter_key)
+        if index is None:
+            raise MissingEvidence(filter_key)
+        return index
 
     def stage(self, key: tuple, name: str) -> int:
-        """The number of a stage of a case; raises Missing."""
+        """The number of a stage of a case; raises MissingEvidence."""
         names = tables.stage_names(self.case(key))
         if name not in names:
             raise MissingEvidence(name)
         return names.index(name)
 
-    def stage_gain(self, key: tuple, wanted: tuple, base: tuple, stage: str, component: str) -> Estimate:
+    def stage_gain(self, key: tuple, filter_key: tuple, base: tuple, stage: str, component: str) -> Estimate:
         """Paired gain of a filter against another over a stage, %."""
-        of, s = self.case(key), self.stage(key, stage)
-        return tables.stage_gain(of, self.filter(key, wanted), self.filter(key, base), s, COMPONENTS[component])
+        result, s = self.case(key), self.stage(key, stage)
+        return tables.stage_gain(result, self.filter(key, filter_key), self.filter(key, base), s, COMPONENTS[component])
 
-    def probability(self, key: tuple, wanted: tuple, stage: str, model: int) -> Estimate:
+    def probability(self, key: tuple, filter_key: tuple, stage: str, model: int) -> Estimate:
         """Mean probability of a model (from 1) over the reported scans of a stage; ends of intervals are averaged."""
-        of, f = self.case(key), self.filter(key, wanted)
-        rows = self.tables["probabilities"]
-        t = self._bounds(of, stage)
-        own = rows[(rows["case"] == of.name) & (rows["filter"] == of.axes.filters[f]) & (rows["model"] == model)]
-        own = own[(own["t_s"] >= t[0]) & (own["t_s"] < t[1])]
-        return Estimate(*(float(own[name].mean()) for name in ("probability", "probability_lo", "probability_hi")))
+        result, f = self.case(key), self.filter(key, filter_key)
+        table = self.tables["probabilities"]
+        t = self._bounds(result, stage)
+        is_model = (
+            (table["case"] == result.name) & (table["filter"] == result.axes.filters[f]) & (table["model"] == model)
+        )
+        rows = table[is_model & (table["t_s"] >= t[0]) & (table["t_s"] < t[1])]
+        return Estimate(*(float(rows[name].mean()) for name in ("probability", "probability_lo", "probability_hi")))
 
-    def _bounds(self, of: CaseResult, stage: str) -> tuple[float, float]:
+    def _bounds(self, result: CaseResult, stage: str) -> tuple[float, float]:
         if stage == "whole":
             return 0.0, np.inf
-        for name, begin, end in tables.stage_bounds(of):
+        for name, begin, end in tables.stage_bounds(result):
             if name == stage:
-                last = name == tables.stage_names(of)[-1]
+                last = name == tables.stage_names(result)[-1]
                 return begin, np.inf if last else end
         raise MissingEvidence(stage)
 
-    def operations(self, key: tuple, wanted: tuple) -> float:
+    def operations(self, key: tuple, filter_key: tuple) -> float:
         """Operations of one update, mean over the whole flight."""
-        of = self.case(key)
-        name = of.axes.filters[self.filter(key, wanted)]
-        return float(self.row("operations", case=of.name, filter=name, stage="whole")["operations"])
+        result = self.case(key)
+        name = result.axes.filters[self.filter(key, filter_key)]
+        return float(self.row("operations", case=result.name, filter=name, stage="whole")["operations"])
 
 
-def growth_of_change(seen: Evidence, key: tuple) -> float:
+def growth_of_change(evidence: Evidence, key: tuple) -> float:
     """The probability to leave a model, the largest of a filter's, within 20 intervals over that within one; the least
     of a case's filters of several models."""
     growths = []
-    for options in seen.case(key).spec.filters:
-        T = world.transition_matrix(options.transition)
+    for options in evidence.case(key).spec.filters:
+        T = model_bank.transition_matrix(options.transition)
         if len(T) > 1:
-            later = world.transition_powers(T, np.array([20.0]))[0]
+            later = model_bank.transition_powers(T, np.array([20.0]))[0]
             growths.append(np.max(1 - np.diag(later)) / np.max(1 - np.diag(T)))
     return float(min(growths))
 
 
-def largest_fault_of_powers(seen: Evidence, key: tuple, tenfold: bool) -> float:
+def largest_fault_of_powers(evidence: Evidence, key: tuple, tenfold: bool) -> float:
     """The largest element, over a case's filters, of T(Δt/10⁶) − I, or of T(10 Δt) − T(Δt)¹⁰ where tenfold."""
     faults = []
-    for options in seen.case(key).spec.filters:
-        T = world.transition_matrix(options.transition)
-        near, ten = world.transition_powers(T, np.array([1e-6, 10.0]))
+    for options in evidence.case(key).spec.filters:
+        T = model_bank.transition_matrix(options.transition)
+        near, ten = model_bank.transition_powers(T, np.array([1e-6, 10.0]))
         product = np.linalg.multi_dot([T] * 10) if len(T) > 1 else T
         faults.append(np.abs(ten - product if tenfold else near - np.eye(len(T))).max())
     return float(max(faults))
 
 
-def merged_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
+def early_merging_fault(evidence: Evidence, key: tuple, filter_key: tuple) -> float:
     """The largest relative difference of merging hypotheses before a model extrapolates them and after, on an axis. The
     hypotheses are drawn at random; weights are those of (7), merged by moments (4)."""
-    options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-    T = world.transition_matrix(options.transition)
-    dt = float(seen.case(key).spec.sensor.scan_period_s)
+    options = evidence.case(key).spec.filters[evidence.filter(key, filter_key)]
+    T = model_bank.transition_matrix(options.transition)
+    dt = float(evidence.case(key).spec.sensor.scan_period_s)
     rng = np.random.default_rng(1)
     p = rng.dirichlet(np.ones(len(T)))
     x, root = rng.normal(size=(len(T), 3)), rng.normal(size=(len(T), 3, 3))
     P = root @ np.swapaxes(root, 1, 2)
     faults = []
     for n, model in enumerate(options.models):
-        moves, accelerates = world.MOTIONS[model.motion]
+        moves, accelerates = model_bank.MOTIONS[model.motion]
         F = np.array([[1, moves * dt, accelerates * dt**2 / 2], [0, 1, accelerates * dt], [0, 0, accelerates]])
         G = np.array([dt**2 / 2, dt, accelerates])
         Q = model.sigma_acceleration_mps2**2 * np.outer(G, G)
         weight = T[n] * p / (T[n] @ p)
         early, late = _moments(weight, x, P), _moments(weight, x @ F.T, F @ P @ F.T + Q)
-        for one, other in ((F @ early[0], late[0]), (F @ early[1] @ F.T + Q, late[1])):
-            faults.append(float(np.abs(one - other).max() / np.abs(other).max()))
+        for merged_before, merged_after in ((F @ early[0], late[0]), (F @ early[1] @ F.T + Q, late[1])):
+            faults.append(float(np.abs(merged_before - merged_after).max() / np.abs(merged_after).max()))
     return max(faults)
 
 
 def _moments(weight: np.ndarray, x: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean (3,) and covariance (3, 3) of hypotheses (n, 3), (n, 3, 3) by (4)."""
     mean = weight @ x
-    apart = x - mean
-    return mean, np.einsum("i,ijk->jk", weight, P + apart[:, :, None] * apart[:, None, :])
+    deviations = x - mean
+    return mean, np.einsum("i,ijk->jk", weight, P + deviations[:, :, None] * deviations[:, None, :])
 
 
-def cost_of_merging_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
+def cost_of_merging_early(evidence: Evidence, key: tuple, filter_key: tuple) -> float:
     """Operations of a scan of a filter that extrapolates what is merged, over one that merges what is extrapolated."""
-    options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-    merges = np.count_nonzero(world.transition_matrix(options.transition))
+    options = evidence.case(key).spec.filters[evidence.filter(key, filter_key)]
+    merges = np.count_nonzero(model_bank.transition_matrix(options.transition))
     early, late = (
         fixed + merge * merges + once
         for fixed, merge, once in (cost.operations_of(options, merged_first) for merged_first in (True, False))
@@ -167,14 +172,19 @@ def cost_of_merging_early(seen: Evidence, key: tuple, wanted: tuple) -> float:
     return float(early / late)
 
 
-def blocks_over(
-    seen: Evidence, key: tuple, wanted: tuple, family: str, of: Literal["extrapolations", "updates"], power: int
+def blocks_over_power(
+    evidence: Evidence,
+    key: tuple,
+    filter_key: tuple,
+    family: str,
+    blocks: Literal["extrapolations", "updates"],
+    power: int,
 ) -> float:
     """Extrapolations or updates of a family with a filter's bank of N models, over a power of N."""
-    options = seen.case(key).spec.filters[seen.filter(key, wanted)]
-    T = world.transition_matrix(options.transition)
-    counted = cost.blocks(family, T, merged_first=False)[of == "updates"]
-    return float(counted.sum() / len(T) ** power)
+    options = evidence.case(key).spec.filters[evidence.filter(key, filter_key)]
+    T = model_bank.transition_matrix(options.transition)
+    counts = cost.model_counts(family, T, merged_first=False)[blocks == "updates"]
+    return float(counts.sum() / len(T) ** power)
 
 
 def bend(range_m: float, sigma_range_m: np.ndarray, sigma_angle_rad: np.ndarray) -> np.ndarray:
@@ -187,7 +197,7 @@ SIGMA_RANGE_M, SIGMA_ANGLE_RAD = (1.0, 150.0), tuple(np.radians(np.array([2.0, 1
 
 
 def share_linear(
-    seen: Evidence | None, key: tuple, range_m: float, even_logarithms: bool = False, most: float = 0.1
+    evidence: Evidence | None, key: tuple, range_m: float, even_logarithms: bool = False, max_bend: float = 0.1
 ) -> float:
     """Share of the printed accuracies of radars with a `bend` of at most so much; each range is spread evenly."""
     steps = 1000
@@ -196,24 +206,29 @@ def share_linear(
         low * (high / low) ** middles if even_logarithms else low + (high - low) * middles
         for low, high in (SIGMA_RANGE_M, SIGMA_ANGLE_RAD)
     ]
-    return float(np.mean(bend(range_m, *np.meshgrid(*axes)) <= most))
+    return float(np.mean(bend(range_m, *np.meshgrid(*axes)) <= max_bend))
 
 
 def gain_over_best(
-    seen: Evidence, key: tuple, wanted: tuple, rivals: Sequence[tuple], stage: str, component: str
+    evidence: Evidence, key: tuple, filter_key: tuple, rivals: Sequence[tuple], stage: str, component: str
 ) -> Estimate:
     """The paired gain of a filter over the best of its rivals over a stage, %."""
-    return min((seen.stage_gain(key, wanted, one, stage, component) for one in rivals), key=lambda of: of.value)
+    return min(
+        (evidence.stage_gain(key, filter_key, rival, stage, component) for rival in rivals), key=lambda gain: gain.value
+    )
 
 
-def lead(seen: Evidence, key: tuple, wanted: tuple, stage: str, model: int) -> Estimate:
+def lead(evidence: Evidence, key: tuple, filter_key: tuple, stage: str, model: int) -> Estimate:
     """By how much a model's mean probability exceeds the largest of the others'."""
-    every = range(1, len(wanted[2]) + 1)
-    own = seen.probability(key, wanted, stage, model)
-    top = max((seen.probability(key, wanted, stage, m) for m in every if m != model), key=lambda of: of.value)
-    return Estimate(own.value - top.value, own.lo - top.hi, own.hi - top.lo)
+    models = range(1, len(filter_key[2]) + 1)
+    probability = evidence.probability(key, filter_key, stage, model)
+    largest = max(
+        (evidence.probability(key, filter_key, stage, m) for m in models if m != model),
+        key=lambda estimate: estimate.value,
+    )
+    return Estimate(probability.value - largest.value, probability.lo - largest.hi, probability.hi - largest.lo)
 
 
-def cost_over(seen: Evidence, key: tuple, wanted: tuple, base: tuple) -> float:
+def operations_ratio(evidence: Evidence, key: tuple, filter_key: tuple, base: tuple) -> float:
     """Ratio of counted operations of two filters."""
-    return seen.operations(key, wanted) / seen.operations(key, base)
+    return evidence.operations(key, filter_key) / evidence.operations(key, base)

@@ -1,11 +1,11 @@
 """What is measured for the claims on the chain, from the tables."""
 
-from radarsim.papers import evidence
+from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.papers.evidence import ratio
 from radarsim.report.statistics import Estimate
 
 
-class Evidence(evidence.Evidence):
+class Evidence(GeneralEvidence):
     """Finds the shipped experiments' cases by their names."""
 
     def over_ideal(self, key: str, name: str, component: str) -> Estimate:
@@ -15,6 +15,6 @@ class Evidence(evidence.Evidence):
         return Estimate(*(float(row[column]) for column in ("over_ideal", "over_ideal_lo", "over_ideal_hi")))
 
 
-def last_to_last(seen: Evidence, key: str, name: str, other: str, component: str) -> Estimate:
+def last_to_last(evidence: Evidence, key: str, name: str, base: str, component: str) -> Estimate:
     """σ at the last scan, of a filter over that of another."""
-    return ratio(seen.curve(key, name, component).last(), seen.curve(key, other, component).last())
+    return ratio(evidence.curve(key, name, component).last(), evidence.curve(key, base, component).last())

@@ -9,9 +9,14 @@ from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from radarsim.kernels.algebra import CORRECT, NO_NOISE, TAKE, constant_acceleration, pack, predicted_covariance
-from radarsim.physics import acceleration_step_covariance, manoeuvre_covariance, transition, white_jerk_covariance
-from radarsim.studies.range_doppler.filters import least_squares_start, observation
+from radarsim.kernels.kalman_algebra import CORRECT, NO_NOISE, TAKE, constant_acceleration, pack, predict_covariance
+from radarsim.physics.motion import (
+    acceleration_step_covariance,
+    manoeuvre_covariance,
+    transition,
+    white_jerk_covariance,
+)
+from radarsim.studies.range_doppler.filter_design import least_squares_start, observation
 
 Form = Literal["random_jerk", "white_jerk", "white_jerk_rate", "acceleration_step", "normalised"]
 Start = Literal[
@@ -39,7 +44,9 @@ def covariance_of(form: Form, variance: float, sigma_range_m: float, dt: float) 
     return white_jerk_covariance(variance if form == "white_jerk_rate" else variance / dt, dt)
 
 
-def started(start: Start, observes: int, sigma: np.ndarray, dt: float, Q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def start_covariances(
+    start: Start, observes: int, sigma: np.ndarray, dt: float, Q: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Covariances (B, 3, 3) of B starts, believed and true, at the last of the scans that make them.
 
     observes is 1 (range) or 2 (and velocity); sigma (2,); Q (B, 3, 3) of a scan, which only `process_noise` uses: the
@@ -119,11 +126,11 @@ def errors(
     P, S = _starts(names, observes, sigma, dt, Q)
     true, believed = np.full((2, scans, 3, len(versions)), np.nan)
     for begin in np.unique(first):
-        of = np.flatnonzero(first == begin)
-        found = _recursion(P[of], S[of], Q[of], observes, sigma, dt, scans - begin)
-        for sigmas, own in zip((true, believed), found, strict=True):
-            sigmas[: begin - 1, :observes, of] = sigma[:observes, None]
-            sigmas[begin - 1 :, :, of] = own
+        indices = np.flatnonzero(first == begin)
+        curves = _recursion(P[indices], S[indices], Q[indices], observes, sigma, dt, scans - begin)
+        for sigmas, curve in zip((true, believed), curves, strict=True):
+            sigmas[: begin - 1, :observes, indices] = sigma[:observes, None]
+            sigmas[begin - 1 :, :, indices] = curve
     return Errors(true.transpose(2, 0, 1), believed.transpose(2, 0, 1))
 
 
@@ -138,8 +145,8 @@ def _starts(
 ) -> tuple[np.ndarray, np.ndarray]:
     believed, true = np.empty((2, len(names), 3, 3))
     for name in START_NAMES:
-        if (of := np.flatnonzero([one == name for one in names])).size:
-            believed[of], true[of] = started(name, observes, sigma, dt, Q[of])
+        if (indices := np.flatnonzero([start == name for start in names])).size:
+            believed[indices], true[indices] = start_covariances(name, observes, sigma, dt, Q[indices])
     return believed, true
 
 
@@ -151,34 +158,40 @@ def _recursion(
     true, believed = np.empty((2, steps + 1, 3, len(Q)))
     for k in range(steps + 1):
         if k:
-            P, S = predicted_covariance(P, F, q), predicted_covariance(S, F, NO_NOISE)
+            P, S = predict_covariance(P, F, q), predict_covariance(S, F, NO_NOISE)
             for m in range(observes):
                 P, gain, _ = TAKE[m](P, sigma[m] ** 2, 1.0)
                 S = CORRECT[m](S, sigma[m] ** 2, gain)
-        for to, of in ((true, S), (believed, P)):
-            np.sqrt([of[0], of[3], of[5]], out=to[k])
-        if k % LOOK == LOOK - 1 and _steady(true[k - 1 : k + 1]) and _steady(believed[k - 1 : k + 1]):
+        for sigmas, covariance in ((true, S), (believed, P)):
+            np.sqrt([covariance[0], covariance[3], covariance[5]], out=sigmas[k])
+        if (
+            k % SCANS_BETWEEN_CHECKS == SCANS_BETWEEN_CHECKS - 1
+            and _steady(true[k - 1 : k + 1])
+            and _steady(believed[k - 1 : k + 1])
+        ):
             true[k:], believed[k:] = true[k], believed[k]
             break
     return true, believed
 
 
-LOOK = 16  # scans between looks whether all σ have settled
-SETTLED = 1e-14  # relative change of a scan: some roundings
+SCANS_BETWEEN_CHECKS = 16  # scans between looks whether all σ have settled
+SETTLED_CHANGE = 1e-14  # relative change of a scan: some roundings
 
 
 def _steady(sigma: np.ndarray) -> bool:
     """Whether σ of two scans (2, …) are the same but for rounding."""
-    return bool((abs(sigma[1] - sigma[0]) <= SETTLED * sigma[1]).all())
+    return bool((abs(sigma[1] - sigma[0]) <= SETTLED_CHANGE * sigma[1]).all())
 
 
-def both(radar: tuple[float, float, float], versions: Sequence[Version], scans: int) -> tuple[Errors, Errors]:
+def errors_of_both_filters(
+    radar: tuple[float, float, float], versions: Sequence[Version], scans: int
+) -> tuple[Errors, Errors]:
     """Errors of range only, and of range and velocity, of versions on a radar (σ_r, σ_V, Δt)."""
     sigma, dt = np.array(radar[:2], dtype=float), float(radar[2])
     Q = covariances(versions, sigma[0], dt)
     return errors(versions, 1, sigma, dt, scans, Q), errors(versions, 2, sigma, dt, scans, Q)
 
 
-def gain(base: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Relative gain (17) in % of own σ over base, that of range only: arrays of any shape."""
-    return 100 * (base - own) / base
+def gain(base: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+    """Relative gain (17) in % of σ over `base`, that of range only: arrays of any shape."""
+    return 100 * (base - sigma) / base

@@ -20,13 +20,13 @@ from radarsim.papers.range_doppler.measures import RADARS
 from radarsim.report.statistics import Estimate
 from radarsim.threads import mapping
 
-ENDS = "P1.5"
-FALLING = ("P1.26", "P1.27")  # as far as a settled curve may rise again
-FIRST_STEPS = "P1.28"
+FINAL_GAIN_CLAIM = "P1.5"
+FALLING_SIGMA_CLAIMS = ("P1.26", "P1.27")  # as far as a settled curve may rise again
+FIRST_STEPS_CLAIM = "P1.28"
 EACH, LOWER = "each radar", "the lower one"
-SHIPPED = "0.001"  # D_M, (m/s³)²
-SWEPT = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
-LONG = 250  # scans after which a filter is taken as steady
+SHIPPED_VARIANCE = "0.001"  # D_M, (m/s³)²
+SWEPT_VARIANCES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)  # D_M of the config manoeuvre_variance
+STEADY_SCANS = 250  # scans after which a filter is taken as steady
 FILTERS = ("r", "r+Vr")
 WAVELENGTH_M = {1: 1.8, 2: 0.15, 3: 0.15, 4: 0.03, 5: 0.03}
 REPETITION_HZ = 1e3
@@ -43,36 +43,40 @@ class Interpretations(PaperInterpretations):
 
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
         """Those of the radars that the interpretation means; what falls to a steady value may rise by its tolerance."""
-        if claim.id == FIRST_STEPS and interpretation["first_steps_of"] == EACH:
+        if claim.id == FIRST_STEPS_CLAIM and interpretation["first_steps_of"] == EACH:
             return [with_cases(part, radar) for radar in RADARS for part in claim.parts]
-        if claim.id == ENDS and interpretation["end_of"] == LOWER:
+        if claim.id == FINAL_GAIN_CLAIM and interpretation["end_of"] == LOWER:
             return [
                 replace(claim.parts[0], cases=(2, 3), what="the lower of the final range gains", measure=_lower_end)
             ]
-        if claim.id not in FALLING:
+        if claim.id not in FALLING_SIGMA_CLAIMS:
             return claim.parts
         wide = same(0, 100 * self.settings(interpretation)["within"])
-        meant = [part for part in claim.parts if interpretation["curves_of"] == EACH or part.cases == (2,)]
-        return [replace(part, expected=wide) for part in meant]
+        parts = [part for part in claim.parts if interpretation["curves_of"] == EACH or part.cases == (2,)]
+        return [replace(part, expected=wide) for part in parts]
 
     def evidence(
-        self, claim: Claim, interpretation: Interpretation, seen: ChangedResults | None, of: PaperClaims
+        self,
+        claim: Claim,
+        interpretation: Interpretation,
+        changed_results: ChangedResults | None,
+        paper_claims: PaperClaims,
     ) -> "ExactEvidence":
         return _evidence(interpretation)
 
     def versions(self) -> list[Version]:
         """Every version of the filters that a declared interpretation asks for, with the D_M of the shipped sweep."""
-        found: dict[Version, None] = {}
-        for one in self.declared():
-            form, start = cast(Form, one["process_noise"]), cast(Start, one["start"])
-            for variance in (float(one["manoeuvre_variance"]), *SWEPT):
-                found[form, variance, start] = None
-        return list(found)
+        versions: dict[Version, None] = {}
+        for interpretation in self.declared():
+            form, start = cast(Form, interpretation["process_noise"]), cast(Start, interpretation["start"])
+            for variance in (float(interpretation["manoeuvre_variance"]), *SWEPT_VARIANCES):
+                versions[form, variance, start] = None
+        return list(versions)
 
 
-def _lower_end(seen: measures.Evidence) -> Estimate:
+def _lower_end(evidence: measures.Evidence) -> Estimate:
     """The least of the final range gains of RLS 2 and 3, %."""
-    return measures.extreme_gain(seen, 2, 3, which="least", component="r", pick="last")
+    return measures.extreme_gain(evidence, 2, 3, extreme="least", component="r", pick="last")
 
 
 @cache
@@ -87,10 +91,10 @@ def _table() -> Mapping[int, Mapping[Version, "_Sigmas"]]:
     versions = Interpretations().versions()
 
     def of_radar(number: int) -> dict[Version, _Sigmas]:
-        found = filter_versions.both(RADARS[number], versions, LONG)
+        errors = filter_versions.errors_of_both_filters(RADARS[number], versions, STEADY_SCANS)
         return {
-            one: _Sigmas(*(tuple(e.true[i] for e in found), tuple(e.believed[i] for e in found)))
-            for i, one in enumerate(versions)
+            version: _Sigmas(*(tuple(e.true[i] for e in errors), tuple(e.believed[i] for e in errors)))
+            for i, version in enumerate(versions)
         }
 
     with mapping() as mapped:  # NumPy computes outside the interpreter's lock
@@ -108,7 +112,7 @@ class _Sigmas(NamedTuple):
 def _case(number: int, variance: float) -> SimpleNamespace:
     """What stands in for a case: one radar at one D_M."""
     sigma_r, sigma_v, period = RADARS[number]
-    k = np.arange(1, round(measures.DURATION / period) + 2)
+    k = np.arange(1, round(measures.DURATION_S / period) + 2)
     axes = {"k": k, "t_s": (k - 1.0) * period, "scan_period_s": period, "C_theta": (sigma_r / (period * sigma_v)) ** 2}
     axes |= {"wavelength_m": WAVELENGTH_M[number], "repetition_rate_hz": REPETITION_HZ}
     return SimpleNamespace(name=f"rls{number}", number=number, variance=variance, axes=SimpleNamespace(**axes), count=0)
@@ -122,8 +126,8 @@ class ExactEvidence(measures.Evidence):
         self._interpretation, self._sets = interpretation, Interpretations().settings(interpretation)
         self._limit_s: float = self._sets.get("limit_s", np.inf)
         self.extremum = self._sets["extremum"]
-        shown = interpretation["shown_variance"]
-        self._own = float(shown if shown != SHIPPED else interpretation["manoeuvre_variance"])
+        variance = interpretation["shown_variance"]
+        self._own = float(variance if variance != SHIPPED_VARIANCE else interpretation["manoeuvre_variance"])
         self._curves: dict[tuple[Any, ...], Curve] = {}
 
     def case(self, key: Any) -> Any:
@@ -170,7 +174,7 @@ class ExactEvidence(measures.Evidence):
 
     def variances(self, radar: int) -> list[float]:
         """Those of the shipped sweep."""
-        return list(SWEPT)
+        return list(SWEPT_VARIANCES)
 
     @property
     def _start(self) -> Start:
@@ -180,17 +184,17 @@ class ExactEvidence(measures.Evidence):
         """σ (LONG,) of the two filters."""
         radar = self.case(key)
         version = cast(Form, self._interpretation["process_noise"]), radar.variance, self._start
-        of = _table()[radar.number][version]
-        alone, both = of.believed if self._interpretation["truth"] == "as believed" else of.true
+        sigmas = _table()[radar.number][version]
+        range_only, both = sigmas.believed if self._interpretation["truth"] == "as believed" else sigmas.true
         c = tuple(measures.COMPONENTS).index(component)
-        return alone[:, c], both[:, c]
+        return range_only[:, c], both[:, c]
 
     def _cut(self, key: Any, values: np.ndarray) -> Curve:
         axes = self.case(key).axes
         scans = self._sets.get("scans", len(axes.k))
         values = values[: len(axes.k)]
-        kept = np.isfinite(values) & (axes.t_s <= self._limit_s + 1e-6) & (axes.k <= scans)
-        end, asked = float(axes.t_s[min(scans, len(axes.k)) - 1]), self._limit_s
-        short = f"the run of RLS {self.case(key).number} ends at {end:g} s, before {asked:g} s"
-        ends = short if np.isfinite(asked) and end < asked - 1e-6 else ""
-        return Curve(axes.k[kept], axes.t_s[kept], *(values[kept],) * 3, short=ends)
+        is_kept = np.isfinite(values) & (axes.t_s <= self._limit_s + 1e-6) & (axes.k <= scans)
+        end, limit_s = float(axes.t_s[min(scans, len(axes.k)) - 1]), self._limit_s
+        short = f"the run of RLS {self.case(key).number} ends at {end:g} s, before {limit_s:g} s"
+        ends = short if np.isfinite(limit_s) and end < limit_s - 1e-6 else ""
+        return Curve(axes.k[is_kept], axes.t_s[is_kept], *(values[is_kept],) * 3, short=ends)

@@ -10,22 +10,22 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.papers import evidence
 from radarsim.papers.evidence import Curve, MissingEvidence, common_times, exact_number, ratio, subtract
-from radarsim.physics import manoeuvre_covariance, transition
+from radarsim.papers.evidence import Evidence as GeneralEvidence
+from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.report.statistics import Estimate, difference
-from radarsim.studies.range_doppler import filters, tables
+from radarsim.studies.range_doppler import steady_state, tables
 
 RADARS = {1: (25, 5, 10), 2: (250, 15, 10), 3: (250, 15, 5), 4: (50, 1, 10), 5: (50, 1, 5)}  # σ_r, σ_V, Δt
 VARIANCE = 1e-3  # the paper's D_M, (m/s³)²
 SPEED_MPS = 300.0  # the paper's example of an ambiguous Doppler frequency
-DURATION = 140.0  # s: fifteen points at Δt = 10 s
+DURATION_S = 140.0  # s: fifteen points at Δt = 10 s
 R, RV = ("range",), ("range", "velocity")
 COMPONENTS = {"r": "range", "Vr": "velocity", "ar": "acceleration"}
 Key = int | tuple[int, float]  # a radar at D_M = 10⁻³, or a radar and its D_M
 
 
-class Evidence(evidence.Evidence):
+class Evidence(GeneralEvidence):
     """Finds the paper's radars, and its two filters, by their settings."""
 
     extremum = 1.0  # point of gain: what differs by less is no material difference, of two times either
@@ -42,8 +42,8 @@ class Evidence(evidence.Evidence):
     def _radar(result: CaseResult) -> int | None:
         """The number of the paper's radar that a case is."""
         radar = result.spec.radar
-        own = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
-        return next((number for number, row in RADARS.items() if all(map(math.isclose, own, row))), None)
+        settings = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
+        return next((number for number, row in RADARS.items() if all(map(math.isclose, settings, row))), None)
 
     @staticmethod
     def _variance(result: CaseResult) -> float:
@@ -76,7 +76,7 @@ class Evidence(evidence.Evidence):
         axes, c = self.case(key).axes, list(COMPONENTS).index(component)
         f = axes.filters.index(self.filter(key, observes))
         variance = float(axes.manoeuvre_variance[f])
-        _, steady = filters.steady_state(int(axes.observes[f]), variance, axes.sigma, axes.scan_period_s)
+        _, steady = steady_state.steady_state(int(axes.observes[f]), variance, axes.sigma, axes.scan_period_s)
         when = tables.settling(Estimate(sigma.value, sigma.lo, sigma.hi), sigma.t, float(np.sqrt(steady[c, c])))
         return Estimate(*(part / axes.scan_period_s for part in when))
 
@@ -84,70 +84,74 @@ class Evidence(evidence.Evidence):
         """A curve of a case, marked where its run ends before the paper's 140 s."""
         result = self.case(key)
         end = float(result.axes.t_s[-1])
-        short = f"{result.name} ends at {end:g} s, the paper's run at {DURATION:g} s" if end < DURATION - 1e-6 else ""
+        short = (
+            f"{result.name} ends at {end:g} s, the paper's run at {DURATION_S:g} s" if end < DURATION_S - 1e-6 else ""
+        )
         return replace(series, short=short)
 
     def variances(self, radar: int) -> list[float]:
-        """The manoeuvre variances at hand for a radar; raises Missing where there are fewer than two."""
-        found = sorted({self._variance(result) for result in self.results if self._radar(result) == radar})
-        if len(found) < 2:
+        """The manoeuvre variances at hand for a radar; raises MissingEvidence where there are fewer than two."""
+        variances = sorted({self._variance(result) for result in self.results if self._radar(result) == radar})
+        if len(variances) < 2:
             raise MissingEvidence(radar)
-        return found
+        return variances
 
 
 Pick = Literal["largest", "least", "first", "last", "when_largest", "scan_of_largest"] | int  # or the scan itself
 
 
 def _as_long_as_the_papers(series: Curve) -> Curve:
-    return series.where(series.t <= DURATION + 1e-6)
+    return series.where(series.t <= DURATION_S + 1e-6)
 
 
 def _picked(series: Curve, pick: Pick) -> Estimate:
     if pick == "scan_of_largest":
         return series.when_largest("k")
-    found: Estimate = series.at(pick) if isinstance(pick, int) else getattr(series, pick)()
-    return found
+    estimate: Estimate = series.at(pick) if isinstance(pick, int) else getattr(series, pick)()
+    return estimate
 
 
-def gain(seen: Evidence, radar: int, component: str, pick: Pick, since: int = 2, upto: int | None = None) -> Estimate:
+def gain(
+    evidence: Evidence, radar: int, component: str, pick: Pick, since: int = 2, upto: int | None = None
+) -> Estimate:
     """A point of a radar's gain over the scans from `since` to `upto`, %."""
-    found = seen.k_gain(radar, component).since(since)
-    return _picked(found if upto is None else found.upto(upto), pick)
+    gains = evidence.k_gain(radar, component).since(since)
+    return _picked(gains if upto is None else gains.upto(upto), pick)
 
 
 def extreme_gain(
-    seen: Evidence, *radars: int, which: Literal["least", "largest"], component: str, pick: Pick
+    evidence: Evidence, *radars: int, extreme: Literal["least", "largest"], component: str, pick: Pick
 ) -> Estimate:
     """The least or the largest of these radars' gains, %."""
-    found = [gain(seen, radar, component, pick) for radar in radars]
-    return min(found) if which == "least" else max(found)
+    gains = [gain(evidence, radar, component, pick) for radar in radars]
+    return min(gains) if extreme == "least" else max(gains)
 
 
 def gain_above(
-    seen: Evidence, *radars: int, component: str, high: int, which: Literal["least", "largest"], pick: Pick
+    evidence: Evidence, *radars: int, component: str, high: int, extreme: Literal["least", "largest"], pick: Pick
 ) -> Estimate:
     """Gain of the first `high` radars, the least or the largest of them, less the largest of the others, points."""
-    upper = extreme_gain(seen, *radars[:high], which=which, component=component, pick=pick)
-    return difference(upper, extreme_gain(seen, *radars[high:], which="largest", component=component, pick=pick))
+    upper = extreme_gain(evidence, *radars[:high], extreme=extreme, component=component, pick=pick)
+    return difference(upper, extreme_gain(evidence, *radars[high:], extreme="largest", component=component, pick=pick))
 
 
-def above_all_others(seen: Evidence, radar: int, component: str, scans: Collection[int]) -> Estimate:
+def lead_at_scans(evidence: Evidence, radar: int, component: str, scans: Collection[int]) -> Estimate:
     """The least gain of a radar at these scans less its largest at any other, points."""
-    found = seen.k_gain(radar, component)
-    own = np.isin(found.k, list(scans))
-    return difference(found.where(own).least(), found.where(~own).largest())
+    gains = evidence.k_gain(radar, component)
+    is_given_scan = np.isin(gains.k, list(scans))
+    return difference(gains.where(is_given_scan).least(), gains.where(~is_given_scan).largest())
 
 
-def gain_raised(seen: Evidence, slow: int, fast: int) -> Estimate:
+def least_gain_rise(evidence: Evidence, slow: int, fast: int) -> Estimate:
     """The least difference of range gains, fast − slow, at common times."""
-    return subtract(*common_times(seen.k_gain(fast, "r"), seen.k_gain(slow, "r"))).least()
+    return subtract(*common_times(evidence.k_gain(fast, "r"), evidence.k_gain(slow, "r"))).least()
 
 
-def extrema_apart(seen: Evidence, slow: int, fast: int) -> Estimate:
+def time_between_extrema(evidence: Evidence, slow: int, fast: int) -> Estimate:
     """Time from one radar's largest range gain to the other's, s; each is all times within a point of the largest.
 
     Or within as much as the evidence takes for one: 0 for the largest value alone."""
-    return apart_in_time(*(_extremum(seen.k_gain(radar, "r"), seen.extremum) for radar in (fast, slow)))
+    return gap_in_time(*(_extremum(evidence.k_gain(radar, "r"), evidence.extremum) for radar in (fast, slow)))
 
 
 def _extremum(gain: Curve, within: float) -> tuple[Estimate, Estimate]:
@@ -158,16 +162,16 @@ def _extremum(gain: Curve, within: float) -> tuple[Estimate, Estimate]:
     return Estimate(sure[0], likely[0], sure[0]), Estimate(sure[-1], sure[-1], likely[-1])
 
 
-def apart_in_time(one: tuple[Estimate, Estimate], other: tuple[Estimate, Estimate]) -> Estimate:
+def gap_in_time(span_a: tuple[Estimate, Estimate], span_b: tuple[Estimate, Estimate]) -> Estimate:
     """The gap between two spans of time, 0 where they meet; at least, that of the widest they may be."""
-    gap = max(one[0].value - other[1].value, other[0].value - one[1].value, 0.0)
-    least = max(one[0].lo - other[1].hi, other[0].lo - one[1].hi, 0.0)
-    return Estimate(float(gap), float(least), float(gap))
+    gap = max(span_a[0].value - span_b[1].value, span_b[0].value - span_a[1].value, 0.0)
+    least_gap = max(span_a[0].lo - span_b[1].hi, span_b[0].lo - span_a[1].hi, 0.0)
+    return Estimate(float(gap), float(least_gap), float(gap))
 
 
-def apart(seen: Evidence, slow: int, fast: int, component: str) -> Estimate:
+def largest_gap(evidence: Evidence, slow: int, fast: int, component: str) -> Estimate:
     """How far two radars' gains lie apart at most, in % of the larger curve's height, over common times."""
-    a, b = common_times(seen.k_gain(fast, component), seen.k_gain(slow, component))
+    a, b = common_times(evidence.k_gain(fast, component), evidence.k_gain(slow, component))
     gap = subtract(a, b)
     sign = np.sign(gap.value)
     ends = np.where(sign < 0, -gap.hi, gap.lo), np.where(sign < 0, -gap.lo, gap.hi)
@@ -178,9 +182,9 @@ def apart(seen: Evidence, slow: int, fast: int, component: str) -> Estimate:
     return Estimate(*(100 * max(part, 0.0) / height for part in size.largest()))
 
 
-def likeness(seen: Evidence, radar: int, one: str, other: str) -> Estimate:
+def likeness(evidence: Evidence, radar: int, component_a: str, component_b: str) -> Estimate:
     """Correlation over the scans of two components' gains of a radar; half-widths of all points add in squares."""
-    a, b = common_times(seen.k_gain(radar, one), seen.k_gain(radar, other))
+    a, b = common_times(evidence.k_gain(radar, component_a), evidence.k_gain(radar, component_b))
     a.last()
     value = float(np.corrcoef(a.value, b.value)[0, 1])
     steps = np.diag((a.hi - a.lo) / 2), np.diag((b.hi - b.lo) / 2)
@@ -191,132 +195,132 @@ def likeness(seen: Evidence, radar: int, one: str, other: str) -> Estimate:
     return Estimate(value, value - half, value + half)
 
 
-def gain_by_variance(seen: Evidence, radar: int) -> Estimate:
+def gain_by_variance(evidence: Evidence, radar: int) -> Estimate:
     """Final range gain at the greatest D_M at hand less that at the least, points; without its sign."""
-    keys = [(radar, seen.variances(radar)[end]) for end in (0, -1)]
-    gains = [seen.marked(seen.gain(key, seen.filter(key, RV), "r"), key) for key in keys]
-    of = difference(*(_as_long_as_the_papers(one).last() for one in gains))
-    return of if of.value >= 0 else Estimate(-of.value, -of.hi, -of.lo)
+    keys = [(radar, evidence.variances(radar)[end]) for end in (0, -1)]
+    gains = [evidence.marked(evidence.gain(key, evidence.filter(key, RV), "r"), key) for key in keys]
+    change = difference(*(_as_long_as_the_papers(curve).last() for curve in gains))
+    return change if change.value >= 0 else Estimate(-change.value, -change.hi, -change.lo)
 
 
-def ineffective_from(seen: Evidence, radar: int, asked_s: float) -> Estimate:
+def ineffective_from(evidence: Evidence, radar: int, stated_s: float) -> Estimate:
     """The first time at which the acceleration gain is gone (zero or a loss); missing where the run is over before
     that time."""
-    found = seen.k_gain(radar, "ar")
-    found.last()
-    if found.t[-1] < asked_s and found.value.min() > 0:
-        raise MissingEvidence(f"the run of RLS {radar} ends at {found.t[-1]:g} s, before {asked_s:g} s")
-    gone = [found.t[part <= 0] for part in (found.value, found.lo, found.hi)]
-    return Estimate(*(float(times[0]) if times.size else np.inf for times in gone))
+    gains = evidence.k_gain(radar, "ar")
+    gains.last()
+    if gains.t[-1] < stated_s and gains.value.min() > 0:
+        raise MissingEvidence(f"the run of RLS {radar} ends at {gains.t[-1]:g} s, before {stated_s:g} s")
+    times_without_gain = [gains.t[part <= 0] for part in (gains.value, gains.lo, gains.hi)]
+    return Estimate(*(float(times[0]) if times.size else np.inf for times in times_without_gain))
 
 
-def loss_scans(seen: Evidence, radar: int) -> Estimate:
+def loss_scans(evidence: Evidence, radar: int) -> Estimate:
     """Scans at which a radar loses in acceleration; the interval counts the sure ones, and the possible ones."""
-    found = seen.k_gain(radar, "ar")
-    found.last()
-    return Estimate(*(float(np.sum(part < 0)) for part in (found.value, found.hi, found.lo)))
+    gains = evidence.k_gain(radar, "ar")
+    gains.last()
+    return Estimate(*(float(np.sum(part < 0)) for part in (gains.value, gains.hi, gains.lo)))
 
 
-def after_loss(seen: Evidence, radar: int) -> Estimate:
+def gain_after_loss(evidence: Evidence, radar: int) -> Estimate:
     """The largest acceleration gain of a radar after its first scan with a loss."""
-    found = seen.k_gain(radar, "ar")
-    lost = np.flatnonzero(found.value < 0)
-    return found.where(slice(int(lost[0]) + 1 if lost.size else len(found.k) - 1, None)).largest()
+    gains = evidence.k_gain(radar, "ar")
+    lost = np.flatnonzero(gains.value < 0)
+    return gains.where(slice(int(lost[0]) + 1 if lost.size else len(gains.k) - 1, None)).largest()
 
 
-def after_peak(seen: Evidence, radar: int) -> Estimate:
+def fall_from_peak(evidence: Evidence, radar: int) -> Estimate:
     """The largest range gain less the last one."""
-    return difference(gain(seen, radar, "r", "largest"), gain(seen, radar, "r", "last"))
+    return difference(gain(evidence, radar, "r", "largest"), gain(evidence, radar, "r", "last"))
 
 
-def rise(seen: Evidence, radar: int) -> Estimate:
+def velocity_gain_rise(evidence: Evidence, radar: int) -> Estimate:
     """The largest rise of the velocity gain over an earlier scan's."""
-    found = seen.k_gain(radar, "Vr")
-    found.last()
-    return max(difference(found.point(j), found.where(slice(0, j)).least()) for j in range(1, len(found.k)))
+    gains = evidence.k_gain(radar, "Vr")
+    gains.last()
+    return max(difference(gains.point(j), gains.where(slice(0, j)).least()) for j in range(1, len(gains.k)))
 
 
-def fall(seen: Evidence, radar: int) -> Estimate:
+def velocity_gain_fall(evidence: Evidence, radar: int) -> Estimate:
     """The velocity gain at the end less that at its first scan."""
-    return difference(gain(seen, radar, "Vr", "last"), gain(seen, radar, "Vr", "first"))
+    return difference(gain(evidence, radar, "Vr", "last"), gain(evidence, radar, "Vr", "first"))
 
 
 def sigma_of(
-    seen: Evidence, radar: int, *others: int, observes: tuple[str, ...], component: str, pick: Pick
+    evidence: Evidence, radar: int, *others: int, observes: tuple[str, ...], component: str, pick: Pick
 ) -> Estimate:
     """A point of σ(k) of the first of these radars."""
-    return _picked(seen.sigma(radar, observes, component), pick)
+    return _picked(evidence.sigma(radar, observes, component), pick)
 
 
 def sigma_change(
-    seen: Evidence, slow: int, fast: int, observes: tuple[str, ...], component: str, pick: Pick
+    evidence: Evidence, slow: int, fast: int, observes: tuple[str, ...], component: str, pick: Pick
 ) -> Estimate:
     """σ fast − σ slow of two radars, first or last of each."""
-    return difference(*(_picked(seen.sigma(radar, observes, component), pick) for radar in (fast, slow)))
+    return difference(*(_picked(evidence.sigma(radar, observes, component), pick) for radar in (fast, slow)))
 
 
-def largest_rise(seen: Evidence, radar: int, observes: tuple[str, ...], component: str, since: int) -> Estimate:
+def largest_rise(evidence: Evidence, radar: int, observes: tuple[str, ...], component: str, since: int) -> Estimate:
     """The largest rise of σ over an earlier scan's from scan `since` on, in % of that; 0 where it never rises."""
-    sigma = seen.sigma(radar, observes, component).since(since)
+    sigma = evidence.sigma(radar, observes, component).since(since)
     sigma.last()
     worst = max(ratio(sigma.point(j), sigma.where(slice(0, j)).least(), 100) for j in range(1, len(sigma.k)))
     return Estimate(*(max(part - 100, 0.0) for part in worst))
 
 
-def final_share(seen: Evidence, radar: int) -> Estimate:
+def final_share(evidence: Evidence, radar: int) -> Estimate:
     """Δσ_r at the end in % of its largest value."""
-    apart = range_difference(seen, radar)
-    return ratio(apart.last(), apart.largest(), 100)
+    differences = range_difference(evidence, radar)
+    return ratio(differences.last(), differences.largest(), 100)
 
 
-def range_difference(seen: Evidence, radar: int) -> Curve:
+def range_difference(evidence: Evidence, radar: int) -> Curve:
     """Δσ_r(k) = σ_r(r) − σ_r(r,V_r), from k = 2.
 
     Taken as independent: the common noise makes the two errors alike, so the interval is too wide, never too narrow."""
-    return subtract(seen.sigma(radar, R, "r").since(2), seen.sigma(radar, RV, "r").since(2))
+    return subtract(evidence.sigma(radar, R, "r").since(2), evidence.sigma(radar, RV, "r").since(2))
 
 
-def final_to_fourth(seen: Evidence, radar: int, observes: tuple[str, ...]) -> Estimate:
+def final_to_fourth(evidence: Evidence, radar: int, observes: tuple[str, ...]) -> Estimate:
     """σ of range at the end in % of that at the 4th scan."""
-    sigma = seen.sigma(radar, observes, "r")
+    sigma = evidence.sigma(radar, observes, "r")
     return ratio(sigma.last(), sigma.at(4), scale=100)
 
 
 def by_variance(
-    seen: Evidence, radar: int, of: Literal["final_range", "settling"], observes: tuple[str, ...]
+    evidence: Evidence, radar: int, quantity: Literal["final_range", "settling"], observes: tuple[str, ...]
 ) -> Estimate:
     """Final σ of the range, or its settling in scan periods, at the least D_M at hand less that at the greatest."""
-    keys = [(radar, seen.variances(radar)[end]) for end in (0, -1)]
-    if of == "final_range":
-        return difference(*(seen.whole_sigma(key, observes, "r").last() for key in keys))
-    small, large = (seen.settling(key, observes) for key in keys)
+    keys = [(radar, evidence.variances(radar)[end]) for end in (0, -1)]
+    if quantity == "final_range":
+        return difference(*(evidence.whole_sigma(key, observes, "r").last() for key in keys))
+    small, large = (evidence.settling(key, observes) for key in keys)
     if not np.isfinite(small.value):  # not settled within the run: later than its end
-        low = min(small.lo, float(seen.case(keys[0]).axes.k[-1] - 1))
+        low = min(small.lo, float(evidence.case(keys[0]).axes.k[-1] - 1))
         return Estimate(np.inf, low - large.hi, np.inf)
     return difference(small, large)
 
 
-def earlier(seen: Evidence, radar: int, unit: Literal["scans", "s"]) -> Estimate:
+def velocity_lead(evidence: Evidence, radar: int, unit: Literal["scans", "s"]) -> Estimate:
     """How much earlier the filter with velocity has a velocity: in scans, or in seconds."""
-    a, b = (seen.sigma(radar, observes, "Vr") for observes in (R, RV))
+    a, b = (evidence.sigma(radar, observes, "Vr") for observes in (R, RV))
     return exact_number(a.k[0] - b.k[0] if unit == "scans" else a.t[0] - b.t[0])
 
 
-def doppler(seen: Evidence, radar: int) -> Estimate:
+def doppler(evidence: Evidence, radar: int) -> Estimate:
     """Doppler frequency of the paper's 300 m/s in repetition rates."""
-    axes = seen.case(radar).axes
+    axes = evidence.case(radar).axes
     return exact_number(2 * SPEED_MPS / axes.wavelength_m / axes.repetition_rate_hz)
 
 
-def c_theta(seen: Evidence, radar: int) -> Estimate:
+def c_theta(evidence: Evidence, radar: int) -> Estimate:
     """C_θ (11) of a radar: algebra."""
-    return exact_number(seen.case(radar).axes.C_theta)
+    return exact_number(evidence.case(radar).axes.C_theta)
 
 
-def closed_forms(seen: Evidence, radar: int) -> Estimate:
+def closed_forms(evidence: Evidence, radar: int) -> Estimate:
     """The largest relative difference of (8) and (12), as printed, from the matrices of (5) and (9). Of covariances
     R̄_k drawn at random; an element of (8) counts against the root of the two variances it is between."""
-    axes = seen.case(radar).axes
+    axes = evidence.case(radar).axes
     dt, theta = axes.scan_period_s, axes.C_theta
     C_M = VARIANCE / RADARS[radar][0] ** 2
     B, Q = transition(dt), manoeuvre_covariance(C_M, dt)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from radarsim.language import term
+from radarsim.language.translate import term
 from radarsim.report.quantities import COMMON, FLOORS, RIGHT, WRONG, Quantity
 from radarsim.studies.interface import Study
 
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import Axes, CaseResult
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
     from radarsim.studies.ambiguous_doppler.config import Keys
+    from radarsim.studies.ambiguous_doppler.recorded_plots import FoldedRecordedPlots
     from radarsim.studies.ambiguous_doppler.study import Plan
-    from radarsim.studies.ambiguous_doppler.track import Recorded
-    from radarsim.studies.floor import Floor
+    from radarsim.studies.floors.bound import Floor
 
 COLUMN = "above_oracle_percent|above_oracle"  # against the filter that is given the true folds
 ABOVE_ORACLE = Quantity(
@@ -58,7 +58,7 @@ class AmbiguousDoppler(Study):
 
     def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
         modules = f"{__name__}.config", f"{__name__}.study"
-        return (*modules, f"{__name__}.track") if plots else modules
+        return (*modules, f"{__name__}.recorded_plots") if plots else modules
 
     def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
         from radarsim.studies.ambiguous_doppler import study
@@ -98,24 +98,24 @@ class AmbiguousDoppler(Study):
         return figures.DRAWN_FROM
 
     def question(self, experiment: "Experiment") -> str:
-        from radarsim.studies.ambiguous_doppler import words
+        from radarsim.studies.ambiguous_doppler import answer
 
-        return words.question(experiment)
+        return answer.question(experiment)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.ambiguous_doppler import words
+        from radarsim.studies.ambiguous_doppler import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
-        from radarsim.studies.ambiguous_doppler import words
+        from radarsim.studies.ambiguous_doppler import answer
 
-        return words.warnings(experiment)
+        return answer.warnings(experiment)
 
-    def recording_interface(self) -> "Recorded":
-        from radarsim.studies.ambiguous_doppler.track import Recorded
+    def recording_interface(self) -> "FoldedRecordedPlots":
+        from radarsim.studies.ambiguous_doppler.recorded_plots import FoldedRecordedPlots
 
-        return Recorded()
+        return FoldedRecordedPlots()
 
 
 STUDY = AmbiguousDoppler()

@@ -7,8 +7,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from radarsim.config import fields
-from radarsim.config.fields import At, Design, Model, NonNegative, Positive, Probability, Whole, at, cross_check, key
+from radarsim.config import cross_checks, key_types, marks, radial_keys, rare_event_keys, study_keys
+from radarsim.config.cross_checks import CheckError, check_error, cross_check
+from radarsim.config.key_types import NonNegative, Positive, Probability, WholeNumber, key
+from radarsim.config.marks import DesignMark
+from radarsim.config.model import Model
 from radarsim.constants import STANDARD_GRAVITY_MPS2
 
 MAX_RARE_SCANS = 64  # the search for sequences of folds precedes the run, and each shifts the noise of every scan
@@ -23,10 +26,10 @@ BIAS_KEYS = ("bias_range_m", "bias_velocity_mps", "sigma_bias_range_m", "sigma_b
 ORACLE_SUFFIX = "with known folds"  # appended to a filter's name
 LISTS_HYPOTHESES = {"doppler": "folded", "merge": "never"}  # keys of filters that keep several hypotheses
 
-Order = Annotated[int, Whole(0, 2)]
+Order = Annotated[int, WholeNumber(0, 2)]
 
 
-class Radar(fields.Radar):
+class Radar(radial_keys.Radar):
     """A coherent surveillance radar: accuracies of one plot, period of its scans, pulse repetition rates."""
 
     repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MAX_RATES)] = key(
@@ -56,11 +59,11 @@ class Radar(fields.Radar):
         return tuple(tuple(joint_span(span, other_span) for other_span in self.spans_mps) for span in self.spans_mps)
 
     @cross_check
-    def _spans_differ(self) -> Iterator[At]:
+    def _spans_differ(self) -> Iterator[CheckError]:
         spans = self.spans_mps
         for i, span in enumerate(spans):
             if any(math.isclose(span, other_span, rel_tol=MIN_SPAN_DIFFERENCE) for other_span in spans[:i]):
-                yield at("repetition_rate_hz", f"must differ from rate to rate: two spans are {span:g} m/s")
+                yield check_error("repetition_rate_hz", f"must differ from rate to rate: two spans are {span:g} m/s")
                 return
 
 
@@ -95,12 +98,12 @@ class RandomPolynomial(Model):
 
     kind: Literal["random_polynomial"] = key("kind", "a polynomial of the second degree, drawn in each realisation")
     range_m: Positive = key("range", "range at the first scan, m", 100e3)
-    sigma_velocity_mps: Annotated[NonNegative, Field(le=fields.FASTEST_MPS)] | None = key(
+    sigma_velocity_mps: Annotated[NonNegative, Field(le=radial_keys.MAX_SPEED_MPS)] | None = key(
         "σ of the target's radial velocity",
         "standard deviation of the radial velocity, m/s; default: that of `prior`",
         None,
     )
-    sigma_acceleration_mps2: Annotated[NonNegative, Field(le=fields.HARDEST_MPS2)] | None = key(
+    sigma_acceleration_mps2: Annotated[NonNegative, Field(le=radial_keys.MAX_ACCELERATION_MPS2)] | None = key(
         "σ of the target's radial acceleration",
         "standard deviation of the radial acceleration, m/s²; default: that of `prior`",
         None,
@@ -111,8 +114,8 @@ class AccelerationPulse(Model):
     """A polynomial with a constant acceleration for a while; the velocity gained remains."""
 
     kind: Literal["acceleration_pulse"] = key("kind", "a constant acceleration for a while")
-    coefficients: fields.Coefficients = key("derivatives of the range at the first plot", fields.COEFFICIENTS)
-    acceleration_g: Annotated[fields.Number, Field(ge=-100, le=100)] = key(
+    coefficients: radial_keys.Coefficients = key("derivatives of the range at the first plot", radial_keys.COEFFICIENTS)
+    acceleration_g: Annotated[key_types.Number, Field(ge=-100, le=100)] = key(
         "acceleration", "radial acceleration added, standard gravities", symbol="a", unit="g"
     )
     start_s: NonNegative = key("start time", "start time, counted from the first scan, s")
@@ -121,17 +124,17 @@ class AccelerationPulse(Model):
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
         added = abs(self.acceleration_g) * STANDARD_GRAVITY_MPS2 * t**2 / 2
-        return fields.polynomial_reach_m(self.coefficients, t) + added
+        return radial_keys.polynomial_reach_m(self.coefficients, t) + added
 
 
 Target = Annotated[
-    fields.Polynomial
+    radial_keys.Polynomial
     | RandomPolynomial
-    | fields.AccelerationStart
+    | radial_keys.AccelerationStart
     | AccelerationPulse
-    | fields.Turn
-    | fields.FlyBy
-    | fields.Recorded,
+    | radial_keys.Turn
+    | radial_keys.FlyBy
+    | radial_keys.RecordedTarget,
     Field(discriminator="kind"),
 ]
 
@@ -146,7 +149,7 @@ class Manoeuvres(Model):
 class Filter(Model):
     """A Kalman filter of range, or several of different order, with the velocity or without."""
 
-    name: Annotated[fields.Name, fields.Display()] = key("name", "label; every filter has its own")
+    name: Annotated[key_types.Name, marks.DisplayMark()] = key("name", "label; every filter has its own")
     doppler: Literal["none", "unfolded", "folded", "remainder"] = key(
         "use of Doppler",
         "none: range alone; unfolded: the velocity with its true fold, a bound; folded: as measured, by hypotheses; "
@@ -164,7 +167,7 @@ class Filter(Model):
         symbol="D_M",
         unit="",
     )
-    hypotheses: Annotated[int, Whole(1, MAX_HYPOTHESES)] | None = key(
+    hypotheses: Annotated[int, WholeNumber(1, MAX_HYPOTHESES)] | None = key(
         "hypotheses kept",
         "folded: largest number of fold sequences kept; 1: the nearest fold; default: 300",
         300,
@@ -217,26 +220,26 @@ class Filter(Model):
         return self.doppler in ("folded", "remainder")
 
     @cross_check
-    def _orders_and_variances(self) -> Iterator[At]:
+    def _orders_and_variances(self) -> Iterator[CheckError]:
         if len(self.variances) != len(self.orders):
             count = len(self.orders)
-            yield at(
+            yield check_error(
                 "manoeuvre_variance", f"must be a list of {count}, one for each order" if count > 1 else "must be one"
             )
 
     @cross_check
-    def _orders_differ(self) -> Iterator[At]:
+    def _orders_differ(self) -> Iterator[CheckError]:
         if list(self.orders) != sorted(set(self.orders)):
-            yield at("orders", "must increase, without repetition")
+            yield check_error("orders", "must increase, without repetition")
 
     @cross_check
-    def _combined(self) -> Iterator[At]:
+    def _combined(self) -> Iterator[CheckError]:
         if len(self.orders) > 1 and self.combine is None:
-            yield at("combine", "is needed by several orders: likelihood, expected_error or intersection")
+            yield check_error("combine", "is needed by several orders: likelihood, expected_error or intersection")
         elif len(self.orders) == 1 and self.combine is not None:
-            yield at("combine", "has no effect on one order; leave it out")
+            yield check_error("combine", "has no effect on one order; leave it out")
         elif self.combine is not None and self.doppler == "remainder":
-            yield at("combine", "has no doppler: remainder, which unfolds for one order")
+            yield check_error("combine", "has no doppler: remainder, which unfolds for one order")
 
 
 def _carried_filter(data: Any) -> Any:
@@ -251,17 +254,17 @@ def _carried_filter(data: Any) -> Any:
     return {**kept_keys, "doppler": doppler_by_observed.get(tuple(observed), observed)}
 
 
-class RareFolds(fields.RareEvent):
+class RareFolds(rare_event_keys.RareEvent):
     """Rare wrong folds: realisations shifted towards them, and weights that correct for the shift."""
 
-    filter: fields.Name = key("filter", "the filter whose wrong folds at the last scan are sampled")
+    filter: key_types.Name = key("filter", "the filter whose wrong folds at the last scan are sampled")
 
     @property
     def aimed_at(self) -> str:
         return self.filter
 
 
-class Keys(fields.Lasting):
+class Keys(radial_keys.TimedStudyKeys):
     """Folded Doppler: how much it gains, and after how many scans."""
 
     figure_names = (
@@ -274,15 +277,15 @@ class Keys(fields.Lasting):
     most_scans: ClassVar[int] = MAX_SCANS
 
     radar: Radar = key("radar", "the radar")
-    target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
-    prior: Annotated[Prior, Design()] = key(
+    target: Annotated[Target, marks.Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    prior: Annotated[Prior, DesignMark()] = key(
         "prior", "what the filters know before the first plot", Prior.model_validate({})
     )
-    filters: fields.Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: fields.Baseline = fields.BASELINE
-    scans: Annotated[Annotated[int, Whole(2, MAX_SCANS)] | None, Design()] = fields.SCANS
-    duration_s: Annotated[Positive | None, Design(), fields.Added()] = fields.DURATION
-    rare: Annotated[RareFolds | None, Design(), fields.Added()] = key(
+    filters: study_keys.Members[Filter] = key("filters", "the filters; all see the same plots")
+    baseline: study_keys.Baseline = study_keys.BASELINE
+    scans: Annotated[Annotated[int, WholeNumber(2, MAX_SCANS)] | None, DesignMark()] = study_keys.SCANS
+    duration_s: Annotated[Positive | None, DesignMark(), marks.AddedKeyMark()] = study_keys.DURATION
+    rare: Annotated[RareFolds | None, DesignMark(), marks.AddedKeyMark()] = key(
         "rare wrong folds",
         "importance sampling of wrong folds, for filters that are almost always right: rare.csv",
         None,
@@ -320,71 +323,77 @@ class Keys(fields.Lasting):
         return carried
 
     @cross_check
-    def _prior_in_proportion(self) -> Iterator[At]:
+    def _prior_in_proportion(self) -> Iterator[CheckError]:
         """Refuse a prior so wide that a plot's accuracy is lost in rounding, or that the start has too many folds."""
         radar, prior = self.radar, self.prior
         if prior.sigma_velocity_mps > MAX_PROPORTION * radar.sigma_velocity_mps:
-            yield at("prior.sigma_velocity_mps", f"must be at most {MAX_PROPORTION:g} times the velocity's accuracy")
+            yield check_error(
+                "prior.sigma_velocity_mps", f"must be at most {MAX_PROPORTION:g} times the velocity's accuracy"
+            )
             return
         widest, name = max((prior.sigma_velocity_mps, "prior"), (radar.sigma_velocity_mps, "radar"))
         if widest > MAX_FOLDS * min(radar.spans_mps):
             smallest = f"{widest / MAX_FOLDS:g} m/s, {name}.sigma_velocity_mps over {MAX_FOLDS:g}"
-            yield at("radar.repetition_rate_hz", f"its span must be at least {smallest}")
+            yield check_error("radar.repetition_rate_hz", f"its span must be at least {smallest}")
 
     @cross_check
-    def _range_resolved(self) -> Iterator[At]:
+    def _range_resolved(self) -> Iterator[CheckError]:
         radar, prior, last = self.radar, self.prior, (self.plots - 1) * self.radar.scan_period_s
         if prior.sigma_acceleration_mps2 * radar.scan_period_s > MAX_PROPORTION * radar.sigma_velocity_mps:
             limit = f"{MAX_PROPORTION:g} times the velocity's accuracy a scan period"
-            yield at("prior.sigma_acceleration_mps2", f"must be at most {limit}")
+            yield check_error("prior.sigma_acceleration_mps2", f"must be at most {limit}")
         if not isinstance(self.target, RandomPolynomial):
-            yield from fields.within_reach(self.target, radar, last)
+            yield from radial_keys.range_errors(self.target, radar, last)
 
     @cross_check
-    def _remainders_exist(self) -> Iterator[At]:
-        yield from fields.of_each(self.filters, self._remainder_exists)
+    def _remainders_exist(self) -> Iterator[CheckError]:
+        yield from cross_checks.check_each(self.filters, self._remainder_exists)
 
-    def _remainder_exists(self, i: int, filter_: Filter) -> Iterator[At]:
+    def _remainder_exists(self, i: int, filter_: Filter) -> Iterator[CheckError]:
         if filter_.doppler != "remainder":
             return
         joint = self.radar.joint_spans_mps
         if len(joint) == 1:
-            yield at(f"filters.{i}.doppler", "remainder needs several rates in radar.repetition_rate_hz")
+            yield check_error(f"filters.{i}.doppler", "remainder needs several rates in radar.repetition_rate_hz")
         elif not all(joint[j][k] for j in range(len(joint)) for k in range(j)):
             limit = f"in ratios of whole numbers up to {MAX_RATIO}"
-            yield at(f"filters.{i}.doppler", f"remainder needs rates in radar.repetition_rate_hz that are {limit}")
+            yield check_error(
+                f"filters.{i}.doppler", f"remainder needs rates in radar.repetition_rate_hz that are {limit}"
+            )
 
     @cross_check
-    def _every_plot(self) -> Iterator[At]:
+    def _every_plot(self) -> Iterator[CheckError]:
         for i, filter_ in enumerate(self.filters):
             if filter_.combine in ("expected_error", "intersection") and self.radar.detection_probability < 1:
-                yield at(f"filters.{i}.combine", f"{filter_.combine} needs every plot: radar.detection_probability 1")
+                yield check_error(
+                    f"filters.{i}.combine", f"{filter_.combine} needs every plot: radar.detection_probability 1"
+                )
 
     @cross_check
-    def _rare_fits(self) -> Iterator[At]:
+    def _rare_fits(self) -> Iterator[CheckError]:
         if self.rare is None:
             return
         listing = [f for f in self.filters if f.doppler == "folded" and f.merge == "never"]
         single = [f.name for f in listing if f.combine is None]
         if self.rare.filter not in single:
             names = ", ".join(single) or "there is none"
-            yield at("rare.filter", f"must be the name of a filter of one order that lists its folds: {names}")
+            yield check_error("rare.filter", f"must be the name of a filter of one order that lists its folds: {names}")
         if self.radar.detection_probability < 1:
-            yield at("rare", "needs every plot: radar.detection_probability 1")
+            yield check_error("rare", "needs every plot: radar.detection_probability 1")
         if self.plots > MAX_RARE_SCANS:
-            yield at("rare", f"needs at most {MAX_RARE_SCANS} scans, got {self.plots}")
+            yield check_error("rare", f"needs at most {MAX_RARE_SCANS} scans, got {self.plots}")
 
     @cross_check
-    def _variances_in_proportion(self) -> Iterator[At]:
-        yield from fields.of_each(self.filters, self._variance_in_proportion)
+    def _variances_in_proportion(self) -> Iterator[CheckError]:
+        yield from cross_checks.check_each(self.filters, self._variance_in_proportion)
 
-    def _variance_in_proportion(self, i: int, filter_: Filter) -> Iterator[At]:
+    def _variance_in_proportion(self, i: int, filter_: Filter) -> Iterator[CheckError]:
         radar = self.radar
         powers = zip(filter_.orders, filter_.variances, strict=False)
         grown = max(math.sqrt(variance) * radar.scan_period_s**order for order, variance in powers)
         if grown > MAX_PROPORTION * radar.sigma_velocity_mps:
             limit = f"{MAX_PROPORTION:g} times the velocity's accuracy a scan"
-            yield at(
+            yield check_error(
                 f"filters.{i}.manoeuvre_variance",
                 f"out of proportion: its root must change velocity by at most {limit}",
             )

@@ -6,24 +6,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels, rare, statistics
+from radarsim.report import key_labels, rare_events, statistics
 from radarsim.report import tables as report_tables
 from radarsim.report.row_notes import RowNote, notes_where
-from radarsim.studies.ambiguous_doppler.filters import FoldedAxes
-from radarsim.studies.ambiguous_doppler.kernels.records import BEYOND_SUM, BINS, COUNT_SUM, LISTED_SUM, RIGHT_SUM
-from radarsim.studies.ambiguous_doppler.kernels.sums import BEYOND, FULL, WRONG
+from radarsim.studies.ambiguous_doppler.axes import FoldedAxes
+from radarsim.studies.ambiguous_doppler.kernels.layout import (
+    BINS,
+    COUNT_SUM,
+    LISTED_SUM,
+    OFF_BY_HALF_SPAN_SUM,
+    RIGHT_SUM,
+)
+from radarsim.studies.ambiguous_doppler.kernels.weighted_sums import BEYOND, FULL, WRONG
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Result = CaseResult[FoldedAxes]
-table = report_tables.Tables()
+table = report_tables.TableMakers()
 WRONG_FOLD, NO_ROOM = "wrong fold", "wrong fold that found no room"  # events of rare.csv, the second part of the first
 # Velocities off by more than half the span may decide σ even if they occur once in 10⁵; most samples hold none and show
 # no tail. So σ is marked where fewer than FEW_EVENTS occurred: in 60 × 20,000 realisations of `ambiguous_rls5` the
 # intervals of marked σ cover in 45 % of cases, those of unmarked σ in 95 %.
 FEW_FOLDS = RowNote(
-    "few_folds", f"under {statistics.FEW_EVENTS} velocities off by half the span: rarer ones may decide"
+    "few_folds", f"under {statistics.MIN_EVENTS} velocities off by half the span: rarer ones may decide"
 )
 
 
@@ -43,18 +49,18 @@ def _gains(results: Sequence[Result]) -> "pd.DataFrame":
         {**report_tables.gains([result]), "above_oracle_percent|above_oracle": _above_oracle(result)}
         for result in results
     )
-    return _with_notes(report_tables.joined(columns), _few_folds(results))
+    return _with_notes(report_tables.join_columns(columns), _few_folds(results))
 
 
 def _few_folds(results: Sequence[Result]) -> set[tuple[str, str, int]]:
     """Case, filter and scan of each σ of a filter that unfolds which is off by half the span in few realisations."""
     rows = set()
     for result in results:
-        beyond_counts = np.asarray(result.sums["folds"])[..., BEYOND_SUM]
+        beyond_counts = np.asarray(result.sums["folds"])[..., OFF_BY_HALF_SPAN_SUM]
         if "events" in result.sums:
             events_seen = events(result, tuple(np.indices(beyond_counts.shape)), BEYOND)
             beyond_counts = statistics.effective_events(events_seen.weight, events_seen.squared)
-        few_events = unfolding_filters(result)[:, None] & (beyond_counts < statistics.FEW_EVENTS)
+        few_events = unfolding_filters(result)[:, None] & (beyond_counts < statistics.MIN_EVENTS)
         rows |= {(result.name, result.axes.filters[f], int(result.axes.k[k])) for f, k in np.argwhere(few_events)}
     return rows
 
@@ -72,7 +78,7 @@ def _above_oracle(result: Result) -> statistics.Estimate:
     axes, b = result.axes, result.axes.baseline
     compared = np.array(axes.available[b : b + 1] & axes.available)
     compared[b] = False
-    indices = f, k, c = report_tables.shown(result, compared)
+    indices = f, k, c = report_tables.row_index(result, compared)
     oracles = [i for i, options in enumerate(result.spec.filters) if options.doppler == "unfolded"]
     if not oracles:
         return statistics.Estimate(*np.full((3, f.size), np.nan))
@@ -84,7 +90,7 @@ def _above_oracle(result: Result) -> statistics.Estimate:
         oracle_moments[:, 1],
         oracle_moments[:, 3],
         products,
-        report_tables.realisations(result)[indices],
+        report_tables.realisation_counts(result)[indices],
     )
     has_oracle = axes.available[oracle, k, c] & (f != oracle)
     return statistics.Estimate(*(np.where(has_oracle, -value, np.nan) for value in (gain.value, gain.hi, gain.lo)))
@@ -107,17 +113,17 @@ def _folds(result: Result) -> report_tables.Columns:
     indices = f, k = np.nonzero(visible & (np.asarray(result.sums["estimates"])[..., 0] > 0))
     n = np.asarray(result.sums["estimates"])[..., 0][indices]
     folds = np.asarray(result.sums["folds"])[indices]
-    right_rate, beyond_rate = (statistics.rate(folds[:, index], n) for index in (RIGHT_SUM, BEYOND_SUM))
+    right_rate, beyond_rate = (statistics.rate(folds[:, index], n) for index in (RIGHT_SUM, OFF_BY_HALF_SPAN_SUM))
     counts = n
     note = np.full(f.size, "", dtype=object)
     if "events" in result.sums:
         counts = np.full(f.size, float(result.count))
         wrong_events, beyond_events = (events(result, (f, k), event) for event in (WRONG, BEYOND))
-        right_rate = rare.complement(rare.rate(wrong_events, sampling(result)))
-        beyond_rate = rare.rate(beyond_events, sampling(result))
-        note = rare.note(sampling(result), wrong_events, beyond_events)
+        right_rate = rare_events.complement(rare_events.event_rate(wrong_events, sampling(result)))
+        beyond_rate = rare_events.event_rate(beyond_events, sampling(result))
+        note = rare_events.weight_notes(sampling(result), wrong_events, beyond_events)
     return {
-        **report_tables.leading(result, f, k),
+        **report_tables.label_columns(result, f, k),
         "n": counts.astype(np.int64),
         "right": right_rate,
         "exact_right": axes.exact_right[indices],
@@ -133,14 +139,14 @@ def unfolding_filters(result: Result) -> np.ndarray:
     return np.array([options.folds and options.combine in (None, "likelihood") for options in result.spec.filters])
 
 
-def sampling(result: Result) -> rare.Drawn:
+def sampling(result: Result) -> rare_events.SamplingWeights:
     """The weights of the realisations of a case with rare wrong folds."""
-    return rare.Drawn(result.count, *np.asarray(result.sums["drawn"]))
+    return rare_events.SamplingWeights(result.count, *np.asarray(result.sums["drawn"]))
 
 
-def events(result: Result, indices: tuple[np.ndarray, ...], event: int) -> rare.Counted:
+def events(result: Result, indices: tuple[np.ndarray, ...], event: int) -> rare_events.EventWeights:
     """The weighted counts of realisations with an event (WRONG, BEYOND or FULL), at filters and scans."""
-    return rare.Counted(*np.moveaxis(np.asarray(result.sums["events"])[(*indices, event)], -1, 0))
+    return rare_events.EventWeights(*np.moveaxis(np.asarray(result.sums["events"])[(*indices, event)], -1, 0))
 
 
 def _rare_tables(result: Result) -> Iterator[dict[str, np.ndarray]]:
@@ -155,8 +161,8 @@ def _rare_tables(result: Result) -> Iterator[dict[str, np.ndarray]]:
 def _rare_rows(result: Result, f: np.ndarray, aimed_at: np.ndarray, event: int, name: str) -> dict[str, np.ndarray]:
     """Columns of rare.csv for filters f (n,) and an event, by its number in the sums and its name."""
     k = np.full(f.size, len(result.axes.k) - 1)
-    labels, counts = report_tables.leading(result, f, k), events(result, (f, k), event)
-    return rare.rows(labels, name, aimed_at, counts, sampling(result), is_unguided_part=event == FULL)
+    labels, counts = report_tables.label_columns(result, f, k), events(result, (f, k), event)
+    return rare_events.rate_columns(labels, name, aimed_at, counts, sampling(result), is_unguided_part=event == FULL)
 
 
 @table("calibration")
@@ -174,7 +180,7 @@ def _calibration(result: Result) -> report_tables.Columns:
     indices = f, k, bins = np.nonzero(axes.remembers[:, None, None] & (counts[..., 0] > 0))
     n, right, expected = counts[indices].T
     return {
-        **report_tables.leading(result, f),
+        **report_tables.label_columns(result, f),
         "k": np.asarray(axes.k)[k],
         **{"bin_lo": bins / BINS, "bin_hi": (bins + 1) / BINS, "n": n.astype(np.int64)},
         "right": statistics.rate(right, n),
@@ -202,7 +208,7 @@ def _orders(result: Result) -> report_tables.Columns:
     f, order, k = np.nonzero(has_order[:, :, None] & (counts > 0)[:, None])
     n, sums = counts[f, k], np.asarray(result.sums["orders"])[f, k, order]
     return {
-        **report_tables.leading(result, f, k, order=order),
+        **report_tables.label_columns(result, f, k, order=order),
         "n": n.astype(np.int64),
         "weight": statistics.mean(sums[:, 0], sums[:, 1], n),
         "best_order_sigma_r": axes.best_order[f, k, 0],
@@ -216,7 +222,9 @@ def _rare(results: Sequence[Result]) -> "pd.DataFrame | None":
 
     Those of the sought filter that found no room in a full list in a row of their own: no shift leads there.
     """
-    return rare.table([columns for result in results if "events" in result.sums for columns in _rare_tables(result)])
+    return rare_events.rate_table(
+        [columns for result in results if "events" in result.sums for columns in _rare_tables(result)]
+    )
 
 
 tables = table.made
@@ -231,8 +239,8 @@ def inputs(results: Sequence[Result]) -> "pd.DataFrame":
     for result in results:
         radar = result.spec.radar
         spans = radar.spans_mps
-        formatted = [", ".join(map(panels.number, values)) for values in (radar.rates_hz, spans)]
+        formatted = [", ".join(map(key_labels.format_value, values)) for values in (radar.rates_hz, spans)]
         accuracy = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s, radar.wavelength_m)
         other_values = (min(spans) / radar.sigma_velocity_mps, radar.detection_probability, result.spec.scans)
-        rows[(panels.plain(panels.device(result)), *accuracy, *formatted, *other_values)] = None
+        rows[(key_labels.without_markup(key_labels.config_device(result)), *accuracy, *formatted, *other_values)] = None
     return report_tables.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})

@@ -12,11 +12,11 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
     from radarsim.studies.discriminator.config import Keys
     from radarsim.studies.discriminator.study import Plan
-    from radarsim.studies.floor import Floor
+    from radarsim.studies.floors.bound import Floor
 
 
 class Discriminator(Study):
@@ -80,14 +80,14 @@ class Discriminator(Study):
         return figures.DRAWN_FROM
 
     def question(self, experiment: "Experiment") -> str:
-        from radarsim.studies.discriminator import words
+        from radarsim.studies.discriminator import answer
 
-        return words.question(experiment)
+        return answer.question(experiment)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.discriminator import words
+        from radarsim.studies.discriminator import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
 
 STUDY = Discriminator()

@@ -8,29 +8,29 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from radarsim.bursts import burst as model
+from radarsim.bursts import fisher
 from radarsim.engine.results import CaseResult
-from radarsim.report import rare, statistics
+from radarsim.report import rare_events, statistics
 from radarsim.report import tables as common
 from radarsim.report.row_notes import notes_about
-from radarsim.studies.discriminator.kernels import LOCKS as COUNTED
-from radarsim.studies.discriminator.kernels import bin_edges
+from radarsim.studies.discriminator.kernels.sums import LOCKS as COUNTED
+from radarsim.studies.discriminator.kernels.sums import bin_edges
 
 if TYPE_CHECKING:
     import pandas as pd
 
 WAVELENGTHS_M = (("metre", 1.8), ("decimetre", 0.15), ("centimetre", 0.03))  # P1's five radars have these three
 QUANTILES = (0.05, 0.5, 0.95)
-table = common.Tables()
+table = common.TableMakers()
 
 
-def last_locks(made: "Mapping[str, pd.DataFrame]", result: CaseResult, name: str) -> "pd.Series":
+def last_locks(tables_by_name: "Mapping[str, pd.DataFrame]", result: CaseResult, name: str) -> "pd.Series":
     """The row of locks at the last window of an estimator."""
-    return common.where(made["locks"], case=result.name, filter=name).iloc[-1]
+    return common.select_rows(tables_by_name["locks"], case=result.name, filter=name).iloc[-1]
 
 
-def plain(result: CaseResult) -> int:
-    """How many bursts were drawn as they are: all, but where rare losses of lock are sought."""
+def plain_bursts(result: CaseResult) -> int:
+    """How many bursts were drawn from the plain law: all of them unless rare losses of lock are sought."""
     return int(result.sums["drawn"][0]) if "drawn" in result.sums else result.count
 
 
@@ -41,38 +41,38 @@ def _curves(result: CaseResult) -> common.Columns:
     sigma_all [unit]: σ of all bursts, none dropped
     posterior_sigma [unit]: the potential σ with the prior
     """
-    axes, at = result.axes, common.shown(result)
-    f, k, c = at
+    axes, indices = result.axes, common.row_index(result)
+    f, k, c = indices
     locked = np.broadcast_to(result.sums["locks"][..., [COUNTED.index("lock")]], axes.available.shape)
-    n, bound = locked[at], axes.exact_sigma[at]
-    moments = result.sums["error"][at]
-    of = statistics.errors(moments, n)
-    every = statistics.errors(result.sums["error_all"][at], plain(result))
+    n, bound = locked[indices], axes.exact_sigma[indices]
+    moments = result.sums["error"][indices]
+    locked_errors = statistics.errors(moments, n)
+    all_errors = statistics.errors(result.sums["error_all"][indices], plain_bursts(result))
     return {
         **_labels(result, f, k, c),
         "n": n.astype(np.int64),
-        "sigma": statistics.Estimate(*(part * bound for part in of.sigma)),
-        "bias": of.bias * bound,
-        "bias_se": of.bias_se * bound,
-        "spread": of.spread * bound,
+        "sigma": statistics.Estimate(*(part * bound for part in locked_errors.sigma)),
+        "bias": locked_errors.bias * bound,
+        "bias_se": locked_errors.bias_se * bound,
+        "spread": locked_errors.spread * bound,
         "exact_sigma": bound,
         "exact_bias": np.full(f.size, np.nan),
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
-        "sigma_all": every.sigma.value * bound,
-        "posterior_sigma": axes.posterior_sigma[at],
+        "sigma_all": all_errors.sigma.value * bound,
+        "posterior_sigma": axes.posterior_sigma[indices],
     }
 
 
 @table.whole("gains")
 def _gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """Without rows: estimators have no baseline."""
-    return common.joined((), common.GAINS)
+    return common.join_columns((), common.GAINS)
 
 
 def _labels(result: CaseResult, f: np.ndarray, k: np.ndarray, c: np.ndarray | None = None) -> dict[str, np.ndarray]:
     """The first columns of rows of windows, of which t_s is the length."""
-    components = {} if c is None else common.components(result, c)
-    return common.leading(result, f, k, **components) | {"t_s": result.axes.duration_s[f, k]}
+    components = {} if c is None else common.component_columns(result, c)
+    return common.label_columns(result, f, k, **components) | {"t_s": result.axes.duration_s[f, k]}
 
 
 def _at_windows(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
@@ -96,11 +96,16 @@ def _locks(result: CaseResult) -> common.Columns:
     rates = {name: statistics.rate(count[:, i], result.count) for i, name in enumerate(COUNTED)}
     note = np.full(f.size, "", dtype=object)
     if "losses" in result.sums:
-        every = {name: losses(result, (f, k, np.full(f.size, i))) for i, name in enumerate(COUNTED)}
-        rates = {name: rare.complement(rare.rate(lost, drawn(result))) for name, lost in every.items()}
-        note = rare.note(drawn(result), every["lock"])
-        so_far = rare.note(drawn(result), every["always_three"], every["always_posterior_three"])
-        note = np.where(note == "", notes_about(so_far, "always"), note)
+        losses_by_lock = {name: losses(result, (f, k, np.full(f.size, i))) for i, name in enumerate(COUNTED)}
+        rates = {
+            name: rare_events.complement(rare_events.event_rate(lost, sampling_weights(result)))
+            for name, lost in losses_by_lock.items()
+        }
+        note = rare_events.weight_notes(sampling_weights(result), losses_by_lock["lock"])
+        always_notes = rare_events.weight_notes(
+            sampling_weights(result), losses_by_lock["always_three"], losses_by_lock["always_posterior_three"]
+        )
+        note = np.where(note == "", notes_about(always_notes, "always"), note)
     return {
         **_labels(result, f, k),
         "n": np.full(f.size, result.count),
@@ -115,22 +120,22 @@ def _locks(result: CaseResult) -> common.Columns:
     }
 
 
-def drawn(result: CaseResult) -> rare.Drawn:
+def sampling_weights(result: CaseResult) -> rare_events.SamplingWeights:
     """How the bursts of a case with rare losses of lock were drawn."""
-    return rare.Drawn(result.count, *result.sums["drawn"])
+    return rare_events.SamplingWeights(result.count, *result.sums["drawn"])
 
 
-def losses(result: CaseResult, at: tuple[np.ndarray, ...]) -> rare.Counted:
-    """Of what LOCKS counts the bursts that fail it, at filters, windows and, if given, entry of LOCKS."""
-    return rare.Counted(*np.moveaxis(result.sums["losses"][at], -1, 0))
+def losses(result: CaseResult, indices: tuple[np.ndarray, ...]) -> rare_events.EventWeights:
+    """The weights of bursts that fail a condition of LOCKS, at indices of filter, window and, if given, condition."""
+    return rare_events.EventWeights(*np.moveaxis(result.sums["losses"][indices], -1, 0))
 
 
-def _rare_part(result: CaseResult) -> dict[str, np.ndarray]:
-    windows = np.array([len(own) for own in result.axes.pulses])
+def _rare_columns(result: CaseResult) -> dict[str, np.ndarray]:
+    windows = np.array([len(window_pulses) for window_pulses in result.axes.pulses])
     f, k = np.arange(len(windows)), windows - 1
     lost = losses(result, (f, k, np.full(f.size, COUNTED.index("lock"))))
     sought = np.array([e.name == result.spec.rare.estimator for e in result.spec.estimators])
-    return rare.rows(_labels(result, f, k), "loss of lock", sought, lost, drawn(result))
+    return rare_events.rate_columns(_labels(result, f, k), "loss of lock", sought, lost, sampling_weights(result))
 
 
 @table("residuals")
@@ -140,12 +145,12 @@ def _residuals(result: CaseResult) -> common.Columns:
     q05, median, q95 [unit]: 5 %, half and 95 % of the errors lie below
     posterior_sigma [unit]: the potential σ with the prior
     """
-    at = f, k, c = common.shown(result)
-    bound = result.axes.posterior_sigma[at]
-    low, middle, high = quantiles(result.sums["residuals"][at], bin_edges(), QUANTILES)
+    indices = f, k, c = common.row_index(result)
+    bound = result.axes.posterior_sigma[indices]
+    low, middle, high = quantiles(result.sums["residuals"][indices], bin_edges(), QUANTILES)
     return {
         **_labels(result, f, k, c),
-        "n": np.full(f.size, plain(result)),
+        "n": np.full(f.size, plain_bursts(result)),
         "q05": low * bound,
         "median": middle * bound,
         "q95": high * bound,
@@ -153,19 +158,19 @@ def _residuals(result: CaseResult) -> common.Columns:
     }
 
 
-def quantiles(counts: np.ndarray, edges: np.ndarray, at: Sequence[float]) -> list[np.ndarray]:
-    """Quantiles of histograms (n, bins): linear within a bin, the outer bins' outer edges where they fall outside."""
+def quantiles(counts: np.ndarray, edges: np.ndarray, shares: Sequence[float]) -> list[np.ndarray]:
+    """Quantiles of histograms (n, bins) at `shares`, linear within a bin and limited to the outer edges."""
     total = np.cumsum(counts, axis=1)
-    found = []
-    for share in at:
+    values = []
+    for share in shares:
         goal = share * total[:, -1]
         i = np.minimum((total < goal[:, None]).sum(axis=1), counts.shape[1] - 1)
         rows = np.arange(len(counts))
         inside = counts[rows, i]
-        before = total[rows, i] - inside
-        fraction = (goal - before) / np.where(inside > 0, inside, 1.0)
-        found.append(edges[i] + fraction * (edges[i + 1] - edges[i]))
-    return found
+        count_below = total[rows, i] - inside
+        fraction = (goal - count_below) / np.where(inside > 0, inside, 1.0)
+        values.append(edges[i] + fraction * (edges[i + 1] - edges[i]))
+    return values
 
 
 @table("windows")
@@ -228,10 +233,10 @@ def _motion(result: CaseResult) -> common.Columns:
     covariance, duration = axes.potential_covariance, axes.burst_s
     for band, wavelength in WAVELENGTHS_M:
         for place, t in (("beginning", 0.0), ("middle", 0.5 * duration)):
-            velocity, acceleration = (0.5 * wavelength * model.derivative_spread(covariance, i, t) for i in (0, 1))
+            velocity, acceleration = (0.5 * wavelength * fisher.derivative_spread(covariance, i, t) for i in (0, 1))
             row = {"case": result.name, "band": band, "wavelength_m": wavelength, "at": place}
             rows.append(row | {"sigma_velocity_mps": velocity, "sigma_acceleration_mps2": acceleration})
-    return common.of_rows(rows)
+    return common.columns_from_rows(rows)
 
 
 @table("passes")
@@ -240,16 +245,16 @@ def _passes(result: CaseResult) -> common.Columns:
 
     passes ±: mean number of passes over a window's data a burst
     """
-    n, total = plain(result), result.sums["passes"]
-    of = statistics.mean(total[:, 0], total[:, 1], n)
-    count = len(of.value)
-    return {**common.leading(result, np.arange(count)), "n": np.full(count, n), "passes": of}
+    n, total = plain_bursts(result), result.sums["passes"]
+    mean_passes = statistics.mean(total[:, 0], total[:, 1], n)
+    count = len(mean_passes.value)
+    return {**common.label_columns(result, np.arange(count)), "n": np.full(count, n), "passes": mean_passes}
 
 
 @table.whole("rare")
 def _rare(results: Sequence[CaseResult]) -> "pd.DataFrame | None":
     """Loss of lock at the last window of each estimator; `plain` bursts are not shifted."""
-    return rare.table([_rare_part(result) for result in results if "losses" in result.sums])
+    return rare_events.rate_table([_rare_columns(result) for result in results if "losses" in result.sums])
 
 
 tables = table.made
@@ -257,4 +262,4 @@ tables = table.made
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """σ of the locked bursts in place of the common table."""
-    return common.joined(map(_curves, results))
+    return common.join_columns(map(_curves, results))

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from radarsim.language import term
+from radarsim.language.translate import term
 from radarsim.report.quantities import COMMON, Component, Quantity
 from radarsim.studies.interface import Study
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
     from radarsim.studies.multimodel.config import Keys
+    from radarsim.studies.multimodel.recorded_plots import FlightRecordedPlots
     from radarsim.studies.multimodel.study import Plan
-    from radarsim.studies.multimodel.track import Recorded
 
 PROBABILITY = Quantity(
     *("probability", term("probability"), "probabilities", "probability"), per=term("model"), kind="share"
@@ -51,7 +51,7 @@ class MultiModel(Study):
 
     def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
         modules = f"{__name__}.config", f"{__name__}.study"
-        return (*modules, f"{__name__}.track") if plots else modules
+        return (*modules, f"{__name__}.recorded_plots") if plots else modules
 
     def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
         from radarsim.studies.multimodel import study
@@ -96,19 +96,19 @@ class MultiModel(Study):
         return figures.DRAWN_FROM
 
     def question(self, experiment: "Experiment") -> str:
-        from radarsim.studies.multimodel import words
+        from radarsim.studies.multimodel import answer
 
-        return words.question(experiment)
+        return answer.question(experiment)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.multimodel import words
+        from radarsim.studies.multimodel import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
-    def recording_interface(self) -> "Recorded":
-        from radarsim.studies.multimodel.track import Recorded
+    def recording_interface(self) -> "FlightRecordedPlots":
+        from radarsim.studies.multimodel.recorded_plots import FlightRecordedPlots
 
-        return Recorded()
+        return FlightRecordedPlots()
 
 
 STUDY = MultiModel()

@@ -1,5 +1,4 @@
-"""Keys of the multimodel study (P2): a radar in biconical coordinates, a flight, filters with banks of motion
-models."""
+"""Keys of the multimodel study (P2): a radar in biconical coordinates, a flight, filters with banks of models."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -7,8 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from radarsim.config import fields
-from radarsim.config.fields import At, Design, Display, Model, Name, NonNegative, Number, Positive, at, cross_check, key
+from radarsim.config import key_types, marks, study_keys
+from radarsim.config.cross_checks import CheckError, check_error, cross_check
+from radarsim.config.key_types import Name, NonNegative, Number, Positive, key
+from radarsim.config.marks import DesignMark, DisplayMark
+from radarsim.config.model import Model
 
 MOST_SCANS = 100_000
 MOST_MODELS = 5
@@ -25,7 +27,7 @@ Acceleration = Annotated[Number, Field(ge=-2000, le=2000)]
 class Sensor(Model):
     """A radar with a flat antenna: accuracies of a plot, its period, where the antenna looks."""
 
-    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    name: Annotated[Name | None, DisplayMark()] = key("name", "display name", None)
     sigma_range_m: Positive | None = key(
         "σ of the measured range", "standard deviation of a measured range, m", None, symbol="σ_r"
     )
@@ -53,32 +55,32 @@ class Sensor(Model):
         "antenna elevation", "elevation of the antenna's normal above the horizon, rad", 0.0, symbol="ε_A"
     )
     antenna_height_m: Number = key("antenna height", "height of the phase centre above the origin, m", 0.0, symbol="h")
-    detection_probability: Annotated[fields.Probability, Field(gt=0)] = key(
+    detection_probability: Annotated[key_types.Probability, Field(gt=0)] = key(
         "detection probability",
         "probability that a scan gives a plot; the three that start the track are never missed",
         1.0,
         symbol="P_D",
     )
-    conversion: Annotated[Literal["plain", "unbiased"], Design()] = key(
+    conversion: Annotated[Literal["plain", "unbiased"], DesignMark()] = key(
         "conversion of plots",
         "conversion of plots to the local frame: as in the paper, or with its mean error removed",
         "plain",
     )
 
     @cross_check
-    def _one_frame(self) -> Iterator[At]:
+    def _one_frame(self) -> Iterator[CheckError]:
         biconical = [self.sigma_range_m, self.sigma_elevation_rad, self.sigma_azimuth_rad]
         local = [self.sigma_x_m, self.sigma_y_m, self.sigma_z_m]
         if biconical.count(None) + local.count(None) != 3 or (None in biconical and None in local):
-            yield at(
+            yield check_error(
                 "sigma_range_m",
                 "give sigma_range_m, sigma_elevation_rad, sigma_azimuth_rad, or else sigma_x_m, sigma_y_m, sigma_z_m",
             )
 
     @cross_check
-    def _scans_in_order(self) -> Iterator[At]:
+    def _scans_in_order(self) -> Iterator[CheckError]:
         if 2 * self.jitter_s >= self.scan_period_s:
-            yield at("jitter_s", "must be under half the scan period")
+            yield check_error("jitter_s", "must be under half the scan period")
 
     @property
     def sigma(self) -> tuple[float, float, float]:
@@ -96,13 +98,13 @@ class Stage(Model):
     end_s: Positive | None = key("end time", "end, s from the first plot; only the last stage has none", None)
 
 
-Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterValidator(fields.unique_names)]
+Stages = Annotated[tuple[Stage, ...], Field(min_length=1, max_length=12), AfterValidator(study_keys.unique_names)]
 
 
 class Target(Model):
     """What all targets share: the stages by which tables are made."""
 
-    stages: Annotated[Stages, Design()] = key(
+    stages: Annotated[Stages, DesignMark()] = key(
         "stages", "stages in order, the last without an end", (Stage(name="all", end_s=None),)
     )
 
@@ -112,12 +114,12 @@ class Target(Model):
         return tuple(stage.end_s for stage in self.stages if stage.end_s is not None)
 
     @cross_check
-    def _in_order(self) -> Iterator[At]:
+    def _in_order(self) -> Iterator[CheckError]:
         ends = [stage.end_s for stage in self.stages]
         if None in ends[:-1] or ends[-1] is not None:
-            yield at("stages", "all but the last need end_s, and only they")
+            yield check_error("stages", "all but the last need end_s, and only they")
         elif any(b <= a for a, b in pairwise(end for end in ends if end is not None)):
-            yield at("stages", "must follow one another in time")
+            yield check_error("stages", "must follow one another in time")
 
 
 class Phase(Model):
@@ -130,7 +132,9 @@ class Phase(Model):
     period_s: Positive | None = key(
         "period of the weave", "the commands follow a sine of this period, s; none: constant", None
     )
-    trimmed: fields.Flag = key("gravity and drag balanced", "lift and thrust balance gravity and drag as well", False)
+    trimmed: key_types.Flag = key(
+        "gravity and drag balanced", "lift and thrust balance gravity and drag as well", False
+    )
 
 
 class Flight(Target):
@@ -147,27 +151,27 @@ class Flight(Target):
     )
 
     @cross_check
-    def _phases_in_order(self) -> Iterator[At]:
+    def _phases_in_order(self) -> Iterator[CheckError]:
         starts = [phase.start_s for phase in self.phases]
         if starts[0] != 0:
-            yield at("phases.0.start_s", "must be 0")
+            yield check_error("phases.0.start_s", "must be 0")
         if any(b <= a for a, b in pairwise(starts)):
-            yield at("phases", "must follow one another in time")
+            yield check_error("phases", "must follow one another in time")
 
     @cross_check
-    def _moves(self) -> Iterator[At]:
+    def _moves(self) -> Iterator[CheckError]:
         if self.velocity_mps == (0, 0, 0):
-            yield at("velocity_mps", "must not be zero")
+            yield check_error("velocity_mps", "must not be zero")
 
 
-class Recorded(Target):
+class RecordedFlight(Target):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
     kind: Literal["recorded"] = key("kind", "a flight from a CSV file with columns t_s, x_m, y_m, z_m")
-    file: Annotated[str, fields.DataFile()] = key("file", "path of the file, relative to this one")
+    file: Annotated[str, marks.DataFile()] = key("file", "path of the file, relative to this one")
 
 
-AnyTarget = Annotated[Flight | Recorded, Field(discriminator="kind")]
+AnyTarget = Annotated[Flight | RecordedFlight, Field(discriminator="kind")]
 
 
 class MotionModel(Model):
@@ -183,20 +187,20 @@ class MotionModel(Model):
     )
 
 
-Column = Annotated[tuple[fields.Probability, ...], Field(min_length=1, max_length=MOST_MODELS)]
+Column = Annotated[tuple[key_types.Probability, ...], Field(min_length=1, max_length=MOST_MODELS)]
 
 
 class Filter(Model):
     """A Kalman filter, or several that share what they know."""
 
-    name: Annotated[Name, Display()] = key("name", "label; every filter has its own")
+    name: Annotated[Name, DisplayMark()] = key("name", "label; every filter has its own")
     family: Literal["kalman", "gpb1", "imm", "gpb2"] = key(
         "family of filters", "one model; or MMA1 (GPB1), MMA2 (IMM), MMA3 (GPB2) of the paper"
     )
     models: Annotated[tuple[MotionModel, ...], Field(min_length=1, max_length=MOST_MODELS)] = key(
         "motion models", "the bank of motion models, one to five; kalman has one"
     )
-    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS), fields.ColumnsOfOne()] = key(
+    transition: Annotated[tuple[Column, ...], Field(min_length=1, max_length=MOST_MODELS), marks.ColumnsOfOne()] = key(
         "transition probabilities",
         "transition probabilities: row i, column j from model j to model i; columns sum to one",
         ((1.0,),),
@@ -215,43 +219,43 @@ class Filter(Model):
     )
 
     @cross_check
-    def _family_fits(self) -> Iterator[At]:
+    def _family_fits(self) -> Iterator[CheckError]:
         size = len(self.models)
         if self.family == "kalman" and size != 1:
-            yield at("models", f"kalman has one model, got {size}; take imm, gpb1 or gpb2")
+            yield check_error("models", f"kalman has one model, got {size}; take imm, gpb1 or gpb2")
 
     @cross_check
-    def _transition_fits(self) -> Iterator[At]:
+    def _transition_fits(self) -> Iterator[CheckError]:
         size = len(self.models)
         if len(self.transition) != size or any(len(row) != size for row in self.transition):
-            yield at("transition", f"must be {size} rows of {size} probabilities, one for each model")
+            yield check_error("transition", f"must be {size} rows of {size} probabilities, one for each model")
             return
         columns = [sum(row[j] for row in self.transition) for j in range(size)]
         if any(abs(total - 1) > COLUMN_TOLERANCE for total in columns):
             by_rows = all(abs(sum(row) - 1) <= COLUMN_TOLERANCE for row in self.transition)
             hint = "; its rows do: transpose it" if by_rows else ""
-            yield at("transition", f"its columns must sum to one (column j: from model j){hint}")
+            yield check_error("transition", f"its columns must sum to one (column j: from model j){hint}")
 
 
-class Keys(fields.Study):
+class Keys(study_keys.StudyKeys):
     """Multiple-model filters on an aeroballistic target."""
 
     figure_names = ("trajectory", "sigma_y", "sigma_vy", "probabilities", "families", "cost", "consistency")
 
     sensor: Sensor = key("sensor", "the radar")
-    target: Annotated[AnyTarget, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    target: Annotated[AnyTarget, marks.Scenario()] = key("target", "the target: a scenario's stem, or inline")
     filters: Annotated[
-        tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(fields.unique_names), Design()
+        tuple[Filter, ...], Field(min_length=1, max_length=32), AfterValidator(study_keys.unique_names), DesignMark()
     ] = key("filters", "the filters; all see the same plots")
-    baseline: fields.Baseline = fields.BASELINE
-    start_acceleration_mps2: Annotated[NonNegative, Design()] = key(
+    baseline: study_keys.Baseline = study_keys.BASELINE
+    start_acceleration_mps2: Annotated[NonNegative, DesignMark()] = key(
         "σ of the acceleration at the start of a track",
         "spread of the acceleration that the start of a track allows for, m/s²",
         30.0,
     )
-    scans: Annotated[int | None, fields.Whole(4, MOST_SCANS), Design()] = key(
+    scans: Annotated[int | None, key_types.WholeNumber(4, MOST_SCANS), DesignMark()] = key(
         "number of scans", "number of plots; default: to the end of the flight", None
     )
-    report_every: Annotated[int, fields.Whole(1, MOST_SCANS), Design()] = key(
+    report_every: Annotated[int, key_types.WholeNumber(1, MOST_SCANS), DesignMark()] = key(
         "every n-th scan reported", "tables and figures contain every n-th scan and the last; stages use all scans", 1
     )

@@ -1,5 +1,6 @@
-"""P2's figures: the flight (1-4), σ of height and its rate (5, 6), probabilities (7), families × rules, cost,
-consistency."""
+"""P2's figures: the flight, σ of height and its rate, probabilities, families × rules, cost, consistency.
+
+The flight is figures 1–4 of the paper, σ of height and of its rate figures 5 and 6, the probabilities figure 7."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,9 +11,10 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language import listed, numeral, term, tr
-from radarsim.report import panels, seen, tables, wording
-from radarsim.report.drawing import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import join_names, term, tr
+from radarsim.report import captions, case_selection, figure_lines, key_labels, math_text, panel_layout, tables, wording
+from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 
 if TYPE_CHECKING:
@@ -46,7 +48,7 @@ def figures(
     """All figures for which there are results, by name; each shows the cases that the config names for it."""
 
     def visible_results(name: str) -> list[CaseResult]:
-        return panels.shown(results, panels.named(experiment, name))[0]
+        return case_selection.select_cases(results, case_selection.cases_for_figure(experiment, name))[0]
 
     figures_by_name: dict[str, Figure | None] = {}
     for component in SIGMAS:
@@ -67,7 +69,7 @@ def _figure_of_panels(
     """A figure of one panel, or of several in two columns, or three if that fills the page better."""
     if not figure_panels:
         return None
-    width = panels.WIDE_MM if len(figure_panels) == 1 else PAGE_MM
+    width = panel_layout.WIDE_MM if len(figure_panels) == 1 else PAGE_MM
     columns = 1 if len(figure_panels) == 1 else 3 if len(figure_panels) in (3, 5, 6, 9, 12) else 2
     return Figure(name, title, caption, tuple(figure_panels), columns, width, height)
 
@@ -102,7 +104,7 @@ def _legend_keys(result: CaseResult, **changes: Any) -> tuple[tuple[str, Style],
 
 def _with_legend(panels_without_legend: Sequence[Panel], result: CaseResult, **changes: Any) -> list[Panel]:
     """Panels with a common legend in its own cell; changes: see `_legend_keys`."""
-    with_legend = panels.in_legend(panels_without_legend)
+    with_legend = panel_layout.with_legend_cell(panels_without_legend)
     if _has_many_filters(result):
         with_legend[-1] = replace(with_legend[-1], keys=_legend_keys(result, **changes))
     return with_legend
@@ -112,16 +114,16 @@ def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
     """The title that distinguishes a case: its swept values if all cases are of one config, else its label."""
     if len(results) == 1:
         return ""
-    if len(panels.families(results)) > 1:
-        return panels.label(result).replace("_", " ")
+    if len(case_selection.group_by_config(results)) > 1:
+        return key_labels.case_label(result).replace("_", " ")
     return ", ".join(_value(result, key, value) for key, value in result.swept)
 
 
 def _value(result: CaseResult, key: str, value: object) -> str:
     """A swept value in words: a number with its symbol and unit, a choice by its name."""
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return f"{panels.symbol_of(result, key)} = {panels.with_its_unit(result, key, value)}"
-    return panels.with_its_unit(result, key, value)
+        return f"{key_labels.key_symbol(result, key)} = {key_labels.value_with_unit(result, key, value)}"
+    return key_labels.value_with_unit(result, key, value)
 
 
 def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
@@ -140,9 +142,14 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     stage_lines = _stage_lines(list(flights.values()))
     axes = (
         (Axis(tr("east $z$, km")), Axis(tr("north $x$, km")), tr("1  ground track"), ()),
-        (panels.time_axis(), Axis(tr("height $y$, km"), limits=(0, None)), tr("2  height"), stage_lines),
-        (panels.time_axis(), Axis(tr("speed, m/s"), limits=(0, None)), tr("3  speed"), stage_lines),
-        (panels.time_axis(), Axis(tr("acceleration, m/s²"), limits=(0, None)), tr("4  acceleration"), stage_lines),
+        (panel_layout.time_axis(), Axis(tr("height $y$, km"), limits=(0, None)), tr("2  height"), stage_lines),
+        (panel_layout.time_axis(), Axis(tr("speed, m/s"), limits=(0, None)), tr("3  speed"), stage_lines),
+        (
+            panel_layout.time_axis(),
+            Axis(tr("acceleration, m/s²"), limits=(0, None)),
+            tr("4  acceleration"),
+            stage_lines,
+        ),
     )
     lines[1:] = [_without_labels(panel_lines) for panel_lines in lines[1:]]
     flight_panels = [
@@ -156,7 +163,7 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
         "{name}: ground range from {begin:.0f} to {end:.0f} km, height up to {height:.0f} km, "
         "acceleration up to {acceleration:.0f} m/s². ",
         **{
-            "name": track.name or track.label or panels.plain_label(results[0]),
+            "name": track.name or track.label or key_labels.plain_case_label(results[0]),
             "begin": float(ground_range_km[0]),
             "end": float(ground_range_km[-1]),
         },
@@ -205,7 +212,7 @@ def _stage_lines(results: Sequence[CaseResult], letters: int = LETTERS_ACROSS) -
         return ()
     marks: list[Reference | Note] = [Reference(end, "x") for end in ends]
     for stage, (begin, end) in zip(stages, pairwise([0.0, *ends, last]), strict=True):
-        if wording.letters_in(name := tr(stage.name)) <= letters * (end - begin) / last:
+        if math_text.letters_in(name := tr(stage.name)) <= letters * (end - begin) / last:
             marks.append(Note((begin + end) / 2, np.nan, name, "top"))
     return tuple(marks)
 
@@ -219,12 +226,12 @@ def _stages_sentence(figure_panels: Sequence[Panel], results: Sequence[CaseResul
     (shared_stages,) = stages if len(stages) == 1 else ((),)
     if len(shared_stages) < 2 or min(filter(None, name_counts), default=0) >= len(shared_stages):
         return ""
-    return " " + tr("Stages in order: {names}.", names=listed([tr(stage.name) for stage in shared_stages]))
+    return " " + tr("Stages in order: {names}.", names=join_names([tr(stage.name) for stage in shared_stages]))
 
 
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
     """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case."""
-    rows = tables.groups(curves[curves["component"] == component], "case", "filter")
+    rows = tables.group_by(curves[curves["component"] == component], "case", "filter")
     quantity, symbol, unit = SIGMAS[component]
     sigma_panels = []
     for result in results:
@@ -232,10 +239,14 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         for f, style in zip(result.axes.filters, _styles(result), strict=True):
             filter_rows = rows.get((result.name, f))
             if filter_rows is not None:
-                marks.append(panels.line(filter_rows, panels.SIGMA[:4], panels.literal(f), replace(style, marker=None)))
-        y = Axis(panels.sigma_of(symbol, unit), "log")
+                marks.append(
+                    figure_lines.line_from_rows(
+                        filter_rows, figure_lines.SIGMA[:4], key_labels.escape_dollars(f), replace(style, marker=None)
+                    )
+                )
+        y = Axis(key_labels.sigma_axis_label(symbol, unit), "log")
         sigma_panels.append(
-            Panel(panels.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1)
+            Panel(panel_layout.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1)
         )
     if len(sigma_panels) > 1:
         sigma_panels = _with_legend(sigma_panels, results[0], marker=None)
@@ -262,12 +273,12 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
 def _with_paper_number(figure: Figure | None, results: Sequence[CaseResult], number: str) -> Figure | None:
     """The figure with its number in the paper, if it is of the paper's experiment."""
     is_of_paper = figure is not None and all(result.name == "multimodel" for result in results)
-    return seen.with_figure_number(figure, number) if figure and is_of_paper else figure
+    return captions.with_figure_number(figure, number) if figure and is_of_paper else figure
 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
     """Mean probabilities of the models against time (figure 7), a panel for each filter of two or more models."""
-    rows = tables.groups(table, "case", "filter", "model")
+    rows = tables.group_by(table, "case", "filter", "model")
     probability_panels: list[Panel] = []
     for result in results:
         for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
@@ -281,19 +292,27 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
             for m, motion in enumerate(_motions(options.models)):
                 columns = ("t_s", "probability", "probability_lo", "probability_hi")
                 model_rows = rows[(result.name, name, m + 1)]
-                marks.append(panels.line(model_rows, columns, f"{m + 1} {motion}", Style(m, m)))
-            title = panels.literal(name) if len(results) == 1 else f"{_title(result, results)}: {panels.literal(name)}"
+                marks.append(figure_lines.line_from_rows(model_rows, columns, f"{m + 1} {motion}", Style(m, m)))
+            title = (
+                key_labels.escape_dollars(name)
+                if len(results) == 1
+                else f"{_title(result, results)}: {key_labels.escape_dollars(name)}"
+            )
             probability_panels.append(
                 Panel(
-                    panels.time_axis(), Axis(tr("mean probability"), limits=(0, 1)), tuple(marks), title, direct=False
+                    panel_layout.time_axis(),
+                    Axis(tr("mean probability"), limits=(0, 1)),
+                    tuple(marks),
+                    title,
+                    direct=False,
                 )
             )
     banks = {tuple(mark.label for mark in panel.marks if isinstance(mark, Line)) for panel in probability_panels}
     titles = [panel.title for panel in probability_panels]
-    left_out = panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS))
-    probability_panels = panels.spread_out(probability_panels, panels.MOST_PANELS)
+    left_out = case_selection.left_out_remark(titles, case_selection.pick_evenly(titles, case_selection.MAX_PANELS))
+    probability_panels = case_selection.pick_evenly(probability_panels, case_selection.MAX_PANELS)
     if len(probability_panels) > 2 and len(banks) == 1:
-        probability_panels = panels.in_legend(probability_panels)
+        probability_panels = panel_layout.with_legend_cell(probability_panels)
     caption = (
         tr(
             "Mean posterior probabilities of the models; the numbers after the motions are the spreads of "
@@ -312,7 +331,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
 def families(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | None:
     """σ of the height by family and merging rule, a map for each stage; needs at least two of each."""
     heat_panels = []
-    rows = tables.groups(tables.where(tables_by_name["stages"], component="y"), "case", "stage")
+    rows = tables.group_by(tables.select_rows(tables_by_name["stages"], component="y"), "case", "stage")
     for result in results:
         filter_by_design = {
             (options.family, options.merge): name
@@ -331,14 +350,14 @@ def families(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure |
             y = Axis(tr("family"), ticks=tuple(enumerate(map(tr, FAMILIES.values()))))
             title = ": ".join(filter(None, (_title(result, results), tr(str(stage)))))
             heat_panels.append(
-                Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, panels.sigma_of("$y$", "m")),), title)
+                Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, key_labels.sigma_axis_label("$y$", "m")),), title)
             )
     caption = tr(
         "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
     )
     titles = [panel.title for panel in heat_panels]
-    caption += panels.left_out(titles, panels.spread_out(titles, panels.MOST_PANELS))
-    heat_panels = panels.spread_out(heat_panels, panels.MOST_PANELS)
+    caption += case_selection.left_out_remark(titles, case_selection.pick_evenly(titles, case_selection.MAX_PANELS))
+    heat_panels = case_selection.pick_evenly(heat_panels, case_selection.MAX_PANELS)
     return _figure_of_panels("families", tr("Families and merging rules"), caption, heat_panels, 52)
 
 
@@ -347,8 +366,8 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
     if not results:
         return None
     result = results[0]
-    operations = tables.groups(tables_by_name["operations"], "case", "stage", "filter")
-    rows = tables.where(tables_by_name["stages"], case=result.name, component="y")
+    operations = tables.group_by(tables_by_name["operations"], "case", "stage", "filter")
+    rows = tables.select_rows(tables_by_name["stages"], case=result.name, component="y")
     cost_panels = []
     max_operations = (
         tables_by_name["operations"].loc[tables_by_name["operations"]["case"] == result.name, "operations"].max()
@@ -360,13 +379,13 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
             style = replace(styles[row["filter"]], dash=None, size_pt=4.5)
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
-            marks.append(Line(count, value, panels.literal(row["filter"]), style, lo, hi))
+            marks.append(Line(count, value, key_labels.escape_dollars(row["filter"]), style, lo, hi))
         x = Axis(tr("operations per update"), limits=(0, 1.06 * float(max_operations)))
-        y = Axis(panels.sigma_of("$y$", "m"), "log")
+        y = Axis(key_labels.sigma_axis_label("$y$", "m"), "log")
         cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     points = [mark for mark in cost_panels[-1].marks if isinstance(mark, Line)]
     min_operations, best = min(float(point.x[0]) for point in points), min(points, key=lambda point: float(point.y[0]))
-    cheapest = listed([point.label for point in points if float(point.x[0]) == min_operations])
+    cheapest = join_names([point.label for point in points if float(point.x[0]) == min_operations])
     headline = tr(
         "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
         **{"cheap": cheapest, "count": min_operations, "stage": cost_panels[-1].title},
@@ -392,7 +411,10 @@ MOTIONS = {"uniform": term("uniform"), "accelerated": term("accelerated"), "stil
 def _case_sentence(result: CaseResult, results: Sequence[CaseResult]) -> str:
     """A sentence that names the case shown, if there are several."""
     return (
-        tr(" For {plain_label}; the other cases are only in the tables.", plain_label=panels.plain_label(result))
+        tr(
+            " For {plain_label}; the other cases are only in the tables.",
+            plain_label=key_labels.plain_case_label(result),
+        )
         if len(results) > 1
         else ""
     )
@@ -408,7 +430,7 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
     if not results:
         return None
     result = results[0]
-    rows = tables.groups(table[table["case"] == result.name], "filter")
+    rows = tables.group_by(table[table["case"] == result.name], "filter")
     consistency_panels = []
     for key, title in (("nees", tr("NEES of the position")), ("nis", tr("NIS of the plot"))):
         marks: list = [Reference(1.0)]
@@ -420,7 +442,11 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
                 n - (len(result.axes.filters) - 1) / 2
             )
             columns = ("x", key, f"{key}_lo", f"{key}_hi")
-            marks.append(panels.line(filter_rows.assign(x=x), columns, panels.literal(f), replace(style, dash=None)))
+            marks.append(
+                figure_lines.line_from_rows(
+                    filter_rows.assign(x=x), columns, key_labels.escape_dollars(f), replace(style, dash=None)
+                )
+            )
         axis = Axis(tr("stage"), ticks=tuple(enumerate(stages)))
         consistency_panels.append(
             Panel(axis, Axis(tr("mean per degree of freedom"), "log"), tuple(marks), title, direct=False)

@@ -1,28 +1,36 @@
-"""P2 (Sychev & Osipov 2023): multiple-model filters on an aeroballistic target, families × merging rules."""
+"""P2's study: the plan of a case, its banks of models and stages, and the sums of a block of realisations."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Axes, Layout
+from radarsim.engine.results import Axes
+from radarsim.engine.sums import Layout
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.multimodel import world as filters
+from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Keys
-from radarsim.studies.multimodel.kernels import records, strip
-from radarsim.studies.multimodel.world import intervals, plot_truth, sensor_frame, truth
+from radarsim.studies.multimodel.kernels import layout as kernels_layout
+from radarsim.studies.multimodel.kernels import plots
+from radarsim.studies.multimodel.kernels import sums as kernels_sums
+from radarsim.studies.multimodel.scenario import intervals, plot_truth, sensor_frame, true_states
 from radarsim.studies.noise import noise_key
 
 COMPONENTS = tuple(
     (f"{prefix}{axis}", unit) for axis in "xyz" for prefix, unit in (("", "m"), ("v", "m/s"), ("a", "m/s2"))
 )
 BLOCK = 64  # eight groups of eight; 0.1 s with six filters and 3725 scans
-FAMILIES = {"kalman": records.KALMAN, "gpb1": records.GPB1, "imm": records.IMM, "gpb2": records.GPB2}
+FAMILIES = {
+    "kalman": kernels_layout.KALMAN,
+    "gpb1": kernels_layout.GPB1,
+    "imm": kernels_layout.IMM,
+    "gpb2": kernels_layout.GPB2,
+}
 RULES = {
-    "moment": records.MOMENT,
-    "best": records.BEST,
-    "combined": records.COMBINED,
-    "modified_combined": records.MODIFIED,
+    "moment": kernels_layout.MOMENT,
+    "best": kernels_layout.BEST,
+    "combined": kernels_layout.COMBINED,
+    "modified_combined": kernels_layout.MODIFIED,
 }
 
 
@@ -38,42 +46,45 @@ class FlightAxes(Axes):
 
 @dataclass(frozen=True)
 class Plan:
-    """The data for simulating a block; see `kernels.records` for the arrays."""
+    """The data for simulating a block; see `kernels.layout` for the arrays."""
 
     layout: Layout
     axes: FlightAxes
-    world: records.World
-    banks: records.Banks
+    world: kernels_layout.World
+    banks: kernels_layout.Banks
     block: int = BLOCK
     gaussian = False
 
 
-def banks(spec: Keys, times: np.ndarray) -> records.Banks:
+def banks(spec: Keys, times: np.ndarray) -> kernels_layout.Banks:
     """The filters' arrays, padded to multiples of eight, for the distinct intervals times (U,) in s."""
     count = len(spec.filters)
     numbers, models = np.zeros((count, 8), dtype=np.int64), np.zeros((count, 16))
-    transitions = np.zeros((count, -(-len(times) * records.MAX_MODELS**2 // 8) * 8))
+    transitions = np.zeros((count, -(-len(times) * kernels_layout.MAX_MODELS**2 // 8) * 8))
     probabilities = np.zeros((count, 8))
     for f, options in enumerate(spec.filters):
-        size, T = len(options.models), filters.transition_matrix(options.transition)
-        numbers[f, records.FAMILY] = FAMILIES[options.family]
-        numbers[f, records.MERGE], numbers[f, records.OUTPUT_RULE] = RULES[options.merge], RULES[options.output]
-        numbers[f, records.AT_PREDICTION] = options.covariance_at == "prediction"
-        numbers[f, records.SIZE] = size
-        bank = filters.model_rows(
+        size, T = len(options.models), model_bank.transition_matrix(options.transition)
+        numbers[f, kernels_layout.FAMILY] = FAMILIES[options.family]
+        numbers[f, kernels_layout.MERGE], numbers[f, kernels_layout.OUTPUT_RULE] = (
+            RULES[options.merge],
+            RULES[options.output],
+        )
+        numbers[f, kernels_layout.AT_PREDICTION] = options.covariance_at == "prediction"
+        numbers[f, kernels_layout.SIZE] = size
+        bank = model_bank.model_rows(
             [m.motion for m in options.models], [m.sigma_acceleration_mps2 for m in options.models]
         )
         models[f, : bank.size] = bank.ravel()
-        powers = filters.transition_powers(T, times / options.transition_interval_s)
+        powers = model_bank.transition_powers(T, times / options.transition_interval_s)
         transitions[f, : powers.size] = powers.ravel()
-        probabilities[f, :size] = filters.stationary(T)
-    return records.Banks(numbers, models, transitions, probabilities)
+        probabilities[f, :size] = model_bank.stationary(T)
+    return kernels_layout.Banks(numbers, models, transitions, probabilities)
 
 
 def stages(spec: Keys, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The stage of each scan (K,), and lengths (S, 2): scans of a stage from the third on, and the reported ones."""
     stage = np.searchsorted(np.array(spec.target.stage_ends_s), t, side="right").astype(np.int64)
-    in_track = np.arange(len(t)) >= records.START
+    in_track = np.arange(len(t)) >= kernels_layout.START
     in_stage = stage == np.arange(len(spec.target.stages))[:, None]
     counts = [(in_stage & in_track).sum(axis=1), (in_stage & in_track & reported).sum(axis=1)]
     return stage, np.stack(counts, axis=1) * 1.0
@@ -82,13 +93,13 @@ def stages(spec: Keys, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray,
 def prepare(case: Case) -> Plan:
     """The plan of a case: truth, sensor, filters' banks, labels. Raises ConfigError for an impossible flight."""
     spec = case.spec
-    t, x = truth(case)
+    t, x = true_states(case)
     scan = np.arange(len(t))
-    reported = scan >= records.START
+    reported = scan >= kernels_layout.START
     reported &= ((scan + 1) % spec.report_every == 0) | (scan == len(t) - 1)
     stage, lengths = stages(spec, t, reported)
     index, times = intervals(t)
-    world = records.World(
+    world = kernels_layout.World(
         keys=np.stack([noise_key(case, "plots"), noise_key(case, "detections")]),
         frame=sensor_frame(spec.sensor),
         plot_truth=plot_truth(case, t, x),
@@ -99,16 +110,16 @@ def prepare(case: Case) -> Plan:
         report_index=(np.cumsum(reported) - 1).astype(np.int64),
         stage=stage,
         lengths=lengths,
-        weights=filters.start_weights(t[: records.START], spec.start_acceleration_mps2),
+        weights=model_bank.start_weights(t[: kernels_layout.START], spec.start_acceleration_mps2),
     )
-    shapes = records.shapes(len(spec.filters), int(reported.sum()), len(lengths))
+    shapes = kernels_layout.shapes(len(spec.filters), int(reported.sum()), len(lengths))
     return Plan(Layout(**shapes), axes(spec, t, world, lengths), world, banks(spec, times))
 
 
-def axes(spec: Keys, t: np.ndarray, world: records.World, lengths: np.ndarray) -> FlightAxes:
+def axes(spec: Keys, t: np.ndarray, world: kernels_layout.World, lengths: np.ndarray) -> FlightAxes:
     """Labels of the sums; this study has no exact values."""
     reported = world.reported.astype(bool)
-    shape = (len(spec.filters), int(reported.sum()), records.STATES)
+    shape = (len(spec.filters), int(reported.sum()), kernels_layout.STATES)
     names = tuple(f.name for f in spec.filters)
     unknown = np.full(shape, np.nan)
     return FlightAxes(
@@ -140,9 +151,9 @@ def _simulate_block(plan: Plan, first: int, count: int, kept_errors: int) -> tup
     """Sums of one block, and the errors (F, K, 9, n) of kept_errors realisations, n a multiple of eight."""
     values = np.zeros(plan.layout.size)
     arrays = plan.layout.unpack(values)
-    sums = records.Sums(*(arrays[name] for name in records.Sums._fields))
-    memory = strip.block_memory(len(plan.banks.numbers), len(plan.world.lengths), len(plan.axes.k), kept_errors)
-    strip.simulate_block(plan.world, plan.banks, memory, sums, plan.axes.baseline, first, count)
+    sums = kernels_layout.Sums(*(arrays[name] for name in kernels_layout.Sums._fields))
+    memory = kernels_sums.block_memory(len(plan.banks.numbers), len(plan.world.lengths), len(plan.axes.k), kept_errors)
+    kernels_sums.simulate_block(plan.world, plan.banks, memory, sums, plan.axes.baseline, first, count)
     return values, memory.errors
 
 
@@ -151,8 +162,10 @@ def simulate_plots(plan: Plan, first: int) -> tuple[np.ndarray, np.ndarray, np.n
 
     In m and m²; detections are 0 or 1. The covariances are packed (xx, xy, xz, yy, yz, zz)."""
     world, count = plan.world, len(plan.world.truth)
-    plot_rows = rows(count * records.PLOT)
-    strip.fill_plots(world.keys, world.frame, world.plot_truth, records.START, first, rows(strip.RANDOM), plot_rows)
-    cells = plot_rows.reshape(count, records.PLOT, WIDTH)
-    covariance = slice(records.COVARIANCE, records.DETECTED)
-    return cells[:, : records.COVARIANCE], cells[:, covariance], cells[:, records.DETECTED]
+    plot_rows = rows(count * kernels_layout.PLOT)
+    plots.fill_plots(
+        world.keys, world.frame, world.plot_truth, kernels_layout.START, first, rows(plots.RANDOM), plot_rows
+    )
+    cells = plot_rows.reshape(count, kernels_layout.PLOT, WIDTH)
+    covariance = slice(kernels_layout.COVARIANCE, kernels_layout.DETECTED)
+    return cells[:, : kernels_layout.COVARIANCE], cells[:, covariance], cells[:, kernels_layout.DETECTED]

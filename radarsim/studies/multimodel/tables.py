@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import notes, statistics
+from radarsim.report import consistency_tables, interval_notes, statistics
 from radarsim.report import tables as report_tables
 from radarsim.studies.multimodel import cost as costs
-from radarsim.studies.multimodel import world
-from radarsim.studies.multimodel.kernels.records import MERGED, MERGES, NEES, NIS
+from radarsim.studies.multimodel import model_bank
+from radarsim.studies.multimodel.kernels.layout import MERGED, MERGES, NEES, NIS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from radarsim.report.row_notes import RowNote
     from radarsim.studies.multimodel.study import FlightAxes
 
-table = report_tables.Tables()
+table = report_tables.TableMakers()
 FREEDOM = 3  # degrees of freedom of a position's or a plot's normalised error squared
 
 
@@ -32,7 +32,7 @@ def _probabilities(result: CaseResult) -> report_tables.Columns:
     probability ±: mean over the realisations
     motion: the model in words
     """
-    axes, models = result.axes, [world.labels(options.models) for options in result.spec.filters]
+    axes, models = result.axes, [model_bank.model_labels(options.models) for options in result.spec.filters]
     filter_models = [(f, m) for f, labels in enumerate(models) for m in range(len(labels)) if len(labels) > 1]
     scans = len(axes.k)
     f = np.repeat([f for f, _ in filter_models], scans).astype(int)
@@ -41,7 +41,7 @@ def _probabilities(result: CaseResult) -> report_tables.Columns:
     sums = np.asarray(result.sums["probability"])[f, k, m]
     mean_probability = statistics.probability(sums[:, 0], sums[:, 1], result.count)
     return {
-        **report_tables.leading(result, f, k, model=m + 1),
+        **report_tables.label_columns(result, f, k, model=m + 1),
         "n": np.full(f.size, result.count),
         "probability": mean_probability,
         "motion": np.array([models[a][b] for a, b in zip(f, m, strict=True)], dtype=object),
@@ -75,8 +75,8 @@ def stage_gain(result: CaseResult, f: int, base: int, s: int, c: int) -> statist
 def _heavy_note(is_heavy: bool, is_baseline_heavy: bool) -> "RowNote | str":
     """The note on a row whose σ, or whose baseline's σ, few realisations decide; empty for others."""
     if is_heavy:
-        return notes.HEAVY
-    return notes.HEAVY.about("gain") if is_baseline_heavy else ""
+        return interval_notes.HEAVY_TAILS
+    return interval_notes.HEAVY_TAILS.about("gain") if is_baseline_heavy else ""
 
 
 @table("stages")
@@ -88,7 +88,7 @@ def _stages(result: CaseResult) -> report_tables.Columns:
     rows, axes, b = [], result.axes, result.axes.baseline
     stage_numbers = {name: s for s, name in enumerate(stage_names(result))}
     square, fourth = np.moveaxis(np.asarray(result.sums["stage"]), -1, 0)
-    is_heavy = statistics.effective(square, fourth, result.count) < notes.EFFECTIVE
+    is_heavy = statistics.effective(square, fourth, result.count) < interval_notes.MIN_EFFECTIVE
     no_gain = statistics.Estimate(np.nan, np.nan, np.nan)
     for f, label in enumerate(axes.filters):
         for stage, begin, end in stage_bounds(result):
@@ -103,7 +103,7 @@ def _stages(result: CaseResult) -> report_tables.Columns:
                     "note": _heavy_note(is_heavy[f, s, c], is_heavy[b, s, c]),
                 }
                 rows.append(row)
-    return report_tables.of_rows(rows)
+    return report_tables.columns_from_rows(rows)
 
 
 @table("consistency")
@@ -121,12 +121,14 @@ def _consistency(result: CaseResult) -> report_tables.Columns:
     columns: dict[str, np.ndarray] = {}
     for quantity, mean_index in (("nees", NEES), ("nis", NIS)):
         total, square = sums[:, mean_index, 0] / FREEDOM, sums[:, mean_index, 1] / FREEDOM**2
-        bounds = notes.bounds_from_spread(total, square, n, len(sums))
+        bounds = consistency_tables.bounds_from_spread(total, square, n, len(sums))
         means = [statistics.mean_square(*pair, n) for pair in zip(total, square, strict=True)]
-        columns |= notes.normalised(quantity, statistics.Estimate(*np.transpose(means)), bounds)
+        columns |= consistency_tables.normalised_square_columns(
+            quantity, statistics.Estimate(*np.transpose(means)), bounds
+        )
     return {
-        **report_tables.leading(
-            result, np.repeat(np.arange(filters), s.size), stage=report_tables.names(names, np.tile(s, filters))
+        **report_tables.label_columns(
+            result, np.repeat(np.arange(filters), s.size), stage=report_tables.pick_names(names, np.tile(s, filters))
         ),
         "n": np.full(len(sums), n),
         **columns,
@@ -156,7 +158,7 @@ def _operations(result: "CaseResult[FlightAxes]") -> report_tables.Columns:
                 "operations": fixed + per_hypothesis * merged + per_merge * merges,
             }
             rows.append(row | counts)
-    return report_tables.of_rows(rows)
+    return report_tables.columns_from_rows(rows)
 
 
 tables = table.made
@@ -169,10 +171,10 @@ def cost(tables_by_name: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -
     measured = run.get("seconds_per_update")
     if not measured:
         return None
-    operation_rows = report_tables.where(tables_by_name["operations"], stage="whole")
+    operation_rows = report_tables.select_rows(tables_by_name["operations"], stage="whole")
     table = operation_rows[["case", "filter", "family", "merge", "models", "operations"]].reset_index(drop=True)
     table["measured, ns"] = [1e9 * measured[c][f] for c, f in zip(table["case"], table["filter"], strict=True)]
-    height = report_tables.where(tables_by_name["stages"], component="y")
+    height = report_tables.select_rows(tables_by_name["stages"], component="y")
     wide = height.pivot(index=["case", "filter"], columns="stage", values="sigma")
     stages = list(dict.fromkeys(height["stage"]))
     wide = wide[stages].rename(columns={stage: f"σ of y, {stage}, m" for stage in stages})

@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
-    from radarsim.studies.floor import Floor
+    from radarsim.studies.floors.bound import Floor
     from radarsim.studies.pulses_to_tracks.config import Keys
     from radarsim.studies.pulses_to_tracks.study import Plan
 
@@ -81,19 +81,19 @@ class PulsesToTracks(Study):
         return figures.DRAWN_FROM
 
     def question(self, experiment: "Experiment") -> str:
-        from radarsim.studies.pulses_to_tracks import words
+        from radarsim.studies.pulses_to_tracks import answer
 
-        return words.question(experiment)
+        return answer.question(experiment)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.pulses_to_tracks import words
+        from radarsim.studies.pulses_to_tracks import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
-        from radarsim.studies.pulses_to_tracks import words
+        from radarsim.studies.pulses_to_tracks import answer
 
-        return words.warnings(experiment)
+        return answer.warnings(experiment)
 
 
 STUDY = PulsesToTracks()

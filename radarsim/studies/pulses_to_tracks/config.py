@@ -6,9 +6,13 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from radarsim.config import fields
-from radarsim.config.document import short
-from radarsim.config.fields import NEAREST_M, At, Design, Display, Lasting, Model, Positive, Whole, at, cross_check, key
+from radarsim.config import cross_checks, key_types, marks, radial_keys, study_keys
+from radarsim.config.cross_checks import CheckError, check_error, cross_check
+from radarsim.config.error_list import short_number
+from radarsim.config.key_types import Positive, WholeNumber, key
+from radarsim.config.marks import DesignMark, DisplayMark
+from radarsim.config.model import Model
+from radarsim.config.radial_keys import MIN_RANGE_M, TimedStudyKeys
 from radarsim.constants import Band
 
 MAX_SCANS = 1000  # each scan has its own windows
@@ -19,16 +23,20 @@ MAX_HYPOTHESES = 1000
 HYPOTHESIS_DEFAULTS = {"prune_below": 1e-6, "estimate": "mean"}  # of filters that keep several hypotheses
 SEQUENCES = ("sequence", "dense", "cured")
 Target = Annotated[
-    fields.Polynomial | fields.AccelerationStart | fields.Turn | fields.FlyBy | fields.Recorded,
+    radial_keys.Polynomial
+    | radial_keys.AccelerationStart
+    | radial_keys.Turn
+    | radial_keys.FlyBy
+    | radial_keys.RecordedTarget,
     Field(discriminator="kind"),
 ]
 
 
-class Radar(fields.InBand):
+class Radar(radial_keys.WaveBandKeys):
     """A surveillance radar: wavelength, accuracy of a range, period of its scans. Its velocity comes from the burst."""
 
-    name: Annotated[fields.Name | None, Display()] = key("name", "display name", None)
-    band: Annotated[Band | None, Display()] = key(
+    name: Annotated[key_types.Name | None, DisplayMark()] = key("name", "display name", None)
+    band: Annotated[Band | None, DisplayMark()] = key(
         "band", "wave band, for display: by its wavelength, or by its letter (IEEE Std 521)", None
     )
     wavelength_m: Positive = key("wavelength", "wavelength, m", symbol="λ")
@@ -44,7 +52,7 @@ class Burst(Model):
         "pulse repetition rate, Hz; the velocity is folded modulo λ/2 times this rate",
         symbol="F_r",
     )
-    pulses: Annotated[int, Whole(MIN_PULSES, MAX_PULSES)] | None = key(
+    pulses: Annotated[int, WholeNumber(MIN_PULSES, MAX_PULSES)] | None = key(
         "pulses of a burst", "number of pulses; or give pulses_per_second", None, symbol="N"
     )
     pulses_per_second: Positive | None = key(
@@ -58,7 +66,7 @@ class Burst(Model):
         "length of a pulse, s: the matched filter loses sinc² of it times the Doppler frequency",
         symbol="t_p",
     )
-    snr_db: Annotated[fields.Number, Field(ge=-60, le=100)] = key(
+    snr_db: Annotated[key_types.Number, Field(ge=-60, le=100)] = key(
         "signal-to-noise ratio of a pulse",
         "ratio of the power of the echo to that of the noise in the sample of a pulse, dB",
         unit="dB",
@@ -71,14 +79,16 @@ class Burst(Model):
     )
 
     @cross_check
-    def _one_number(self) -> Iterator[At]:
+    def _one_number(self) -> Iterator[CheckError]:
         if (self.pulses is None) == (self.pulses_per_second is None):
-            yield at("pulses", "give either pulses or pulses_per_second")
+            yield check_error("pulses", "give either pulses or pulses_per_second")
 
     @cross_check
-    def _pulse_fits(self) -> Iterator[At]:
+    def _pulse_fits(self) -> Iterator[CheckError]:
         if self.pulse_length_s * self.repetition_rate_hz > 1:
-            yield at("pulse_length_s", f"must be <= 1/repetition_rate_hz, {short(1 / self.repetition_rate_hz)} s")
+            yield check_error(
+                "pulse_length_s", f"must be <= 1/repetition_rate_hz, {short_number(1 / self.repetition_rate_hz)} s"
+            )
 
 
 class Prior(Model):
@@ -104,11 +114,11 @@ class Forecast(Model):
 class Filter(Model):
     """A Kalman filter of ranges, and of an estimator's numbers from the burst."""
 
-    name: Annotated[fields.Name, Display()] = key("name", "label; every filter has its own")
+    name: Annotated[key_types.Name, DisplayMark()] = key("name", "label; every filter has its own")
     observes: tuple[Literal["range", "velocity", "acceleration"], ...] = key(
         "observes", "measurements that it uses: [range], [range, velocity] or [range, velocity, acceleration]"
     )
-    manoeuvre_variance: fields.NonNegative = key(
+    manoeuvre_variance: key_types.NonNegative = key(
         "manoeuvre variance",
         "variance of the random jerk it allows for, (m/s³)²; as in P1, not during its initial scans",
         symbol="D_M",
@@ -132,7 +142,7 @@ class Filter(Model):
         "covariance), or a forecast of fixed accuracy; default: track",
         None,
     )
-    derivatives: Annotated[int, Whole(0, MAX_DERIVATIVES)] | None = key(
+    derivatives: Annotated[int, WholeNumber(0, MAX_DERIVATIVES)] | None = key(
         "derivatives estimated",
         "derivatives of the Doppler frequency that are estimated; default: 1 with the acceleration, else 0 (it is "
         "then taken as forecast)",
@@ -157,13 +167,13 @@ class Filter(Model):
         only={"use": "mixture"},
     )
 
-    hypotheses: Annotated[int, Whole(1, MAX_HYPOTHESES)] | None = key(
+    hypotheses: Annotated[int, WholeNumber(1, MAX_HYPOTHESES)] | None = key(
         "hypotheses kept",
         "largest number of hypotheses kept on the folds of its velocities (and, in a mixture, on which "
         "bursts locked), as for folded velocity; default: 1, the fold nearest to the prediction",
         None,
     )
-    prune_below: Annotated[fields.Probability, Field(lt=1)] | None = key(
+    prune_below: Annotated[key_types.Probability, Field(lt=1)] | None = key(
         "ratio below which a hypothesis is dropped",
         "several hypotheses: one is dropped below this ratio to the best one's probability; 0: never; default: 1e-6",
         None,
@@ -178,40 +188,44 @@ class Filter(Model):
         return len(self.observes) - 1
 
     @cross_check
-    def _observes_what_there_is(self) -> Iterator[At]:
+    def _observes_what_there_is(self) -> Iterator[CheckError]:
         allowed = ("range", "velocity", "acceleration")
         if not self.observes or self.observes != allowed[: len(self.observes)]:
-            yield at("observes", "must be [range], [range, velocity] or [range, velocity, acceleration]")
+            yield check_error("observes", "must be [range], [range, velocity] or [range, velocity, acceleration]")
 
     @cross_check
-    def _keys_have_an_effect(self) -> Iterator[At]:
+    def _keys_have_an_effect(self) -> Iterator[CheckError]:
         if self.observes == ("range",):
             for name in ("estimator", "forecast", "derivatives", "use", "hypotheses", *HYPOTHESIS_DEFAULTS):
                 if getattr(self, name) is not None:
-                    yield at(name, "has no effect on range alone; leave it out")
+                    yield check_error(name, "has no effect on range alone; leave it out")
             return
         if self.estimator in ("spectrum", "fisher_bound") and self.forecast is not None:
-            yield at("forecast", f"has no effect with estimator: {self.estimator}; leave it out")
+            yield check_error("forecast", f"has no effect with estimator: {self.estimator}; leave it out")
         if self.estimator == "fisher_bound" and self.use not in (None, "as_measured"):
-            yield at("use", "must be as_measured with estimator: fisher_bound, whose estimates always lock")
+            yield check_error("use", "must be as_measured with estimator: fisher_bound, whose estimates always lock")
 
     @cross_check
-    def _folds_by_hypotheses(self) -> Iterator[At]:
+    def _folds_by_hypotheses(self) -> Iterator[CheckError]:
         if not self.takes:
             return
         if self.estimator == "fisher_bound" and self.hypotheses is not None:
-            yield at("hypotheses", "has no effect with estimator: fisher_bound, which has the true fold; leave it out")
+            yield check_error(
+                "hypotheses", "has no effect with estimator: fisher_bound, which has the true fold; leave it out"
+            )
         several = (self.hypotheses or 1) > 1
         if several and self.use == "gated":
-            yield at("use", "must be as_measured or mixture with several hypotheses, which weigh what a gate would cut")
+            yield check_error(
+                "use", "must be as_measured or mixture with several hypotheses, which weigh what a gate would cut"
+            )
         for name in HYPOTHESIS_DEFAULTS:
             if getattr(self, name) is not None and not several:
-                yield at(name, "has no effect without hypotheses: 2 or more; leave it out")
+                yield check_error(name, "has no effect without hypotheses: 2 or more; leave it out")
 
     @cross_check
-    def _acceleration_is_estimated(self) -> Iterator[At]:
+    def _acceleration_is_estimated(self) -> Iterator[CheckError]:
         if self.takes == 2 and self.derivatives == 0:
-            yield at("derivatives", "must be >= 1 for a filter that observes the acceleration")
+            yield check_error("derivatives", "must be >= 1 for a filter that observes the acceleration")
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
@@ -227,7 +241,7 @@ class Filter(Model):
         return self.model_copy(update=missing) if missing else self
 
 
-class Keys(Lasting):
+class Keys(TimedStudyKeys):
     """From pulses to tracks: which accuracy a number of pulses gives, and how much a lost lock costs."""
 
     figure_names = (
@@ -240,19 +254,19 @@ class Keys(Lasting):
     )
     most_scans = MAX_SCANS
     in_place_of: ClassVar = {
-        **Lasting.in_place_of,
+        **TimedStudyKeys.in_place_of,
         "burst.pulses": "burst.pulses_per_second",
         "burst.pulses_per_second": "burst.pulses",
     }
 
     radar: Radar = key("radar", "the radar")
     burst: Burst = key("burst", "the burst of each scan")
-    target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    target: Annotated[Target, marks.Scenario()] = key("target", "the target: a scenario's stem, or inline")
     prior: Prior = key("designation", "what is known when the track begins")
-    filters: fields.Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
-    baseline: fields.Baseline = fields.BASELINE
-    scans: Annotated[Annotated[int, Whole(2, MAX_SCANS)] | None, Design()] = fields.SCANS
-    duration_s: Annotated[Positive | None, Design()] = fields.DURATION
+    filters: study_keys.Members[Filter] = key("filters", "the filters; all see the same ranges and bursts")
+    baseline: study_keys.Baseline = study_keys.BASELINE
+    scans: Annotated[Annotated[int, WholeNumber(2, MAX_SCANS)] | None, DesignMark()] = study_keys.SCANS
+    duration_s: Annotated[Positive | None, DesignMark()] = study_keys.DURATION
 
     @property
     def pulses(self) -> int:
@@ -261,7 +275,7 @@ class Keys(Lasting):
         if burst.pulses is not None:
             return burst.pulses
         if burst.pulses_per_second is None:
-            raise fields.NotRead("pulses")
+            raise cross_checks.InvalidFieldError("pulses")
         return round(burst.pulses_per_second * self.radar.scan_period_s)
 
     @property
@@ -281,42 +295,42 @@ class Keys(Lasting):
         return self.model_copy(update=update)
 
     @cross_check
-    def _pulses_in_bounds(self) -> Iterator[At]:
+    def _pulses_in_bounds(self) -> Iterator[CheckError]:
         if self.burst.pulses is None and not MIN_PULSES <= self.pulses <= MAX_PULSES:
             bounds = f"{MIN_PULSES} to {MAX_PULSES} pulses in radar.scan_period_s, makes {self.pulses}"
-            yield at("burst.pulses_per_second", f"must be {bounds}")
+            yield check_error("burst.pulses_per_second", f"must be {bounds}")
 
     @cross_check
-    def _burst_fits_the_scan(self) -> Iterator[At]:
+    def _burst_fits_the_scan(self) -> Iterator[CheckError]:
         if self.burst_s > self.radar.scan_period_s:
-            message = f"the burst must be <= radar.scan_period_s, {short(self.radar.scan_period_s)} s"
+            message = f"the burst must be <= radar.scan_period_s, {short_number(self.radar.scan_period_s)} s"
             name = "pulses" if self.burst.pulses is not None else "pulses_per_second"
-            yield at(f"burst.{name}", f"{message}, is {short(self.burst_s)} s")
+            yield check_error(f"burst.{name}", f"{message}, is {short_number(self.burst_s)} s")
 
     @cross_check
-    def _rate_carries_the_derivatives(self) -> Iterator[At]:
+    def _rate_carries_the_derivatives(self) -> Iterator[CheckError]:
         """Refuse a burst over which the forecast acceleration could sweep the frequency past half the rate."""
         if not any(f.takes for f in self.filters):
             return
         swept_hz = 2 / self.radar.wavelength_m * SWEEP_SIGMAS * self.prior.sigma_acceleration_mps2 * self.burst_s
         if self.burst.repetition_rate_hz < 2 * swept_hz:
-            clause = (
-                f"must be >= {short(2 * swept_hz)} Hz, twice what {SWEEP_SIGMAS:g} σ of the prior's acceleration sweep"
-            )
-            yield at("burst.repetition_rate_hz", f"{clause} over the burst")
+            swept = f"twice what {SWEEP_SIGMAS:g} σ of the prior's acceleration sweep over the burst"
+            yield check_error("burst.repetition_rate_hz", f"must be >= {short_number(2 * swept_hz)} Hz, {swept}")
 
     @cross_check
-    def _enough_pulses(self) -> Iterator[At]:
-        yield from fields.of_each(self.filters, self._determined)
+    def _enough_pulses(self) -> Iterator[CheckError]:
+        yield from cross_checks.check_each(self.filters, self._determined)
 
-    def _determined(self, i: int, filter_: Filter) -> Iterator[At]:
+    def _determined(self, i: int, filter_: Filter) -> Iterator[CheckError]:
         parameters = 2 + (filter_.derivatives if filter_.derivatives is not None else max(filter_.takes - 1, 0))
         if filter_.takes and self.pulses < 2 * parameters:
             message = f"{self.pulses} pulses are too few for {parameters} parameters: at least {2 * parameters}"
-            yield at(f"filters.{i}.derivatives" if filter_.derivatives is not None else "burst.pulses", message)
+            yield check_error(
+                f"filters.{i}.derivatives" if filter_.derivatives is not None else "burst.pulses", message
+            )
 
     @cross_check
-    def _in_proportion(self) -> Iterator[At]:
+    def _in_proportion(self) -> Iterator[CheckError]:
         dt, sigma = self.radar.scan_period_s, self.radar.sigma_range_m
         for name, value in (
             ("sigma_velocity_mps", self.prior.sigma_velocity_mps * dt),
@@ -326,13 +340,15 @@ class Keys(Lasting):
                 message = (
                     "out of proportion: what it moves a target in a scan over sigma_range_m must be from 1e-6 to 1e6"
                 )
-                yield at(f"prior.{name}", message)
+                yield check_error(f"prior.{name}", message)
 
     @cross_check
-    def _target_in_reach(self) -> Iterator[At]:
+    def _target_in_reach(self) -> Iterator[CheckError]:
         target: Any = self.target
         last = (self.plots - 1) * self.radar.scan_period_s
         if not math.isfinite(target.reach_m(last)) or target.reach_m(last) > 1e12:
-            yield at("target", "must stay within 1e12 m of the radar up to the last scan")
-        elif isinstance(target, fields.Turn) and target.closest_m(last) < NEAREST_M:
-            yield at("target", f"must not fly over the radar: it comes within {short(NEAREST_M)} m of it")
+            yield check_error("target", "must stay within 1e12 m of the radar up to the last scan")
+        elif isinstance(target, radial_keys.Turn) and target.closest_m(last) < MIN_RANGE_M:
+            yield check_error(
+                "target", f"must not fly over the radar: it comes within {short_number(MIN_RANGE_M)} m of it"
+            )

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import term, tr
-from radarsim.report import panels, sweeps, tables
-from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.language.translate import term, tr
+from radarsim.report import case_selection, figure_lines, key_labels, panel_layout, sweep_figures, tables, time_figures
+from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.report.quantities import RADIAL
-from radarsim.report.statistics import FEW_EVENTS
-from radarsim.studies.pulses_to_tracks.kernels import AGES
+from radarsim.report.statistics import MIN_EVENTS
+from radarsim.studies.pulses_to_tracks.kernels.layout import AGES
 from radarsim.studies.pulses_to_tracks.tables import Result
 
 if TYPE_CHECKING:
@@ -25,10 +25,12 @@ def figures(
     results: Sequence[Result], tables_by_name: "Mapping[str, pd.DataFrame]", experiment: Experiment
 ) -> dict[str, Figure]:
     """sigma_r … gain_ar; folds; locks, measured, losses of cases without a sweep, threshold of the others."""
-    figures_by_name = panels.per_component(results, tables_by_name, RADIAL, experiment)
+    figures_by_name = time_figures.component_figures(results, tables_by_name, RADIAL, experiment)
     for name, (draw, title, caption) in STUDY_FIGURES.items():
-        unswept = [result for result in panels.unswept(results) if not result.swept]
-        visible, left_out = panels.shown(results if name == "folds" else unswept, panels.named(experiment, name))
+        unswept = [result for result in case_selection.unswept_cases(results) if not result.swept]
+        visible, left_out = case_selection.select_cases(
+            results if name == "folds" else unswept, case_selection.cases_for_figure(experiment, name)
+        )
         visible_panels = [panel for result in visible if (panel := draw(result, tables_by_name)).marks]
         if visible_panels:
             figures_by_name[name] = _figure(name, tr(title), tr(caption) + left_out, visible_panels)
@@ -37,21 +39,23 @@ def figures(
 
 
 def _figure(name: str, title: str, caption: str, figure_panels: list[Panel]) -> Figure:
-    if len(figure_panels) > 1 or any(len(panel.marks) > panels.MOST_AT_ENDS for panel in figure_panels):
-        figure_panels = panels.in_legend(figure_panels)
+    if len(figure_panels) > 1 or any(
+        len(panel.marks) > panel_layout.MAX_LINES_NAMED_AT_ENDS for panel in figure_panels
+    ):
+        figure_panels = panel_layout.with_legend_cell(figure_panels)
     columns = min(3, len(figure_panels))
     return Figure(name, title, caption, tuple(figure_panels), columns, COLUMN_MM if columns == 1 else PAGE_MM)
 
 
 def _title(result: Result) -> str:
-    return panels.swept(result) or panels.device(result)
+    return key_labels.swept_description(result) or key_labels.config_device(result)
 
 
 def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd.DataFrame]") -> dict[str, Figure]:
     """Share of bursts that locked, and σ of range at the last scan, against one swept number, for each config."""
     threshold_panels: list[Panel] = []
-    for (_, keys), members in sweeps.families(results).items():
-        x, axis = sweeps.places(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
+    for (_, keys), members in sweep_figures.group_swept_cases(results).items():
+        x, axis = sweep_figures.axis_positions(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
         if len(keys) == 1 and not axis.ticks:
             threshold_panels += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, tables_by_name)
     if not any(panel.marks for panel in threshold_panels):
@@ -62,7 +66,13 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
         "σ of the range at the last scan. Bands: 95 % intervals."
     )
     figure = Figure(
-        "threshold", tr("The threshold"), caption, tuple(panels.in_legend(threshold_panels)), 3, PAGE_MM, 60
+        "threshold",
+        tr("The threshold"),
+        caption,
+        tuple(panel_layout.with_legend_cell(threshold_panels)),
+        3,
+        PAGE_MM,
+        60,
     )
     return {"threshold": figure}
 
@@ -73,82 +83,90 @@ def _threshold_panels(
     """The two panels of cases in the order of their swept values x (n,)."""
     locks: list[Line] = []
     sigmas: list[Line] = []
-    curves = tables.groups(tables_by_name["curves"], "case", "filter", "component")
+    curves = tables.group_by(tables_by_name["curves"], "case", "filter", "component")
     for n, name in enumerate(members[0].axes.filters):
-        style, label = panels.look(n, 0, 1), panels.literal(name)
-        final_sigmas = np.array([sweeps.last(result, name, "r", curves) for result in members])
+        style, label = figure_lines.line_style(n, 0, 1), key_labels.escape_dollars(name)
+        final_sigmas = np.array([sweep_figures.final_sigma(result, name, "r", curves) for result in members])
         exact = final_sigmas[:, 3] if np.isfinite(final_sigmas[:, 3]).any() else None
         sigmas.append(Line(x, final_sigmas[:, 0], label, style, final_sigmas[:, 1], final_sigmas[:, 2], exact))
         if members[0].axes.ideal[n] >= 0:
             shares = np.array([_locked(result, tables_by_name["locks"], name) for result in members])
             locks.append(Line(x, shares[:, 0], label, style, shares[:, 1], shares[:, 2]))
-    y = panels.fitting_axis(tr("$\\sigma$ of $r$ at the end, m"), sigmas)
-    range_panel = Panel(axis, y, tuple(sigmas), panels.device(members[0]))
-    lines_of_losses = tuple(line for line in map(panels.lost, locks) if (line.y > 0).any())
-    axis_y = panels.loss_axis(tr("P(not locked)"), lines_of_losses)
+    y = panel_layout.fitting_axis(tr("$\\sigma$ of $r$ at the end, m"), sigmas)
+    range_panel = Panel(axis, y, tuple(sigmas), key_labels.config_device(members[0]))
+    lines_of_losses = tuple(line for line in map(panel_layout.complement_line, locks) if (line.y > 0).any())
+    axis_y = panel_layout.loss_axis(tr("P(not locked)"), lines_of_losses)
     return [
-        *([Panel(axis, axis_y, lines_of_losses, panels.device(members[0]))] if lines_of_losses else []),
+        *([Panel(axis, axis_y, lines_of_losses, key_labels.config_device(members[0]))] if lines_of_losses else []),
         range_panel,
     ]
 
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:
     """The least share of locks over the scans, with its interval."""
-    rows = tables.where(locks, case=result.name, filter=name)
+    rows = tables.select_rows(locks, case=result.name, filter=name)
     row = rows.iloc[int(rows["lock_rate"].to_numpy().argmin())]
     return float(row["lock_rate"]), float(row["lock_lo"]), float(row["lock_hi"])
 
 
 def _line(result: Result, name: str, rows: "pd.DataFrame", columns: Sequence[str]) -> Line:
     """A filter's line, which looks the same in every figure of its case."""
-    return panels.line(rows, columns, panels.literal(name), panels.look(result.axes.filters.index(name), 0, 1))
+    return figure_lines.line_from_rows(
+        rows, columns, key_labels.escape_dollars(name), figure_lines.line_style(result.axes.filters.index(name), 0, 1)
+    )
 
 
 def locks_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """Share of bursts that locked against time, a line for each estimator."""
-    rows = tables.groups(tables.where(tables_by_name["locks"], case=result.name), "filter")
+    rows = tables.group_by(tables.select_rows(tables_by_name["locks"], case=result.name), "filter")
     marks = []
     ideal_filters = {options.name for options in result.spec.filters if options.estimator == "fisher_bound"}
     for (name,), filter_rows in rows.items():
-        if ((1 - filter_rows["lock_rate"]) * filter_rows["n"]).sum() >= FEW_EVENTS and name not in ideal_filters:
-            marks.append(panels.lost(_line(result, name, filter_rows, ("t_s", "lock_rate", "lock_lo", "lock_hi"))))
-    y_axis = panels.loss_axis(tr("P(not locked)"), marks)
-    return Panel(panels.time_axis(), y_axis, tuple(marks), _title(result))
+        if ((1 - filter_rows["lock_rate"]) * filter_rows["n"]).sum() >= MIN_EVENTS and name not in ideal_filters:
+            marks.append(
+                panel_layout.complement_line(
+                    _line(result, name, filter_rows, ("t_s", "lock_rate", "lock_lo", "lock_hi"))
+                )
+            )
+    y_axis = panel_layout.loss_axis(tr("P(not locked)"), marks)
+    return Panel(panel_layout.time_axis(), y_axis, tuple(marks), _title(result))
 
 
 def folds_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """How often the best hypothesis has no wrong fold against time, a line for each filter that keeps several."""
-    rows = tables.groups(tables.where(tables_by_name["folds"], case=result.name), "filter")
+    rows = tables.group_by(tables.select_rows(tables_by_name["folds"], case=result.name), "filter")
     marks = [
         _line(result, name, filter_rows, ("t_s", "right", "right_lo", "right_hi"))
         for (name,), filter_rows in rows.items()
     ]
-    return Panel(panels.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
+    return Panel(panel_layout.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
 
 
 def measured_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
-    rows = tables.groups(tables.where(tables_by_name["estimates"], case=result.name, component="Vr"), "filter")
+    rows = tables.group_by(tables.select_rows(tables_by_name["estimates"], case=result.name, component="Vr"), "filter")
     columns = ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi")
     marks = [_line(result, name, filter_rows, columns) for (name,), filter_rows in rows.items()]
     if rows:
-        marks.append(panels.line(next(iter(rows.values())), ("t_s", "bound"), tr("Fisher bound"), Style(9, 1)))
-    y = panels.fitting_axis(tr("$\\sigma$ of measured $V_r$, m/s"), marks)
-    return Panel(panels.time_axis(), y, tuple(marks), _title(result))
+        marks.append(
+            figure_lines.line_from_rows(next(iter(rows.values())), ("t_s", "bound"), tr("Fisher bound"), Style(9, 1))
+        )
+    y = panel_layout.fitting_axis(tr("$\\sigma$ of measured $V_r$, m/s"), marks)
+    return Panel(panel_layout.time_axis(), y, tuple(marks), _title(result))
 
 
 def losses_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
     """σ of the range at the last scan by the scans since a burst was lost, a line for each filter that lost some."""
-    range_rows = tables.where(tables_by_name["losses"], case=result.name, component="r", k=result.axes.k[-1])
+    range_rows = tables.select_rows(tables_by_name["losses"], case=result.name, component="r", k=result.axes.k[-1])
     marks = []
-    for (name,), rows in tables.groups(range_rows, "filter").items():
+    for (name,), rows in tables.group_by(range_rows, "filter").items():
         rows = rows[rows["n"] >= MIN_REALISATIONS]
         if len(rows) > 1:
             rows = rows.assign(sigma_hi=np.minimum(rows["sigma_hi"], 1e3 * rows["sigma"]))
             marks.append(_line(result, name, rows, ("since_loss", "sigma", "sigma_lo", "sigma_hi")))
     ticks = tuple((float(age), str(age) if age < AGES - 1 else f"{age}+") for age in range(AGES))
     x_axis = Axis(tr("scans since a burst was lost"), ticks=ticks)
-    y = panels.fitting_axis(tr("$\\sigma$ of $r$ at the last scan, m"), marks)
+    y = panel_layout.fitting_axis(tr("$\\sigma$ of $r$ at the last scan, m"), marks)
     return Panel(x_axis, y, tuple(marks), _title(result))
 
 

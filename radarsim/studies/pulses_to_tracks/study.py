@@ -6,16 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.bursts.burst import Burst, NoSchedule, energy_ratio
+from radarsim.bursts.burst import Burst
+from radarsim.bursts.fisher import energy_ratio
 from radarsim.bursts.kernels.scoring import SIZE
+from radarsim.bursts.window_schedule import NoSchedule
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Layout
+from radarsim.engine.sums import Layout
 from radarsim.errors import ConfigError
-from radarsim.kernels.linear import plain
-from radarsim.physics import transition
+from radarsim.kernels.second_order import as_kernel_array
+from radarsim.physics.motion import transition
 from radarsim.studies.noise import noise_key
-from radarsim.studies.pulses_to_tracks import filters, kernels
-from radarsim.studies.pulses_to_tracks.filters import Menu, PulsesAxes
+from radarsim.studies.pulses_to_tracks import exact_errors, filter_design, scenario
+from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
+from radarsim.studies.pulses_to_tracks.kernels import block
+from radarsim.studies.pulses_to_tracks.kernels import layout as kernels_layout
+from radarsim.studies.pulses_to_tracks.window_menu import Menu
 
 COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
 BLOCK = 512  # some 0.2 s with six filters and 15 scans
@@ -29,8 +34,8 @@ class Plan:
 
     layout: Layout
     axes: PulsesAxes
-    world: kernels.World
-    filters: kernels.Filters
+    world: kernels_layout.World
+    filters: kernels_layout.Filters
     menus: tuple[Menu | None, ...]
     block: int = BLOCK
     gaussian: bool = False  # an estimate that did not lock is no Gaussian error
@@ -40,15 +45,15 @@ def prepare(case: Case) -> Plan:
     """The bursts of a case, the windows of its estimators, and the exact values of its idealisations."""
     spec = case.spec
     t = np.arange(spec.scans) * spec.radar.scan_period_s
-    truth = filters.truth(spec.target, t, case.name)
-    bursts = filters.bursts(spec, truth)
+    truth = scenario.truth(spec.target, t, case.name)
+    bursts = scenario.bursts(spec, truth)
     try:
-        design = filters.design_filters(spec, bursts)
+        design = filter_design.design_filters(spec, bursts)
     except NoSchedule as error:
         raise ConfigError(f"{case.name}: filters: no windows lead from the forecast to the burst: {error}") from None
-    defects = filters.model_defects(truth, spec.radar.scan_period_s)
+    defects = scenario.model_defects(truth, spec.radar.scan_period_s)
     return Plan(
-        layout=Layout(**kernels.shapes(len(spec.filters), spec.scans)),
+        layout=Layout(**kernels_layout.shapes(len(spec.filters), spec.scans)),
         axes=axes(spec, t, bursts, design.arrays, defects),
         world=kernel_world(case, truth, bursts, design, defects),
         filters=design.arrays,
@@ -57,8 +62,8 @@ def prepare(case: Case) -> Plan:
 
 
 def kernel_world(
-    case: Case, truth: np.ndarray, bursts: list[Burst], design: filters.FilterDesign, defects: np.ndarray
-) -> kernels.World:
+    case: Case, truth: np.ndarray, bursts: list[Burst], design: filter_design.FilterDesign, defects: np.ndarray
+) -> kernels_layout.World:
     """The kernels' arrays of the target and its bursts."""
     spec, burst, dt = case.spec, bursts[0], case.spec.radar.scan_period_s
     variances = [scan_burst.noise_variance for scan_burst in bursts]
@@ -70,11 +75,11 @@ def kernel_world(
     doppler = 2.0 * truth[:, 1] / burst.wavelength_m * burst.pulse_period_s * lines
     estimate_rows = np.zeros((2, SIZE))
     for c in range(2):
-        row = filters.centre_row(burst, SIZE, c + 1)
+        row = scenario.centre_row(burst, SIZE, c + 1)
         estimate_rows[c] = row * [math.factorial(j) / burst.duration_s**j for j in range(SIZE)]
-    return kernels.World(
-        keys=plain([noise_key(case, stream) for stream in STREAMS], 4, 2, dtype=np.uint64),
-        model_defects=plain(defects, *defects.shape),
+    return kernels_layout.World(
+        keys=as_kernel_array([noise_key(case, stream) for stream in STREAMS], 4, 2, dtype=np.uint64),
+        model_defects=as_kernel_array(defects, *defects.shape),
         motion=transition(dt)[np.array([0, 0, 1, 1, 2]), np.array([1, 2, 1, 2, 2])],
         sigma_r=float(spec.radar.sigma_range_m),
         prior=np.array([spec.prior.sigma_velocity_mps, spec.prior.sigma_acceleration_mps2]),
@@ -99,7 +104,7 @@ def uses_spectrum(spec: Any) -> bool:
 
 def turns_matrix(burst: Burst) -> np.ndarray:
     """Matrix (2, 2) from velocity and acceleration at the middle to b₁ and b₂ in turns over the burst."""
-    T, centre_s = burst.duration_s, filters.burst_centre(burst) * burst.duration_s
+    T, centre_s = burst.duration_s, scenario.burst_centre(burst) * burst.duration_s
     return 2.0 / burst.wavelength_m * np.array([[T, -centre_s * T], [0.0, 0.5 * T**2]])
 
 
@@ -117,19 +122,21 @@ def bit_reversed_order(lines: int) -> np.ndarray:
     return order
 
 
-def axes(spec: Any, t: np.ndarray, bursts: list[Burst], arrays: kernels.Filters, defects: np.ndarray) -> PulsesAxes:
+def axes(
+    spec: Any, t: np.ndarray, bursts: list[Burst], arrays: kernels_layout.Filters, defects: np.ndarray
+) -> PulsesAxes:
     """Labels, Fisher bounds, and the exact values where all errors are Gaussian."""
     shape = (len(spec.filters), spec.scans, 3)
     sigma, bias, bound = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape[:2], 2), np.nan)
     losses, max_losses = np.zeros(shape), np.zeros(len(spec.filters))
     for f, options in enumerate(spec.filters):
-        if not filters.has_exact_errors(options):
-            losses[f] = filters.lost_burst_errors(spec, options, arrays.sigma[f])
-            max_losses[f] = filters.max_loss_probability(bursts, options)
+        if not exact_errors.has_exact_errors(options):
+            losses[f] = exact_errors.lost_burst_errors(spec, options, arrays.sigma[f])
+            max_losses[f] = exact_errors.max_loss_probability(bursts, options)
         if options.takes:
             bound[f, :, : options.takes] = arrays.sigma[f, :, : options.takes]
-        if filters.has_exact_errors(options):
-            mean, covariance = filters.locked_errors(spec, options, arrays.sigma[f], defects)
+        if exact_errors.has_exact_errors(options):
+            mean, covariance = exact_errors.locked_errors(spec, options, arrays.sigma[f], defects)
             sigma[f], bias[f] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2) + mean**2), mean
     return PulsesAxes(
         filters=tuple(options.name for options in spec.filters),
@@ -164,5 +171,5 @@ def idealisation(spec: Any, options: Any) -> int:
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
     values = np.zeros(plan.layout.size)
-    kernels.simulate_block(plan.world, plan.filters, kernels.Sums(**plan.layout.unpack(values)), first, count)
+    block.simulate_block(plan.world, plan.filters, kernels_layout.Sums(**plan.layout.unpack(values)), first, count)
     return values

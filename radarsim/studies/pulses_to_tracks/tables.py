@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import panels, statistics
+from radarsim.report import key_labels, statistics
 from radarsim.report import tables as report_tables
-from radarsim.report.notes import EFFECTIVE, HEAVY
+from radarsim.report.interval_notes import HEAVY_TAILS, MIN_EFFECTIVE
 from radarsim.report.row_notes import RowNote, notes_where
-from radarsim.studies.pulses_to_tracks import kernels as rec
-from radarsim.studies.pulses_to_tracks.filters import PulsesAxes
+from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
+from radarsim.studies.pulses_to_tracks.kernels import layout
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Result = CaseResult[PulsesAxes]
-table = report_tables.Tables()
+table = report_tables.TableMakers()
 FIRST_MEASURED = 1  # number of the component that a burst's first number measures
-SIGMA_ALL_NOTE = HEAVY.about("sigma_all")  # where a few lost bursts decide the σ of all
+SIGMA_ALL_NOTE = HEAVY_TAILS.about("sigma_all")  # where a few lost bursts decide the σ of all
 # A lost burst is rare and decides σ: if a sample has none, nothing in it shows that. So the number of further losses is
 # taken to be the greatest that the sample allows (95 %), and σ is marked if they would add half of its interval.
 UNSEEN_NOTE = RowNote("unseen_losses", "bursts lost more rarely than seen here may decide")
@@ -34,7 +34,7 @@ def unseen_loss_probability(result: Result) -> np.ndarray:
     """The greatest probability (F,) of further lost bursts, beyond those seen, that the sample allows."""
     from scipy.special import chdtri
 
-    lost = (result.count - np.asarray(result.sums["locks"])[..., rec.LOCKED]).sum(axis=1)
+    lost = (result.count - np.asarray(result.sums["locks"])[..., layout.LOCKED]).sum(axis=1)
     max_lost = 0.5 * chdtri(2.0 * (lost + 1.0), 0.05) - lost
     return np.minimum(max_lost / (result.count * result.axes.k.size), result.axes.max_loss_probability)
 
@@ -93,12 +93,12 @@ def _locks(result: Result) -> report_tables.Columns:
     f, k = _scans(result, result.axes.takes > 0)
     counts, n = np.asarray(result.sums["locks"])[f, k], np.full(f.size, float(result.count))
     return {
-        **report_tables.leading(result, f, k),
+        **report_tables.label_columns(result, f, k),
         "n": n.astype(np.int64),
-        "lock_rate|lock": statistics.rate(counts[:, rec.LOCKED], n),
-        "lock_rate_3sigma": counts[:, rec.LOCKED_3] / n,
-        "taken": counts[:, rec.TAKEN] / n,
-        "wrong_fold": statistics.rate(counts[:, rec.WRONG_FOLD], n),
+        "lock_rate|lock": statistics.rate(counts[:, layout.LOCKED], n),
+        "lock_rate_3sigma": counts[:, layout.LOCKED_3] / n,
+        "taken": counts[:, layout.TAKEN] / n,
+        "wrong_fold": statistics.rate(counts[:, layout.WRONG_FOLD], n),
     }
 
 
@@ -112,11 +112,14 @@ def _estimates(result: Result) -> report_tables.Columns:
     """
     axes = result.axes
     f, c, k = np.nonzero(np.moveaxis(np.isfinite(axes.bound), 1, 2))
-    moments, locked = np.asarray(result.sums["measured"])[f, k, c], np.asarray(result.sums["locks"])[f, k, rec.LOCKED]
+    moments, locked = (
+        np.asarray(result.sums["measured"])[f, k, c],
+        np.asarray(result.sums["locks"])[f, k, layout.LOCKED],
+    )
     n = np.full(f.size, float(result.count))
-    is_heavy = statistics.effective(moments[:, 1, 0], moments[:, 1, 1], n) < EFFECTIVE
+    is_heavy = statistics.effective(moments[:, 1, 0], moments[:, 1, 1], n) < MIN_EFFECTIVE
     return {
-        **report_tables.leading(result, f, k, **report_tables.components(result, FIRST_MEASURED + c)),
+        **report_tables.label_columns(result, f, k, **report_tables.component_columns(result, FIRST_MEASURED + c)),
         "n": locked.astype(np.int64),
         "sigma": statistics.root_mean_square(moments[:, 0, 0], moments[:, 0, 1], locked),
         "sigma_all": statistics.root_mean_square(moments[:, 1, 0], moments[:, 1, 1], n),
@@ -137,7 +140,7 @@ def _losses(result: Result) -> report_tables.Columns:
     f, c, k, age = np.nonzero(np.broadcast_to(visible[:, None], (len(counts), 3, *visible.shape[1:])))
     moments, n = np.asarray(result.sums["losses"])[f, k, age, c], counts[f, k, age]
     return {
-        **report_tables.leading(result, f, k, **report_tables.components(result, c)),
+        **report_tables.label_columns(result, f, k, **report_tables.component_columns(result, c)),
         "since_loss": age,
         "n": n.astype(np.int64),
         "sigma": statistics.root_mean_square(moments[:, 0], moments[:, 1], n),
@@ -152,15 +155,19 @@ def _ideal(result: Result) -> report_tables.Columns:
     over_ideal ±: σ over the exact σ of that
     """
     axes = result.axes
-    indices = f, k, c = report_tables.shown(
+    indices = f, k, c = report_tables.row_index(
         result, np.broadcast_to((axes.ideal >= 0)[:, None, None], axes.available.shape)
     )
     moments = np.asarray(result.sums["error"])[indices]
     sigmas = statistics.errors(moments, np.full(f.size, float(result.count))).sigma
     exact = axes.exact_sigma[axes.ideal[f], k, c]
     return {
-        **report_tables.leading(
-            result, f, k, ideal=report_tables.names(axes.filters, axes.ideal[f]), **report_tables.components(result, c)
+        **report_tables.label_columns(
+            result,
+            f,
+            k,
+            ideal=report_tables.pick_names(axes.filters, axes.ideal[f]),
+            **report_tables.component_columns(result, c),
         ),
         "over_ideal": statistics.Estimate(*(value / exact for value in sigmas)),
     }
@@ -177,11 +184,11 @@ def _folds(result: Result) -> report_tables.Columns:
     f, k = _scans(result, np.array([(options.hypotheses or 1) > 1 for options in result.spec.filters]))
     counts, n = np.asarray(result.sums["folds"])[f, k], np.full(f.size, float(result.count))
     return {
-        **report_tables.leading(result, f, k),
+        **report_tables.label_columns(result, f, k),
         "n": n.astype(np.int64),
-        "right": statistics.rate(counts[:, rec.RIGHT], n),
-        "listed": counts[:, rec.LISTED] / n,
-        "hypotheses": counts[:, rec.NUMBER] / n,
+        "right": statistics.rate(counts[:, layout.RIGHT], n),
+        "listed": counts[:, layout.LISTED] / n,
+        "hypotheses": counts[:, layout.NUMBER] / n,
     }
 
 
@@ -194,7 +201,7 @@ def _passes(result: Result) -> report_tables.Columns:
     f, scans = np.flatnonzero(result.axes.takes > 0), result.axes.k.size
     pass_sums, n = np.asarray(result.sums["passes"])[f], np.full(f.size, float(result.count))
     mean_passes = statistics.mean(pass_sums[:, 0] / scans, pass_sums[:, 1] / scans**2, n)
-    return {**report_tables.leading(result, f), "passes": mean_passes}
+    return {**report_tables.label_columns(result, f), "passes": mean_passes}
 
 
 INPUTS = ("radar", "σ_r, m", "Δt, s", "λ, m", "F, Hz", "pulses", "burst, ms", "SNR a pulse, dB", "energy, dB", "D, m/s")
@@ -208,5 +215,7 @@ def inputs(results: Sequence[Result]) -> "pd.DataFrame":
         radar = spec.radar.sigma_range_m, spec.radar.scan_period_s, spec.radar.wavelength_m
         burst = spec.burst.repetition_rate_hz, spec.pulses, 1e3 * spec.burst_s, spec.burst.snr_db
         energy_range = " … ".join(dict.fromkeys(f"{value:.3g}" for value in (energy.min(), energy.max())))
-        rows[(panels.plain(panels.device(result)), *radar, *burst, energy_range, spec.span_mps)] = None
+        rows[
+            (key_labels.without_markup(key_labels.config_device(result)), *radar, *burst, energy_range, spec.span_mps)
+        ] = None
     return report_tables.frame({name: [row[i] for row in rows] for i, name in enumerate(INPUTS)})

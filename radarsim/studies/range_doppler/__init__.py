@@ -12,13 +12,13 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import Axes, CaseResult
-    from radarsim.report.drawing import Chart, Figure
+    from radarsim.report.drawing.model import Chart, Figure
     from radarsim.report.sentences import Sentence
-    from radarsim.studies.floor import Floor
+    from radarsim.studies.floors.bound import Floor
     from radarsim.studies.range_doppler.config import Keys
-    from radarsim.studies.range_doppler.given import GivenGains
+    from radarsim.studies.range_doppler.package_filters import GivenGains
+    from radarsim.studies.range_doppler.recorded_plots import RangeDopplerRecordedPlots
     from radarsim.studies.range_doppler.study import Plan
-    from radarsim.studies.range_doppler.track import Recorded
 
 
 class RangeDoppler(Study):
@@ -38,9 +38,9 @@ class RangeDoppler(Study):
         return Keys
 
     def own_filters(self) -> "type[GivenGains]":
-        from radarsim.studies.range_doppler.given import own_filters
+        from radarsim.studies.range_doppler.package_filters import package_filter_class
 
-        return own_filters()
+        return package_filter_class()
 
     def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
         return (*COMMON, *FLOORS)
@@ -51,8 +51,8 @@ class RangeDoppler(Study):
         return study.prepare(case)
 
     def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
-        modules = f"{__name__}.config", f"{__name__}.study", f"{__name__}.given"
-        return (*modules, f"{__name__}.track") if plots else modules
+        modules = f"{__name__}.config", f"{__name__}.study", f"{__name__}.package_filters"
+        return (*modules, f"{__name__}.recorded_plots") if plots else modules
 
     def simulate(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
         from radarsim.studies.range_doppler import study
@@ -67,7 +67,7 @@ class RangeDoppler(Study):
     def shortened(self, case: "Case", at_s: float | None, at_k: int | None) -> "Case":
         from radarsim.studies.range_doppler import study
 
-        return study.shortened(case, at_s, at_k)
+        return study.shorten_case(case, at_s, at_k)
 
     def exact_but_for(self, case: "Case") -> str:
         from radarsim.studies.range_doppler import study
@@ -77,7 +77,7 @@ class RangeDoppler(Study):
     def costly(self, case: "Case") -> bool:
         from radarsim.studies.range_doppler import study
 
-        return study.costly(case)
+        return study.is_costly(case)
 
     def floor(self, spec: "Keys", axes: "Axes") -> "Floor | None":
         from radarsim.studies.range_doppler import floor
@@ -122,24 +122,24 @@ class RangeDoppler(Study):
         return figures.DRAWN_FROM
 
     def question(self, experiment: "Experiment") -> str:
-        from radarsim.studies.range_doppler import words
+        from radarsim.studies.range_doppler import answer
 
-        return words.question(experiment)
+        return answer.question(experiment)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.range_doppler import words
+        from radarsim.studies.range_doppler import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
-    def recording_interface(self) -> "Recorded":
-        from radarsim.studies.range_doppler.track import Recorded
+    def recording_interface(self) -> "RangeDopplerRecordedPlots":
+        from radarsim.studies.range_doppler.recorded_plots import RangeDopplerRecordedPlots
 
-        return Recorded()
+        return RangeDopplerRecordedPlots()
 
     def chart(self, cases: "Sequence[Case]", references: "Sequence[Case]") -> "Chart":
-        from radarsim.studies.range_doppler import chart
+        from radarsim.studies.range_doppler import doppler_gain
 
-        return chart.chart(cases, references)
+        return doppler_gain.chart(cases, references)
 
 
 STUDY = RangeDoppler()

@@ -6,14 +6,18 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from radarsim.config import fields
-from radarsim.config.fields import MOST_SCANS, Added, At, Model, NonNegative, Number, Positive, at, cross_check, key
+from radarsim.config import cross_checks, key_types, marks, radial_keys, study_keys
+from radarsim.config.cross_checks import CheckError, check_error, cross_check
+from radarsim.config.key_types import NonNegative, Number, Positive, key
+from radarsim.config.marks import AddedKeyMark
+from radarsim.config.model import Model
+from radarsim.config.radial_keys import MAX_SCANS
 
-FOLDED = "study=ambiguous_doppler"  # takes the same config over
+FOLDED_STUDY = "study=ambiguous_doppler"  # takes the same config over
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
 
-class Radar(fields.Radar):
+class Radar(radial_keys.Radar):
     """A surveillance radar: accuracies of one plot, the period of its scans, and what is wrong with its plots."""
 
     repetition_rate_hz: Positive = key(
@@ -22,24 +26,24 @@ class Radar(fields.Radar):
         1000.0,
         symbol="F_r",
     )
-    detection_probability: Annotated[fields.Probability, Field(gt=0), Added()] = key(
+    detection_probability: Annotated[key_types.Probability, Field(gt=0), AddedKeyMark()] = key(
         "detection probability",
         "probability that a scan gives its plot, range and velocity together",
         1.0,
         symbol="P_D",
     )
-    bias_range_m: Annotated[Number, Added()] = key(
+    bias_range_m: Annotated[Number, AddedKeyMark()] = key(
         "bias of the measured range", "mean error of a measured range, m", 0.0
     )
-    bias_velocity_mps: Annotated[Number, Added()] = key(
+    bias_velocity_mps: Annotated[Number, AddedKeyMark()] = key(
         "bias of the measured radial velocity", "mean error of a measured velocity, m/s", 0.0
     )
-    sigma_bias_range_m: Annotated[NonNegative, Added()] = key(
+    sigma_bias_range_m: Annotated[NonNegative, AddedKeyMark()] = key(
         "σ of the random bias in range",
         "standard deviation of an additional error of range, drawn once per realisation, m",
         0.0,
     )
-    sigma_bias_velocity_mps: Annotated[NonNegative, Added()] = key(
+    sigma_bias_velocity_mps: Annotated[NonNegative, AddedKeyMark()] = key(
         "σ of the random bias in radial velocity",
         "standard deviation of an additional error of velocity, drawn once per realisation, m/s",
         0.0,
@@ -52,53 +56,54 @@ class Radar(fields.Radar):
         return self.detection_probability == 1 and not any(errors)
 
 
-class JerkPulse(fields.Starting):
+class JerkPulse(radial_keys.ManoeuvreStart):
     """A polynomial with a jerk for a while; the acceleration it has built up stays."""
 
     kind: Literal["jerk_pulse"] = key("kind", "a constant jerk for a while")
-    coefficients: fields.Coefficients = key("derivatives of the range at the first plot", fields.COEFFICIENTS)
-    jerk_mps3: Annotated[Number, Field(ge=-fields.HARDEST_MPS2, le=fields.HARDEST_MPS2)] = key(
-        "jerk", "radial jerk added during the pulse, m/s³"
+    coefficients: radial_keys.Coefficients = key("derivatives of the range at the first plot", radial_keys.COEFFICIENTS)
+    jerk_mps3: Annotated[Number, Field(ge=-radial_keys.MAX_ACCELERATION_MPS2, le=radial_keys.MAX_ACCELERATION_MPS2)] = (
+        key("jerk", "radial jerk added during the pulse, m/s³")
     )
     duration_s: Positive = key("duration", "length of the pulse, s")
 
     def reach_m(self, t: float) -> float:
         """A bound on the range up to a time t (s)."""
-        return fields.polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
+        return radial_keys.polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
 
 
-Displaced = Annotated[NonNegative, Added()]
+DisplacementSigma = Annotated[NonNegative, AddedKeyMark()]
 
 
-class Flying(Model):
+class RandomFlight(Model):
     """A flight in space with a random first state: it is displaced, and flies the same accelerations."""
 
-    sigma_position_m: Displaced = key(
+    sigma_position_m: DisplacementSigma = key(
         "σ of the first position",
         "standard deviation of each coordinate of its first position, drawn for each realisation, m",
         0.0,
     )
-    sigma_velocity_mps: Displaced = key(
+    sigma_velocity_mps: DisplacementSigma = key(
         "σ of the first velocity",
         "standard deviation of each coordinate of its first velocity, drawn for each realisation, m/s",
         0.0,
     )
 
 
-class Turn(Flying, fields.Turn):
+class Turn(RandomFlight, radial_keys.Turn):
     """Straight flight in a plane through the radar, a turn of constant load, straight flight again."""
 
 
-class FlyBy(Flying, fields.FlyBy):
+class FlyBy(RandomFlight, radial_keys.FlyBy):
     """Straight flight at a constant speed past the radar, at a distance."""
 
 
-class Recorded(Flying, fields.Recorded):
+class RecordedFlight(RandomFlight, radial_keys.RecordedTarget):
     """A flight recorded in a file, smoothed by a spline whose derivatives are the true velocity and acceleration."""
 
 
 Target = Annotated[
-    fields.Polynomial | fields.AccelerationStart | JerkPulse | Turn | FlyBy | Recorded, Field(discriminator="kind")
+    radial_keys.Polynomial | radial_keys.AccelerationStart | JerkPulse | Turn | FlyBy | RecordedFlight,
+    Field(discriminator="kind"),
 ]
 Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
 
@@ -110,30 +115,32 @@ class Best(Model):
     over: Literal["worst", "mean", "last"] = key(
         "taken over scans as", "value over the scans from from_k on: the greatest, their mean, or the last"
     )
-    from_k: Annotated[int, fields.Whole(1, MOST_SCANS)] = key("first scan that counts", "first scan that counts", 3)
+    from_k: Annotated[int, key_types.WholeNumber(1, MAX_SCANS)] = key(
+        "first scan that counts", "first scan that counts", 3
+    )
 
 
 class FilterKeys(Model):
     """What every filter has, those of packages too: what it observes, and a start by least squares."""
 
-    name: Annotated[fields.Name, fields.Display()] = key("name", "label; every filter has its own")
+    name: Annotated[key_types.Name, marks.DisplayMark()] = key("name", "label; every filter has its own")
     kind: str = key("kind", "which filter it is")
     observes: tuple[Literal["range", "velocity"], ...] = key(
         "observed quantities", "measurements that it uses: [range] or [range, velocity]"
     )
-    initial_scans: Annotated[int, fields.Whole(2, MOST_SCANS)] | None = key(
+    initial_scans: Annotated[int, key_types.WholeNumber(2, MAX_SCANS)] | None = key(
         "plots in the initialisation",
         "plots in its least-squares start; default and least: 3 for range, 2 with velocity",
         None,
     )
 
     @cross_check
-    def _can_start(self) -> Iterator[At]:
+    def _can_start(self) -> Iterator[CheckError]:
         if self.observes not in (("range",), ("range", "velocity")):
-            yield at("observes", "must be [range] or [range, velocity]")
+            yield check_error("observes", "must be [range] or [range, velocity]")
         elif self.plots_to_start < PLOTS_NEEDED[len(self.observes)]:
             min_plots = PLOTS_NEEDED[len(self.observes)]
-            yield at(
+            yield check_error(
                 "initial_scans", f"must be >= {min_plots} for a filter that observes {' and '.join(self.observes)}"
             )
 
@@ -150,7 +157,7 @@ class FilterKeys(Model):
 class Filter(FilterKeys):
     """A second-order Kalman filter started by least squares."""
 
-    kind: Annotated[Literal["kalman"], Added()] = key("kind", "the Kalman filter of the study", "kalman")
+    kind: Annotated[Literal["kalman"], AddedKeyMark()] = key("kind", "the Kalman filter of the study", "kalman")
     manoeuvre_variance: Positive | Best = key(
         "manoeuvre variance",
         "variance of the random jerk it allows for, (m/s³)²: D_M; or the error that it minimises",
@@ -166,12 +173,12 @@ class Filter(FilterKeys):
     )
 
 
-def variance_of(filter_keys: FilterKeys) -> float | Best:
+def configured_variance(filter_keys: FilterKeys) -> float | Best:
     """A filter's D_M, (m/s³)²; not-a-number where it has none, as one of a package may."""
     return getattr(filter_keys, "manoeuvre_variance", math.nan)
 
 
-class Keys(fields.Lasting):
+class Keys(radial_keys.TimedStudyKeys):
     """Range alone against range and radial velocity."""
 
     figure_names = (
@@ -181,50 +188,52 @@ class Keys(fields.Lasting):
     )
 
     radar: Radar = key("radar", "the radar")
-    target: Annotated[Target, fields.Scenario()] = key("target", "the target: a scenario's stem, or inline")
-    filters: fields.Members[Filter] = key("filters", "the filters; all see the same plots")
-    baseline: fields.Baseline = fields.BASELINE
-    scans: Annotated[Annotated[int, fields.Whole(2, MOST_SCANS)] | None, fields.Design()] = fields.SCANS
-    duration_s: Annotated[Positive | None, fields.Design(), Added()] = fields.DURATION
+    target: Annotated[Target, marks.Scenario()] = key("target", "the target: a scenario's stem, or inline")
+    filters: study_keys.Members[Filter] = key("filters", "the filters; all see the same plots")
+    baseline: study_keys.Baseline = study_keys.BASELINE
+    scans: Annotated[Annotated[int, key_types.WholeNumber(2, MAX_SCANS)] | None, marks.DesignMark()] = study_keys.SCANS
+    duration_s: Annotated[Positive | None, marks.DesignMark(), AddedKeyMark()] = study_keys.DURATION
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
         return self.model_copy(update={"scans": self.plots, "duration_s": None})
 
     @cross_check
-    def _long_enough(self) -> Iterator[At]:
-        starts = fields.readable(self.filters, lambda filter_keys: (filter_keys.plots_to_start, filter_keys.name))
+    def _long_enough(self) -> Iterator[CheckError]:
+        starts = cross_checks.valid_values(
+            self.filters, lambda filter_keys: (filter_keys.plots_to_start, filter_keys.name)
+        )
         plots, slowest = max(starts, key=lambda start: start[0], default=(0, ""))
         if self.plots < plots:
             duration_key = "scans" if self.duration_s is None else "duration_s"
             unit_text = "" if duration_key == "scans" else " scans of radar.scan_period_s"
-            yield at(duration_key, f"must be >= {plots}{unit_text} for the initialisation of filter {slowest}")
-        yield from fields.of_each(self.filters, self._counts_from)
+            yield check_error(duration_key, f"must be >= {plots}{unit_text} for the initialisation of filter {slowest}")
+        yield from cross_checks.check_each(self.filters, self._counts_from)
 
-    def _counts_from(self, i: int, filter_keys: FilterKeys) -> Iterator[At]:
-        best = variance_of(filter_keys)
+    def _counts_from(self, i: int, filter_keys: FilterKeys) -> Iterator[CheckError]:
+        best = configured_variance(filter_keys)
         if isinstance(best, Best) and not isinstance(filter_keys, Filter):
-            yield at(
+            yield check_error(
                 f"filters.{i}.manoeuvre_variance",
                 f"must be a number: the best one of kind {filter_keys.kind} is not known",
             )
         elif isinstance(best, Best) and best.from_k > self.plots:
-            yield at(f"filters.{i}.manoeuvre_variance.from_k", f"must be <= the number of scans, {self.plots}")
+            yield check_error(f"filters.{i}.manoeuvre_variance.from_k", f"must be <= the number of scans, {self.plots}")
 
     @cross_check
-    def _of_every_plot(self) -> Iterator[At]:
-        yield from fields.of_each(self.filters, self._sees_every_plot)
+    def _of_every_plot(self) -> Iterator[CheckError]:
+        yield from cross_checks.check_each(self.filters, self._sees_every_plot)
 
-    def _sees_every_plot(self, i: int, filter_keys: FilterKeys) -> Iterator[At]:
+    def _sees_every_plot(self, i: int, filter_keys: FilterKeys) -> Iterator[CheckError]:
         if not isinstance(filter_keys, Filter) and self.radar.detection_probability < 1:
             message = (
                 f"must be 1 with filter {filter_keys.name}: "
                 f"gains of kind {filter_keys.kind} are made for a plot at every scan"
             )
-            yield at("radar.detection_probability", message)
+            yield check_error("radar.detection_probability", message)
 
     @cross_check
-    def _accuracies_in_proportion(self) -> Iterator[At]:
+    def _accuracies_in_proportion(self) -> Iterator[CheckError]:
         """Refuse accuracies of which one makes the other meaningless.
 
         Beyond these limits the steady covariance drowns in rounding (SciPy's solver gives up at 1e15).
@@ -232,31 +241,31 @@ class Keys(fields.Lasting):
         radar = self.radar
         if not 1e-12 <= (radar.sigma_range_m / (radar.scan_period_s * radar.sigma_velocity_mps)) ** 2 <= 1e12:
             ratio = "(sigma_range_m / scan_period_s / sigma_velocity_mps)²"
-            yield at("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
+            yield check_error("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
 
     @cross_check
-    def _variances_in_proportion(self) -> Iterator[At]:
+    def _variances_in_proportion(self) -> Iterator[CheckError]:
         """The same of manoeuvre variances."""
         if not any(True for _ in self._accuracies_in_proportion()):  # else that is the fault
-            yield from fields.of_each(self.filters, self._in_proportion)
+            yield from cross_checks.check_each(self.filters, self._in_proportion)
 
-    def _in_proportion(self, i: int, filter_keys: FilterKeys) -> Iterator[At]:
-        variance = variance_of(filter_keys)
+    def _in_proportion(self, i: int, filter_keys: FilterKeys) -> Iterator[CheckError]:
+        variance = configured_variance(filter_keys)
         if isinstance(variance, Best) or math.isnan(variance):
             return
         radar, dt = self.radar, self.radar.scan_period_s
         name = f"filters.{i}.manoeuvre_variance"
         if not 1e-28 <= variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
             ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
-            yield at(name, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
+            yield check_error(name, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
         elif "velocity" in filter_keys.observes and variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
             ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
-            yield at(name, f"out of proportion: {ratio} must be <= 1e12")
+            yield check_error(name, f"out of proportion: {ratio} must be <= 1e12")
 
     @cross_check
-    def _within_reach(self) -> Iterator[At]:
+    def _within_reach(self) -> Iterator[CheckError]:
         last = (self.plots - 1) * self.radar.scan_period_s
-        yield from fields.within_reach(self.target, self.radar, last)
+        yield from radial_keys.range_errors(self.target, self.radar, last)
 
 
 def can_fold(spec: Keys) -> bool:
@@ -264,7 +273,7 @@ def can_fold(spec: Keys) -> bool:
     target, has_study_filters = spec.target, all(isinstance(filter_keys, Filter) for filter_keys in spec.filters)
     has_random_flight = any(getattr(target, name, 0) for name in ("sigma_position_m", "sigma_velocity_mps"))
     noises = {getattr(filter_keys, "process_noise", "") for filter_keys in spec.filters}
-    has_fixed_variances = all(isinstance(variance_of(filter_keys), float) for filter_keys in spec.filters)
+    has_fixed_variances = all(isinstance(configured_variance(filter_keys), float) for filter_keys in spec.filters)
     radar = spec.radar.model_copy(update={"detection_probability": 1.0})
     return (
         has_study_filters

@@ -8,12 +8,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language import tr
-from radarsim.report import panels, seen, tables, wording
-from radarsim.report.drawing import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.language.translate import tr
+from radarsim.report import (
+    captions,
+    case_selection,
+    consistency_figures,
+    figure_lines,
+    key_labels,
+    panel_layout,
+    tables,
+    time_figures,
+    wording,
+)
+from radarsim.report.drawing.model import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
+from radarsim.report.drawing.scales import Scale
+from radarsim.report.math_text import plain_text
 from radarsim.report.quantities import RADIAL
-from radarsim.report.scales import Scale
-from radarsim.report.wording import spoken
 from radarsim.studies.range_doppler.tables import PERIODS, Result
 
 if TYPE_CHECKING:
@@ -22,84 +32,104 @@ if TYPE_CHECKING:
 DRAWN_FROM = {"settling": ("steady",)}
 
 
-OF_THE_PAPER = "range_doppler"  # the config whose figures show what the paper's show
-NUMBERS = {
+PAPER_CONFIG = "range_doppler"  # the config whose figures show what the paper's show
+FIGURE_NUMBERS = {
     **{"sigma_r": "1a", "gain_r": "1b", "sigma_Vr": "2a", "gain_Vr": "2b"},
     **{"sigma_ar": "3a", "gain_ar": "3b"},
 }
 
 
-def figures(results: Sequence[Result], made: "Mapping[str, pd.DataFrame]", experiment: Experiment) -> dict[str, Figure]:
-    """sigma_r … gain_ar (the paper's figures 1a … 3b), and `settling` where the manoeuvre variance is swept."""
-    drawn = panels.per_component(results, made, RADIAL, experiment)
-    if experiment.stem == OF_THE_PAPER:
-        drawn |= {name: seen.with_figure_number(drawn[name], NUMBERS[name]) for name in drawn if name in NUMBERS}
-    some = [result for result in results if result.name in set(panels.named(experiment, "settling"))]
-    figure = settling_figure(some, made["steady"])
-    drawn |= {"settling": figure} if figure else {}
-    some, left_out = panels.shown_families(panels.unswept(results), panels.named(experiment, "consistency"))
-    drawn |= {"consistency": consistency_figure(some, made["consistency"], left_out)} if some else {}
-    return {name: one for name, one in drawn.items() if one}
+def figures(
+    results: Sequence[Result], tables_by_name: "Mapping[str, pd.DataFrame]", experiment: Experiment
+) -> dict[str, Figure]:
+    """The figures sigma_r … gain_ar (1a … 3b of the paper), and `settling` where the manoeuvre variance is swept."""
+    figures_by_name = time_figures.component_figures(results, tables_by_name, RADIAL, experiment)
+    if experiment.stem == PAPER_CONFIG:
+        figures_by_name |= {
+            name: captions.with_figure_number(figures_by_name[name], FIGURE_NUMBERS[name])
+            for name in figures_by_name
+            if name in FIGURE_NUMBERS
+        }
+    settling_names = set(case_selection.cases_for_figure(experiment, "settling"))
+    settling_cases = [result for result in results if result.name in settling_names]
+    if figure := settling_figure(settling_cases, tables_by_name["steady"]):
+        figures_by_name["settling"] = figure
+    selected_cases, left_out = case_selection.select_cases_by_panel(
+        case_selection.unswept_cases(results), case_selection.cases_for_figure(experiment, "consistency")
+    )
+    if selected_cases:
+        figures_by_name["consistency"] = consistency_figure(selected_cases, tables_by_name["consistency"], left_out)
+    return {name: drawing for name, drawing in figures_by_name.items() if drawing}
 
 
 def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:
     """NEES per component against time: a panel for each radar or swept value, of several radars for each filter."""
-    rows = tables.groups(table, "case", "filter")
+    rows = tables.group_by(table, "case", "filter")
     if len(results) == 1 or any(result.swept for result in results):
-        nees = {(*key, "nees"): own for key, own in rows.items()}
-        drawn = panels.nees_panels(results, nees)
+        nees = {(*key, "nees"): filter_rows for key, filter_rows in rows.items()}
+        panels = consistency_figures.nees_panels(results, nees)
     else:
         names = list(dict.fromkeys(name for result in results for name in result.axes.filters))
-        drawn = [_consistency_panel(results, rows, name) for name in names]
-    return panels.nees_figure(drawn, left_out)
+        panels = [_consistency_panel(results, rows, name) for name in names]
+    return consistency_figures.nees_figure(panels, left_out)
 
 
-BEST = 7  # marker of the best manoeuvre variance
-ROOM = 1.5  # above and below all points of a logarithmic axis, as a factor
-LETTER, HIGH, TOUCHING = 0.031, 0.09, 0.02  # of a label, as shares of a panel; how near points share one
-MOST_NAMED = 2  # cases that are named at the ends of lines in half a page
+BEST_MARKER = 7  # marker of the best manoeuvre variance
+AXIS_MARGIN_FACTOR = 1.5  # above and below all points of a logarithmic axis, as a factor
+LETTER_WIDTH, LABEL_HEIGHT, TOUCHING_DISTANCE = (
+    0.031,
+    0.09,
+    0.02,
+)  # of a label, as shares of a panel; how near points share one
+MAX_NAMED_CASES = 2  # cases that are named at the ends of lines in half a page
 
 
 def _consistency_panel(results: Sequence[Result], rows: dict[Any, Any], name: str) -> Panel:
     marks: list = [Reference(1)]
     for i, result in enumerate(results):
         if (result.name, name) in rows:
-            marks.append(panels.line(rows[result.name, name], ("t_s", "nees"), panels.label(result), i))
-    y, title = panels.fitting_axis(tr(panels.NEES), marks), panels.literal(name)
-    return Panel(panels.time_axis(), y, tuple(marks), title, direct=len(results) <= MOST_NAMED)
+            marks.append(
+                figure_lines.line_from_rows(rows[result.name, name], ("t_s", "nees"), key_labels.case_label(result), i)
+            )
+    y, title = panel_layout.fitting_axis(tr(consistency_figures.NEES), marks), key_labels.escape_dollars(name)
+    return Panel(panel_layout.time_axis(), y, tuple(marks), title, direct=len(results) <= MAX_NAMED_CASES)
 
 
 def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure | None:
     """Steady σ of the range against its settling time over D_M, with the ten-period line and the best D_M named."""
     rows = table[table["component"] == "r"]
-    drawn: list[Panel] = []
+    panels: list[Panel] = []
     steady = rows[np.isfinite(rows["settling_s"])]["steady_sigma"]
-    up = float(steady.min()) / ROOM, float(steady.max()) * ROOM
-    for title, members in panels.by_panel(results, np.inf).items():
-        own = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(["filter", "manoeuvre_variance"])
-        if own["manoeuvre_variance"].nunique() > 1:
-            drawn.append(_settling_panel(title, members[0], own, up))
-    titles = [panel.title for panel in drawn]
-    drawn = panels.spread_out(drawn, panels.MOST_PANELS)
-    if not drawn:
+    sigma_limits = float(steady.min()) / AXIS_MARGIN_FACTOR, float(steady.max()) * AXIS_MARGIN_FACTOR
+    for title, members in case_selection.group_by_panel(results, np.inf).items():
+        radar_rows = rows[rows["case"].isin([r.name for r in members])].drop_duplicates(
+            ["filter", "manoeuvre_variance"]
+        )
+        if radar_rows["manoeuvre_variance"].nunique() > 1:
+            panels.append(_settling_panel(title, members[0], radar_rows, sigma_limits))
+    titles = [panel.title for panel in panels]
+    panels = case_selection.pick_evenly(panels, case_selection.MAX_PANELS)
+    if not panels:
         return None
-    caption = _best_settled(drawn) + tr(
+    caption = _best_settled(panels) + tr(
         "Steady σ of the range against its settling time, both exact (within 5 % of the steady value, "
         "for good); grey lines join equal manoeuvre variances D_M, labelled in (m/s³)². Dotted: ten scan "
         "periods, the paper's limit; star: the least steady error within it. Filters that do not settle "
         "within the run are named and left out."
     )
-    caption += panels.left_out(titles, [panel.title for panel in drawn])
-    return panels.in_columns(Figure("settling", tr("Steady error against settling time"), caption, tuple(drawn)))
+    caption += case_selection.left_out_remark(titles, [panel.title for panel in panels])
+    return panel_layout.arrange_columns(
+        Figure("settling", tr("Steady error against settling time"), caption, tuple(panels))
+    )
 
 
-def _best_settled(drawn: Sequence[Panel]) -> str:
+def _best_settled(panels: Sequence[Panel]) -> str:
     """The least steady error within the paper's limit, of all panels."""
     stars = [
         (mark, panel)
-        for panel in drawn
+        for panel in panels
         for mark in panel.marks
-        if isinstance(mark, Line) and len(mark.y) and mark.style.marker == BEST
+        if isinstance(mark, Line) and len(mark.y) and mark.style.marker == BEST_MARKER
     ]
     if not stars:
         return tr("Nothing settles within {periods} scan periods. ", periods=PERIODS)
@@ -107,83 +137,103 @@ def _best_settled(drawn: Sequence[Panel]) -> str:
     name = ", ".join(filter(None, (panel.title, star.name)))
     return tr(
         "Least steady σ within {periods} scan periods: {sigma} m ({name}). ",
-        **{"periods": PERIODS, "sigma": wording.number(float(star.y[0]), 3), "name": spoken(name)},
+        **{"periods": PERIODS, "sigma": wording.number(float(star.y[0]), 3), "name": plain_text(name)},
     )
 
 
-def _settling_panel(title: str, result: Result, rows: "pd.DataFrame", up: tuple[float, float]) -> Panel:
-    """rows: of one radar and the range, one for each filter and manoeuvre variance; up: limits of the axis of y."""
+def _settling_panel(title: str, result: Result, rows: "pd.DataFrame", sigma_limits: tuple[float, float]) -> Panel:
+    """Steady σ against settling time for one radar.
+
+    rows: σ of the range, one row for each filter and manoeuvre variance; sigma_limits: limits of the axis of y."""
     settled = rows[np.isfinite(rows["settling_s"])]
     limit = PERIODS * result.axes.scan_period_s
     longest = max([limit, *settled["settling_s"]])
-    across = -0.04 * longest, 1.15 * longest
+    time_limits = -0.04 * longest, 1.15 * longest
     marks: list = [Reference(limit, "x")]
     points: list[tuple[float, float, str]] = []
-    for variance, same in settled.sort_values("steady_sigma").groupby("manoeuvre_variance"):
-        t, sigma = same["settling_s"].to_numpy(), same["steady_sigma"].to_numpy()
+    for variance, variance_rows in settled.sort_values("steady_sigma").groupby("manoeuvre_variance"):
+        t, sigma = variance_rows["settling_s"].to_numpy(), variance_rows["steady_sigma"].to_numpy()
         marks.append(Line(t, sigma, "", Style(GREY, 0, width_pt=0.5)))
-        points.append((float(t[-1]), float(sigma[-1]), panels.number(float(variance), powers=True)))
-    marks += _labels(points, limit, Scale(False, *across, 0.0, 1.0), Scale(True, *up, 0.0, 1.0))
+        points.append((float(t[-1]), float(sigma[-1]), key_labels.format_value(float(variance), powers=True)))
+    marks += _labels(points, limit, Scale(False, *time_limits, 0.0, 1.0), Scale(True, *sigma_limits, 0.0, 1.0))
     keys = []
     for n, name in enumerate(result.axes.filters):
-        own = settled[settled["filter"] == name].sort_values("manoeuvre_variance")
-        best, style = own[own["best"]], Style(n, n, n)
-        words, star = panels.literal(name), Style(n, None, BEST, size_pt=8)
-        marks.append(Line(own["settling_s"].to_numpy(), own["steady_sigma"].to_numpy(), "", style, name=words))
-        at = best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy()
-        marks.append(Line(*at, "", star, name=tr("{words}: best $D_M$", words=words)))
-        keys.append((panels.literal(name), style))
+        filter_rows = settled[settled["filter"] == name].sort_values("manoeuvre_variance")
+        best, style = filter_rows[filter_rows["best"]], Style(n, n, n)
+        label, star = key_labels.escape_dollars(name), Style(n, None, BEST_MARKER, size_pt=8)
+        marks.append(
+            Line(filter_rows["settling_s"].to_numpy(), filter_rows["steady_sigma"].to_numpy(), "", style, name=label)
+        )
+        best_point = best["settling_s"].to_numpy(), best["steady_sigma"].to_numpy()
+        marks.append(Line(*best_point, "", star, name=tr("{words}: best $D_M$", words=label)))
+        keys.append((key_labels.escape_dollars(name), style))
     keys += [
-        (tr("best $D_M$"), Style(0, None, BEST, size_pt=8)),
+        (tr("best $D_M$"), Style(0, None, BEST_MARKER, size_pt=8)),
         (tr("{periods} scan periods", periods=PERIODS), Style(GREY, 2, width_pt=0.7)),
     ]
-    x = Axis(tr("settling time of $\\sigma$ of $r$, s"), limits=across)
-    y, words = Axis(tr("steady $\\sigma$ of $r$, m"), "log", up), tr("at the points: $D_M$, (m/s³)²")
+    x = Axis(tr("settling time of $\\sigma$ of $r$, s"), limits=time_limits)
+    y, key_title = Axis(tr("steady $\\sigma$ of $r$, m"), "log", sigma_limits), tr("at the points: $D_M$, (m/s³)²")
     remark = _not_settled(rows[~np.isfinite(rows["settling_s"])])
-    return Panel(x, y, tuple(marks), title, tuple(keys), words, direct=False, remark=remark)
+    return Panel(x, y, tuple(marks), title, tuple(keys), key_title, direct=False, remark=remark)
 
 
 def _labels(points: Sequence[tuple[float, float, str]], limit: float, x: Scale, y: Scale) -> list[Note]:
-    """Labels of points (x, y, words), at their right or their left: as few as possible meet a label, curve or limit.
-    Points at one place share a label."""
+    """Labels of points (x, y, text), to the right or left so that few meet another label, a curve or the limit.
+
+    Points that nearly coincide share a label."""
     joined: list[tuple[float, float, str]] = []
-    for t, sigma, words in sorted(points):
-        if joined and math.dist(*((x.position(u), y.position(v)) for u, v, *_ in ((t, sigma), joined[-1]))) < TOUCHING:
-            joined[-1] = (*joined[-1][:2], f"{joined[-1][2]}, {words}")
+    for t, sigma, label in sorted(points):
+        if (
+            joined
+            and math.dist(*((x.position(u), y.position(v)) for u, v, *_ in ((t, sigma), joined[-1])))
+            < TOUCHING_DISTANCE
+        ):
+            joined[-1] = (*joined[-1][:2], f"{joined[-1][2]}, {label}")
         else:
-            joined.append((t, sigma, words))
+            joined.append((t, sigma, label))
     line = (float(x.position(limit)),) * 2 + (0.0, 1.0)  # left, right, lower and upper edge, as shares of the panel
-    ways: list[tuple[float, list[Note], tuple[float, ...]]] = [(0.0, [], (-1.0,) * 4)]  # the best, by the last label
-    before = 0.0, 0.0
-    for t, sigma, words in joined:
-        u, v, wide = float(x.position(t)), float(y.position(sigma)), LETTER * len(words)
-        steep = (before[1] - v) * wide > TOUCHING * (u - before[0])  # a curve that falls from the left is in the way
-        own = ("ne", (u, u + wide, v, v + HIGH), 0.0), ("nw", (u - wide, u, v, v + HIGH), steep + 0.1 + 9 * (u < wide))
-        ways = [
+    layouts: list[tuple[float, list[Note], tuple[float, ...]]] = [(0.0, [], (-1.0,) * 4)]  # the best, by the last label
+    previous_point = 0.0, 0.0
+    for t, sigma, label in joined:
+        u, v, width = float(x.position(t)), float(y.position(sigma)), LETTER_WIDTH * len(label)
+        # A curve that falls steeply from the left is in the way of a label at the left.
+        is_steep = (previous_point[1] - v) * width > TOUCHING_DISTANCE * (u - previous_point[0])
+        placements = (
+            ("ne", (u, u + width, v, v + LABEL_HEIGHT), 0.0),
+            ("nw", (u - width, u, v, v + LABEL_HEIGHT), is_steep + 0.1 + 9 * (u < width)),
+        )
+        layouts = [
             min(
                 (
-                    (cost + more + _meet(box, line) / 2 + _meet(box, last), [*notes, Note(t, sigma, words, place)], box)
-                    for cost, notes, last in ways
+                    (
+                        cost + penalty + _overlap(box, line) / 2 + _overlap(box, last),
+                        [*notes, Note(t, sigma, label, place)],
+                        box,
+                    )
+                    for cost, notes, last in layouts
                 ),
                 key=itemgetter(0),
             )
-            for place, box, more in own
+            for place, box, penalty in placements
         ]
-        before = u, v
-    return min(ways, key=itemgetter(0))[1]
+        previous_point = u, v
+    return min(layouts, key=itemgetter(0))[1]
 
 
-def _meet(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    """Whether two boxes have a place in common."""
+def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether two boxes overlap."""
     return a[0] <= b[1] and b[0] <= a[1] and a[2] <= b[3] and b[2] <= a[3]
 
 
 def _not_settled(rows: "pd.DataFrame") -> str:
-    """Words on the manoeuvre variances that do not settle within the run: a line for each."""
-    found = [
-        (panels.number(same["manoeuvre_variance"].iloc[0], powers=True), panels.literal(", ".join(same["filter"])))
-        for _, same in rows.groupby("manoeuvre_variance")
+    """A remark on the manoeuvre variances that do not settle within the run, a line for each."""
+    labels = [
+        (
+            key_labels.format_value(variance_rows["manoeuvre_variance"].iloc[0], powers=True),
+            key_labels.escape_dollars(", ".join(variance_rows["filter"])),
+        )
+        for _, variance_rows in rows.groupby("manoeuvre_variance")
     ]
     return "\n".join(
-        tr("{variance} ({names}): not settled", variance=variance, names=names) for variance, names in found
+        tr("{variance} ({names}): not settled", variance=variance, names=names) for variance, names in labels
     )

@@ -1,4 +1,4 @@
-"""P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."""
+"""P1's study: the plan of a case, the exact values of its filters, and the sums of a block of realisations."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Axes, Layout
-from radarsim.studies.range_doppler import filters, given
+from radarsim.engine.results import Axes
+from radarsim.engine.sums import Layout
+from radarsim.studies.range_doppler import error_recursion, package_filters, scenario, steady_state
 from radarsim.studies.range_doppler.config import Filter, Keys
-from radarsim.studies.range_doppler.tuning import Designed, designed
+from radarsim.studies.range_doppler.designed_case import DesignedCase, design_case
 
 if TYPE_CHECKING:
-    from radarsim.studies.range_doppler.blocks import Problem
+    from radarsim.studies.range_doppler.kernel_problem import Problem
+
+    pass
 
 COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
 BLOCK = 4096  # 8 chunks of 512; 0.4 ms with two filters and 15 scans
@@ -46,13 +49,13 @@ class RangeDopplerAxes(Axes):
 
 @dataclass(frozen=True)
 class Plan:
-    """All that a block needs. What the kernels take of it is made when a block is first asked for: till then the
-    compiler, which takes half a second to load, is not.
+    """All that a block needs. The kernels' problem is built with the first block, as loading the compiler takes half
+    a second.
 
     gaussian: whether the errors are, with the exact bias and σ of the axes, and in sums of the common kind."""
 
     case: Case
-    made: Designed
+    made: DesignedCase
     axes: RangeDopplerAxes
     block: int = BLOCK
 
@@ -62,28 +65,28 @@ class Plan:
 
     @cached_property
     def layout(self) -> Layout:
-        from radarsim.studies.range_doppler import blocks
+        from radarsim.studies.range_doppler import kernel_problem
 
-        return blocks.layout(self.made)
+        return kernel_problem.layout(self.made)
 
     @cached_property
     def problem(self) -> "Problem":
         """What is simulated, as the kernels take it."""
-        from radarsim.studies.range_doppler import blocks
+        from radarsim.studies.range_doppler import kernel_problem
 
-        return blocks.problem(self.case, self.made, self.axes.baseline)
+        return kernel_problem.problem(self.case, self.made, self.axes.baseline)
 
 
 def prepare(case: Case) -> Plan:
     """Design the filters of a case, its truth, and the exact values of its errors."""
-    designed_case = designed(case)
+    designed_case = design_case(case)
     return Plan(case, designed_case, axes(designed_case))
 
 
-def shortened(case: Case, at_s: float | None, at_k: int | None) -> Case:
-    """The case up to a time (s) or scan: what comes later changes no error there, but by a D_M that is looked for."""
+def shorten_case(case: Case, at_s: float | None, at_k: int | None) -> Case:
+    """The case up to a time (s) or scan; later scans change the errors there only through an optimised D_M."""
     spec: Keys = case.spec
-    filters.true_motion(case)
+    scenario.true_motion(case)
     if not all(isinstance(f, Filter) and isinstance(f.manoeuvre_variance, float) for f in spec.filters):
         return case  # gains of a package may depend on how many scans there are
     until = spec.plots
@@ -100,23 +103,23 @@ def exact_but_for(case: Case) -> str:
     spec: Keys = case.spec
     if spec.radar.detection_probability == 1:
         return ""
-    from radarsim.studies.range_doppler import patterns
+    from radarsim.studies.range_doppler import missed_plot_patterns
 
-    if 2**spec.plots <= patterns.WHOLE:
+    if 2**spec.plots <= missed_plot_patterns.FOLLOWED_PATTERNS:
         return ""
     return "averaged over detection patterns, similar ones merged; accurate to about 1e-4"
 
 
-def costly(case: Case) -> bool:
+def is_costly(case: Case) -> bool:
     """Whether patterns of plots are so many that merging most of them spares work."""
     if case.spec.radar.detection_probability == 1:
         return False
-    from radarsim.studies.range_doppler import patterns
+    from radarsim.studies.range_doppler import missed_plot_patterns
 
-    return bool(2**case.spec.plots > patterns.AT_ONCE)
+    return bool(2**case.spec.plots > missed_plot_patterns.PATTERNS_AT_ONCE)
 
 
-def axes(designed_case: Designed) -> RangeDopplerAxes:
+def axes(designed_case: DesignedCase) -> RangeDopplerAxes:
     """Labels and exact values."""
     spec, radar = designed_case.spec, designed_case.spec.radar
     names = tuple(f.name for f in spec.filters)
@@ -142,7 +145,7 @@ def axes(designed_case: Designed) -> RangeDopplerAxes:
         observes=designed_case.observes,
         manoeuvre_variance=np.array(designed_case.variances),
         process_noise=tuple(f.process_noise if isinstance(f, Filter) else "" for f in spec.filters),
-        settled_gain=np.stack([given.settled(d) for d in designed_case.filters]),
+        settled_gain=np.stack([package_filters.settled_gain(d) for d in designed_case.filters]),
         sigma=designed_case.plots.sigma,
         scan_period_s=designed_case.dt,
         C_theta=float(designed_case.plots.sigma[0] ** 2 / (designed_case.dt**2 * designed_case.plots.sigma[1] ** 2)),
@@ -154,7 +157,7 @@ def axes(designed_case: Designed) -> RangeDopplerAxes:
 
 
 @dataclass(frozen=True)
-class Known:
+class ExactErrors:
     """Exact values: sigma, bias and gain (F, K, 3), NEES (F, K), and the believed covariance (F, K, 3, 3)."""
 
     sigma: np.ndarray
@@ -164,11 +167,11 @@ class Known:
     believed: np.ndarray
 
 
-def exact_values(designed_case: Designed, baseline: int) -> Known:
+def exact_values(designed_case: DesignedCase, baseline: int) -> ExactErrors:
     """Of filters that get every plot."""
     inputs = designed_case.plots, designed_case.x, designed_case.dt, designed_case.drawn
     errors = [
-        given.error_recursion(d, *inputs) if d.given else filters.error_recursion(d, *inputs)
+        package_filters.error_recursion(d, *inputs) if d.given else error_recursion.error_recursion(d, *inputs)
         for d in designed_case.filters
     ]
     lasting, covariance = np.stack([E for E, _ in errors]), np.stack([S for _, S in errors])
@@ -180,12 +183,14 @@ def exact_values(designed_case: Designed, baseline: int) -> Known:
     moment = covariance + bias[..., :, None] * bias[..., None, :]
     with np.errstate(invalid="ignore"):  # a filter that diverges has variances below zero by rounding: no σ
         root = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3) + bias**2)
-    return Known(root, bias, gains(root, root[baseline]), nees_of(believed, bias, moment, available), believed)
+    return ExactErrors(
+        root, bias, gains(root, root[baseline]), expected_nees(believed, bias, moment, available), believed
+    )
 
 
-def nees_of(believed: np.ndarray, bias: np.ndarray, moment: np.ndarray, available: np.ndarray) -> np.ndarray:
+def expected_nees(believed: np.ndarray, bias: np.ndarray, moment: np.ndarray, available: np.ndarray) -> np.ndarray:
     """The expectation (F, K) of eᵀP⁻¹e per estimated component."""
-    return filters.normalised_error(believed, bias, moment, available)[0]
+    return steady_state.normalised_error(believed, bias, moment, available)[0]
 
 
 def gains(sigma: np.ndarray, base: np.ndarray) -> np.ndarray:
@@ -194,34 +199,36 @@ def gains(sigma: np.ndarray, base: np.ndarray) -> np.ndarray:
         return 100 * (1 - sigma / base)
 
 
-def exact_means(designed_case: Designed, baseline: int) -> Known:
+def exact_means(designed_case: DesignedCase, baseline: int) -> ExactErrors:
     """Of filters that miss plots, as means over the patterns: not-a-number where these are too many to be exact."""
     shape = (len(designed_case.filters), len(designed_case.t), 3)
     sigma, bias, gain = (np.full(shape, np.nan) for _ in range(3))
     nees = np.full(shape[:2], np.nan)
-    from radarsim.studies.range_doppler import patterns
+    from radarsim.studies.range_doppler import missed_plot_means
 
-    if len(designed_case.t) <= patterns.PATTERN_SCANS:
-        filter_designs = patterns.designs(designed_case)
-        baseline_means = patterns.means(filter_designs[baseline], filter_designs, designed_case)
+    if len(designed_case.t) <= missed_plot_means.PATTERN_SCANS:
+        filter_designs = missed_plot_means.designs(designed_case)
+        baseline_means = missed_plot_means.means(filter_designs[baseline], filter_designs, designed_case)
         for f, design in enumerate(filter_designs):
             filter_means = (
-                baseline_means if f == baseline else patterns.means(design, [filter_designs[baseline]], designed_case)
+                baseline_means
+                if f == baseline
+                else missed_plot_means.means(design, [filter_designs[baseline]], designed_case)
             )
             sigma[f], bias[f], nees[f] = filter_means.sigma, filter_means.bias, filter_means.nees
             gain[f] = gains(filter_means.beside[0], baseline_means.beside[f])
-    return Known(sigma, bias, gain, nees, np.zeros((*shape, 3)))
+    return ExactErrors(sigma, bias, gain, nees, np.zeros((*shape, 3)))
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
-    from radarsim.studies.range_doppler import blocks
+    from radarsim.studies.range_doppler import kernel_problem
 
-    return blocks.sums(plan.problem, plan.layout, first, count)
+    return kernel_problem.sums(plan.problem, plan.layout, first, count)
 
 
 def errors(plan: Plan, first: int, count: int) -> np.ndarray:
     """The errors (F, count, K, 3) of its realisations."""
-    from radarsim.studies.range_doppler import blocks
+    from radarsim.studies.range_doppler import kernel_problem
 
-    return blocks.errors(plan.problem, first, count)
+    return kernel_problem.errors(plan.problem, first, count)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import notes, panels, statistics
+from radarsim.report import case_selection, consistency_tables, key_labels, statistics
 from radarsim.report import tables as common
-from radarsim.studies.range_doppler import filters, given
+from radarsim.studies.range_doppler import package_filters, steady_state
 from radarsim.studies.range_doppler.study import RangeDopplerAxes
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles i
 SETTLED = 0.05  # within this share of the steady value, for good; the paper gives no tolerance
 
 Result = CaseResult[RangeDopplerAxes]
-table = common.Tables()
+table = common.TableMakers()
 
 
 def follows_the_model(result: Result) -> bool:
@@ -32,31 +32,34 @@ def follows_the_model(result: Result) -> bool:
     return target.kind == "polynomial" and not any(target.coefficients[3:])
 
 
-def own_gains(result: Result) -> bool:
-    """Whether each realisation had gains of its own, so that the sums tell who had an estimate; see kernels.missed."""
+def has_individual_gains(result: Result) -> bool:
+    """Whether each realisation had gains of its own, so that the sums count those with an estimate."""
     return "both" in result.sums
 
 
 def gains(results: Sequence[Result]) -> "pd.DataFrame":
     """Paired gains over the realisations in which both the filter and the baseline have an estimate."""
-    parts = (_own_gains(one) if own_gains(one) else {**common.gains([one])} for one in results)
-    return common.joined(parts, common.GAINS)
+    parts = (
+        _individual_gains(result) if has_individual_gains(result) else {**common.gains([result])} for result in results
+    )
+    return common.join_columns(parts, common.GAINS)
 
 
-def _own_gains(result: Result) -> common.Columns:
+def _individual_gains(result: Result) -> common.Columns:
     axes, b = result.axes, result.axes.baseline
     both = np.asarray(result.sums["both"])
     mask = axes.available[b] & (both[..., 0] > 0)
     mask[b] = False
-    at = f, k, c = common.shown(result, mask)
-    n, own, own_4, base, base_4 = (both[at][:, j] for j in range(5))
-    of = statistics.gain(own, own_4, base, base_4, np.asarray(result.sums["paired"])[at], n)
+    indices = f, k, c = common.row_index(result, mask)
+    n, square, fourth, baseline_square, baseline_fourth = (both[indices][:, j] for j in range(5))
+    paired = np.asarray(result.sums["paired"])[indices]
+    gain = statistics.gain(square, fourth, baseline_square, baseline_fourth, paired, n)
     return {
-        **common.leading(
-            result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **common.components(result, c)
+        **common.label_columns(
+            result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **common.component_columns(result, c)
         ),
-        "gain_percent|gain": of,
-        "exact_percent": axes.exact_gains[at],
+        "gain_percent|gain": gain,
+        "exact_percent": axes.exact_gains[indices],
     }
 
 
@@ -87,53 +90,55 @@ def steady(results: Sequence[Result]) -> "pd.DataFrame":
     table = common.frame({name: [row[i] for row in rows] for i, name in enumerate(STEADY[:-1])})
     stem = table["case"].str.split(" ").str[0]
     family = table.groupby([stem, table["filter"], table["component"]], sort=False)
-    several = family["manoeuvre_variance"].transform("nunique") > 1
-    good = table["steady_sigma"].where(table["under_10_periods"] & several)
-    least = good.groupby([stem, table["filter"], table["component"]], sort=False).transform("min")
-    table["best"] = good.eq(least)
+    has_choice = family["manoeuvre_variance"].transform("nunique") > 1
+    qualified_sigma = table["steady_sigma"].where(table["under_10_periods"] & has_choice)
+    lowest = qualified_sigma.groupby([stem, table["filter"], table["component"]], sort=False).transform("min")
+    table["best"] = qualified_sigma.eq(lowest)
     return table
 
 
 def steady_sigma(axes: RangeDopplerAxes, f: int) -> np.ndarray | None:
-    """Exact σ (3,) that a filter comes to where every scan has its plot; None of a package's that comes to none."""
+    """Exact σ (3,) of a filter in steady state, a plot at every scan; None for a package's filter without one."""
     period = axes.scan_period_s
     if noise := axes.process_noise[f]:
         return _settled(int(axes.observes[f]), float(axes.manoeuvre_variance[f]), tuple(axes.sigma), period, noise)
-    true = given.steady_state(axes.settled_gain[f], axes.sigma, period)
+    true = package_filters.steady_state(axes.settled_gain[f], axes.sigma, period)
     return None if true is None else np.sqrt(np.diag(true))
 
 
 @lru_cache(1024)  # three tables and the answer ask for it
 def _settled(observes: int, variance: float, sigma: tuple[float, ...], period: float, noise: str) -> np.ndarray:
-    return np.sqrt(np.diag(filters.steady_state(observes, variance, np.array(sigma), period, noise)[1]))
+    return np.sqrt(np.diag(steady_state.steady_state(observes, variance, np.array(sigma), period, noise)[1]))
 
 
 def _steady(result: Result) -> list[tuple]:
     axes = result.axes
-    of = statistics.errors(result.sums["error"], common.realisations(result)).sigma
+    measured_sigma = statistics.errors(result.sums["error"], common.realisation_counts(result)).sigma
     t, period, rows = np.asarray(axes.t_s, dtype=float), axes.scan_period_s, []
     for f, name in enumerate(axes.filters):
-        variance, in_the_long_run = float(axes.manoeuvre_variance[f]), steady_sigma(axes, f)
-        if in_the_long_run is None:
+        variance, steady_values = float(axes.manoeuvre_variance[f]), steady_sigma(axes, f)
+        if steady_values is None:
             continue
         for c, (component, unit) in enumerate(axes.components):
-            at = np.flatnonzero(axes.available[f, :, c])
-            if not at.size:
+            scan_indices = np.flatnonzero(axes.available[f, :, c])
+            if not scan_indices.size:
                 continue
-            last, known = float(in_the_long_run[c]), axes.exact_sigma[f, at, c]
-            when = settling(statistics.Estimate(known, known, known), t[at], last).value
+            steady_value, exact_sigma = float(steady_values[c]), axes.exact_sigma[f, scan_indices, c]
+            exact_estimate = statistics.Estimate(exact_sigma, exact_sigma, exact_sigma)
+            settling_s = settling(exact_estimate, t[scan_indices], steady_value).value
+            last_sigma = (end[f, scan_indices[-1], c] for end in measured_sigma)
             rows.append(
                 (
-                    *(result.name, name, variance, component, unit, last, *(end[f, at[-1], c] for end in of)),
-                    *(when / period, when, bool(when < PERIODS * period * (1 - 1e-9))),
+                    *(result.name, name, variance, component, unit, steady_value, *last_sigma),
+                    *(settling_s / period, settling_s, bool(settling_s < PERIODS * period * (1 - 1e-9))),
                 )
             )
     return rows
 
 
-def settling(sigma: statistics.Estimate, t: np.ndarray, last: float) -> statistics.Estimate:
-    """Time from which σ over t (K,) stays within 5 % of the steady value `last`; infinite where it does not."""
-    low, high = last * (1 - SETTLED), last * (1 + SETTLED)
+def settling(sigma: statistics.Estimate, t: np.ndarray, steady_value: float) -> statistics.Estimate:
+    """Time from which σ over t (K,) stays within 5 % of steady_value; infinite where it does not."""
+    low, high = steady_value * (1 - SETTLED), steady_value * (1 + SETTLED)
     touches = (sigma.hi >= low) & (sigma.lo <= high)
     inside = (sigma.lo >= low) & (sigma.hi <= high)
     middle = (sigma.value >= low) & (sigma.value <= high)
@@ -150,7 +155,7 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
 def _curves(result: Result) -> common.Columns:
     """As everywhere."""
     variance = np.diagonal(result.axes.believed, axis1=2, axis2=3)
-    if own_gains(result):
+    if has_individual_gains(result):
         with np.errstate(invalid="ignore"):
             variance = np.asarray(result.sums["believed"]) / np.asarray(result.sums["estimates"])
     return common.curve_columns(result, np.sqrt(variance))
@@ -158,7 +163,7 @@ def _curves(result: Result) -> common.Columns:
 
 def curves(results: Sequence[Result]) -> "pd.DataFrame":
     """The table `curves` alone."""
-    return common.joined(map(_curves, results))
+    return common.join_columns(map(_curves, results))
 
 
 @table("consistency")
@@ -168,19 +173,24 @@ def _normalised_errors(result: Result) -> common.Columns:
     Where plots may be missed, of the realisations in which the filter has started, `n`.
     """
     axes = result.axes
-    there: np.ndarray
-    if own_gains(result):
-        counted = np.asarray(result.sums["nees"])
-        there, size, n = counted[..., 0] > 0, np.full(counted.shape[:2], 3), counted[..., 0].astype(np.int64)
-        mean = statistics.mean_square(counted[..., 1], counted[..., 2], counted[..., 0])
+    is_available: np.ndarray
+    if has_individual_gains(result):
+        nees_sums = np.asarray(result.sums["nees"])
+        is_available, size = nees_sums[..., 0] > 0, np.full(nees_sums.shape[:2], 3)
+        n = nees_sums[..., 0].astype(np.int64)
+        mean = statistics.mean_square(nees_sums[..., 1], nees_sums[..., 2], nees_sums[..., 0])
     else:
-        there, size = np.asarray(axes.available.any(axis=2)), axes.available.sum(axis=2)
-        n, mean = np.full(there.shape, result.count), nees(result)
-    f, k = at = np.nonzero(there)
-    looks = there.sum(axis=1)[f]
-    bounds = statistics.normalised_bounds(size[at] * n[at], looks)
-    mean = statistics.Estimate(*(part[at] for part in mean))
-    return {**common.leading(result, f, k), "n": n[at], **notes.normalised("nees", mean, bounds, axes.exact_nees[at])}
+        is_available, size = np.asarray(axes.available.any(axis=2)), axes.available.sum(axis=2)
+        n, mean = np.full(is_available.shape, result.count), nees(result)
+    f, k = indices = np.nonzero(is_available)
+    scan_counts = is_available.sum(axis=1)[f]
+    bounds = statistics.normalised_bounds(size[indices] * n[indices], scan_counts)
+    mean = statistics.Estimate(*(part[indices] for part in mean))
+    return {
+        **common.label_columns(result, f, k),
+        "n": n[indices],
+        **consistency_tables.normalised_square_columns("nees", mean, bounds, axes.exact_nees[indices]),
+    }
 
 
 def nees(result: Result) -> statistics.Estimate:
@@ -188,16 +198,16 @@ def nees(result: Result) -> statistics.Estimate:
 
     From Σe and the Σ of products of two components. The errors of this study are Gaussian, so that these give the
     spread too: of mean m and second moment M = E eeᵀ, var eᵀP⁻¹e = 2 tr (P⁻¹M)² - 2 (mᵀP⁻¹m)²."""
-    from radarsim.kernels.linear import CROSSED  # loads the compiler
+    from radarsim.kernels.second_order import COMPONENT_PAIRS  # loads the compiler
 
     axes, P, n = result.axes, result.axes.believed, result.count
     error, first = np.asarray(result.sums["error"]), np.asarray(result.sums["error"])[..., 0] / n
     second = np.zeros(P.shape)
-    for (i, j), crossed in zip(CROSSED, np.moveaxis(result.sums["cross"], -1, 0), strict=True):
+    for (i, j), crossed in zip(COMPONENT_PAIRS, np.moveaxis(result.sums["cross"], -1, 0), strict=True):
         second[..., i, j] = second[..., j, i] = crossed / n
     for i in range(3):
         second[..., i, i] = error[..., i, 1] / n
-    mean, variance = filters.normalised_error(P, first, second, axes.available)
+    mean, variance = steady_state.normalised_error(P, first, second, axes.available)
     interval = statistics.mean_square(n * mean, n * (variance + mean**2), n)
     return statistics.Estimate(mean, interval.lo, interval.hi)
 
@@ -218,13 +228,13 @@ def _radar(result: Result) -> common.Columns:
         "doppler_per_repetition_rate": doppler / axes.repetition_rate_hz,
         "unambiguous_velocity_mps": span_mps(result),
     }
-    return common.of_rows([row])
+    return common.columns_from_rows([row])
 
 
 @table.whole("gains")
 def _gains_where_missed(results: Sequence[Result]) -> "pd.DataFrame | None":
     """As everywhere; where plots may be missed, of realisations in which both filters have an estimate."""
-    return gains(results) if any(own_gains(result) for result in results) else None
+    return gains(results) if any(has_individual_gains(result) for result in results) else None
 
 
 tables = table.made
@@ -236,22 +246,37 @@ def span_mps(result: Result) -> float:
 
 
 def inputs(results: Sequence[Result]) -> "pd.DataFrame":
-    """What was put in, for the page: a row for each radar that differs from the others, with the D_M tried on it."""
+    """The inputs, for the page: a row for each distinct radar, with the D_M of its filters."""
     radars: dict[tuple, list[Result]] = {}
-    for members in panels.families(results).values():
+    for members in case_selection.group_by_config(results).values():
         for result in members:
-            of, theta = result.spec.radar, result.axes.C_theta
-            given = (of.sigma_range_m, of.sigma_velocity_mps, of.scan_period_s, of.wavelength_m, theta)
-            radars.setdefault((panels.stem(result), panels.plain(panels.device(result)), *given), []).append(result)
+            radar_keys, theta = result.spec.radar, result.axes.C_theta
+            numbers = (
+                radar_keys.sigma_range_m,
+                radar_keys.sigma_velocity_mps,
+                radar_keys.scan_period_s,
+                radar_keys.wavelength_m,
+                theta,
+            )
+            radars.setdefault(
+                (key_labels.config_stem(result), key_labels.without_markup(key_labels.config_device(result)), *numbers),
+                [],
+            ).append(result)
     rows = []
     for (_, *radar), members in radars.items():
-        tried = sorted({float(v) for result in members for v in result.axes.manoeuvre_variance if not np.isnan(v)})
+        variances = sorted({float(v) for result in members for v in result.axes.manoeuvre_variance if not np.isnan(v)})
         scans = sorted({result.spec.scans for result in members})
-        seen = ", ".join(map(panels.number, sorted({result.spec.radar.detection_probability for result in members})))
-        last = (", ".join(panels.number(v, powers=True) for v in tried), ", ".join(map(str, scans)), seen)
-        rows.append((*radar, *last))
-    missed = any(row[-1] != "1" for row in rows)
-    names = INPUTS if missed else INPUTS[:-1]
+        detection = ", ".join(
+            map(key_labels.format_value, sorted({result.spec.radar.detection_probability for result in members}))
+        )
+        other_values = (
+            ", ".join(key_labels.format_value(v, powers=True) for v in variances),
+            ", ".join(map(str, scans)),
+            detection,
+        )
+        rows.append((*radar, *other_values))
+    has_missed_plots = any(row[-1] != "1" for row in rows)
+    names = INPUTS if has_missed_plots else INPUTS[:-1]
     return common.frame({name: [row[i] for row in rows] for i, name in enumerate(names)})
 
 

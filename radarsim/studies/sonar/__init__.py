@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from radarsim.language import term
+from radarsim.language.translate import term
 from radarsim.report.quantities import COMMON, FLOORS, Component, Quantity
 from radarsim.studies.interface import Study
 
@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.engine.results import CaseResult
-    from radarsim.report.drawing import Figure
+    from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
-    from radarsim.studies.floor import Floor
-    from radarsim.studies.interface import Draw, Plan, RecordedPlots, Tracker
+    from radarsim.studies.floors.bound import Floor
+    from radarsim.studies.interface import Plan
+    from radarsim.studies.plot_arrays import DrawPlots
+    from radarsim.studies.recording_interface import RecordingInterface, Tracker
     from radarsim.studies.sonar.config import Keys
 
 TRACKING = (  # quantities of a tracker among false plots
@@ -64,12 +66,12 @@ class Part(ABC):
         """The answer to it."""
 
     @abstractmethod
-    def drawing(self, case: "Case") -> "Draw":
-        """As `RecordedPlots.drawing`."""
+    def drawing(self, case: "Case") -> "DrawPlots":
+        """As `RecordingInterface.drawing`."""
 
     @abstractmethod
     def tracker(self, case: "Case") -> "Tracker":
-        """As `RecordedPlots.tracker`."""
+        """As `RecordingInterface.tracker`."""
 
 
 class Smoothing(Part):
@@ -97,27 +99,27 @@ class Smoothing(Part):
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         from radarsim.studies.sonar import figures
 
-        return figures.DRAWN_FROM
+        return figures.TABLES_OF_FIGURES
 
     def question(self, specs: "Sequence[Keys]") -> str:
-        from radarsim.studies.sonar import words
+        from radarsim.studies.sonar import answer
 
-        return words.question(specs)
+        return answer.question(specs)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.sonar import words
+        from radarsim.studies.sonar import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
-    def drawing(self, case: "Case") -> "Draw":
-        from radarsim.studies.sonar import track
+    def drawing(self, case: "Case") -> "DrawPlots":
+        from radarsim.studies.sonar import tracking
 
-        return track.drawing(case)
+        return tracking.simulated_plots(case)
 
     def tracker(self, case: "Case") -> "Tracker":
-        from radarsim.studies.sonar import track
+        from radarsim.studies.sonar import tracking
 
-        return track.Tracker(case)
+        return tracking.Tracker(case)
 
 
 class Manoeuvre(Part):
@@ -145,27 +147,27 @@ class Manoeuvre(Part):
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         from radarsim.studies.sonar.manoeuvre import figures
 
-        return figures.DRAWN_FROM
+        return figures.TABLES_OF_FIGURES
 
     def question(self, specs: "Sequence[Keys]") -> str:
-        from radarsim.studies.sonar.manoeuvre import words
+        from radarsim.studies.sonar.manoeuvre import answer
 
-        return words.question(specs)
+        return answer.question(specs)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.sonar.manoeuvre import words
+        from radarsim.studies.sonar.manoeuvre import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
-    def drawing(self, case: "Case") -> "Draw":
-        from radarsim.studies.sonar.manoeuvre import track
+    def drawing(self, case: "Case") -> "DrawPlots":
+        from radarsim.studies.sonar.manoeuvre import tracking
 
-        return track.drawing(case)
+        return tracking.simulated_plots(case)
 
     def tracker(self, case: "Case") -> "Tracker":
-        from radarsim.studies.sonar.manoeuvre import track
+        from radarsim.studies.sonar.manoeuvre import tracking
 
-        return track.Tracker(case)
+        return tracking.Tracker(case)
 
 
 class Clutter(Part):
@@ -193,27 +195,27 @@ class Clutter(Part):
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         from radarsim.studies.sonar.clutter import figures
 
-        return figures.DRAWN_FROM
+        return figures.TABLES_OF_FIGURES
 
     def question(self, specs: "Sequence[Keys]") -> str:
-        from radarsim.studies.sonar.clutter import words
+        from radarsim.studies.sonar.clutter import answer
 
-        return words.question(specs)
+        return answer.question(specs)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
-        from radarsim.studies.sonar.clutter import words
+        from radarsim.studies.sonar.clutter import answer
 
-        return words.answer(results, tables)
+        return answer.answer(results, tables)
 
-    def drawing(self, case: "Case") -> "Draw":
-        from radarsim.studies.sonar.clutter import track
+    def drawing(self, case: "Case") -> "DrawPlots":
+        from radarsim.studies.sonar.clutter import tracking
 
-        return track.drawing(case)
+        return tracking.simulated_plots(case)
 
     def tracker(self, case: "Case") -> "Tracker":
-        from radarsim.studies.sonar.clutter import track
+        from radarsim.studies.sonar.clutter import tracking
 
-        return track.Tracker(case)
+        return tracking.Tracker(case)
 
 
 SMOOTHING = Smoothing()
@@ -255,8 +257,8 @@ class Sonar(Study):
 
     def computing_modules(self, spec: "Keys", plots: bool) -> Sequence[str]:
         package = last_part(spec).package
-        track = (f"{__name__}.track", f"{package}.track") if plots else ()
-        return f"{__name__}.config", f"{package}.study", *track
+        tracking = (f"{__name__}.recorded_plots", f"{package}.tracking") if plots else ()
+        return f"{__name__}.config", f"{package}.study", *tracking
 
     def simulate(self, plan: Any, first: int, count: int) -> "np.ndarray":
         sums: np.ndarray = plan.simulate(first, count)
@@ -292,9 +294,9 @@ class Sonar(Study):
         return {name: figure for name, figure in figures.items() if figure}
 
     def shown(self) -> "Sequence[Component]":
-        from radarsim.studies.sonar import figures
+        from radarsim.studies.sonar import components
 
-        return figures.COMPONENTS
+        return components.COMPONENTS
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
         return {name: tables for part in PARTS.values() for name, tables in part.drawn_from().items()}
@@ -307,10 +309,10 @@ class Sonar(Study):
         answers = (part.answer(members, tables) for part, members in reversed(by_part(results)))
         return [sentence for answer in answers for sentence in answer]
 
-    def recording_interface(self) -> "RecordedPlots":
-        from radarsim.studies.sonar.track import Recorded
+    def recording_interface(self) -> "RecordingInterface":
+        from radarsim.studies.sonar.recorded_plots import RecordedSonarPlots
 
-        return Recorded(last_part)
+        return RecordedSonarPlots(last_part)
 
 
 def last_part(spec: "Keys") -> Part:

@@ -1,74 +1,18 @@
-"""Exact results of P3: generalised least squares, closed forms, true errors of any linear filter.
+"""Exact values: the true errors of any linear filter, averaged over all patterns of missed plots.
 
 Everything is for one coordinate; its state (value, rate, acceleration) has `size` 2 or 3 components, for degree 1 or 2.
-
-Exact values of P3's experiments: the true errors of every linear filter, averaged over all patterns of misses."""
+"""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from radarsim.physics import transition
-from radarsim.studies.sonar.filters import FilterDesign
+from radarsim.physics.motion import transition
+from radarsim.studies.sonar.filter_design import FilterDesign
+from radarsim.studies.sonar.plot_errors import error_covariance, step_correlations
 from radarsim.studies.sonar.scene import Scene
-from radarsim.studies.sonar.world import Values, error_covariance, step_correlations
 
 
-# ---- exact -----------------------------------------------------------------------------------------------------------
-def design_matrix(t: np.ndarray, size: int) -> np.ndarray:
-    """Rows (n, size) that map the state at the last of the times t to the values at all of them."""
-    since = t - t[-1]
-    return np.stack([np.ones_like(since), since, since**2 / 2], axis=1)[:, :size]
-
-
-def generalised_least_squares(t: np.ndarray, C: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Optimal weights (size, n) for the state at the last plot, and their covariance (AᵀC⁻¹A)⁻¹ (size, size).
-
-    t (n,) in s; C (n, n) the covariance of the errors of the plots. Solved by a triangular factor of C and a QR
-    factorisation in unit time, so that no digits are lost for ρ = 0.99 or long tracks."""
-    span = max(t[-1] - t[0], 1e-300)
-    scale = np.array([1.0, 1.0 / span, 1.0 / span**2])[:size]
-    factor = np.linalg.cholesky(C)
-    whitened = np.linalg.solve(factor, design_matrix(t, size) * scale)
-    q, r = np.linalg.qr(whitened)
-    weights = np.linalg.solve(r, q.T) @ np.linalg.inv(factor)
-    root = np.linalg.inv(r)
-    return scale[:, None] * weights, np.outer(scale, scale) * (root @ root.T)
-
-
-def optimal_sigma(t: np.ndarray, sigma: np.ndarray, rho: float, period: float, size: int) -> np.ndarray:
-    """The smallest possible σ (size,) of the state at the last time.
-
-    sigma (n,) are the standard deviations of the plots, infinite where they are missed."""
-    detected = np.isfinite(sigma)
-    C = error_covariance(sigma[detected], rho, t[detected], period)
-    _, P = generalised_least_squares(t[detected], C, size)
-    F = transition(t[-1] - t[detected][-1], size)
-    return np.sqrt(np.diagonal(F @ P @ F.T))
-
-
-# ---- the paper's closed forms, degree 1, equal intervals and weights ----------------------------------------------
-def sigma_smoothed(n: Values) -> Values:
-    """σ of the smoothed coordinate at the last of n plots, per σ of a plot (formula below P3 eq. 2)."""
-    return np.sqrt(2 * (2 * n - 1) / (n * (n + 1)))
-
-
-def sigma_extrapolated(n: Values) -> Values:
-    """σ of the coordinate extrapolated by one scan from n plots, per σ of a plot (formula below P3 eq. 2)."""
-    return np.sqrt(2 * (2 * n + 1) / (n * (n - 1)))
-
-
-def sigma_acceleration(n: Values, period: float) -> Values:
-    """σ of the acceleration of a quadratic through n plots, per σ of a plot (P3 eq. 3)."""
-    return np.sqrt(720 / (n * (n**2 - 1) * (n**2 - 4))) / period**2
-
-
-def gains_closed(n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A_n and B_n of P3 (14): gains of the residual in coordinate and velocity (per period)."""
-    return 2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))
-
-
-# ---- true errors of a given filter --------------------------------------------------------------------------------
 def recursive_errors(
     gain: np.ndarray,
     carry: np.ndarray,
@@ -141,7 +85,6 @@ def consistency(believed: np.ndarray, bias: np.ndarray, covariance: np.ndarray) 
     return np.trace(np.linalg.solve(believed, moment), axis1=-2, axis2=-1)
 
 
-# ---- exact values ----------------------------------------------------------------------------------------------------
 def true_errors(scene: Scene, design: FilterDesign, c: int) -> tuple[np.ndarray, np.ndarray]:
     """Bias (M, K, 3) and covariance (M, K, 3, 3) of the errors of a filter in coordinate c."""
     t, scans, estimated_sizes = design.plots.t, len(design.plots.t), design.known

@@ -2,12 +2,15 @@
 
 import numpy as np
 
-from radarsim.physics import transition
-from radarsim.studies import floor as floors
-from radarsim.studies.floor import Bound, Floor
-from radarsim.studies.sonar.config import Keys, Polynomial
+from radarsim.physics.motion import transition
+from radarsim.studies.floors import bound as floors_bound
+from radarsim.studies.floors import missed_plots, moving, static
+from radarsim.studies.floors.bound import Bound, Floor
+from radarsim.studies.sonar.axes import GivenPlotsAxes
+from radarsim.studies.sonar.config import Keys
+from radarsim.studies.sonar.plot_errors import step_correlations
 from radarsim.studies.sonar.scene import lateral_scale
-from radarsim.studies.sonar.world import GivenPlotsAxes, step_correlations
+from radarsim.studies.sonar.target_keys import Polynomial
 
 
 def floor(spec: Keys, axes: GivenPlotsAxes) -> Floor | None:
@@ -26,7 +29,7 @@ def floor(spec: Keys, axes: GivenPlotsAxes) -> Floor | None:
     size = axes.available.shape[2] // is_measured.shape[1]
     if target.fluctuation_mps2:
         bound = None if correlated or random_scans.size else fluctuating(target, spec, axes, t, size)
-        return None if bound is None else Floor(floors.POSTERIOR, (bound,) * len(axes.filters), bound)
+        return None if bound is None else Floor(floors_bound.POSTERIOR, (bound,) * len(axes.filters), bound)
     if correlated and random_scans.size:
         return None
     rows, maps = derivatives(target, spec, axes, t, size)
@@ -36,17 +39,17 @@ def floor(spec: Keys, axes: GivenPlotsAxes) -> Floor | None:
         information += products(rows[:, c], axes.sigma_of_plots[:, c], float(axes.rho[c]), t, axes.scan_period_s)
     no_prior = np.zeros(information.shape[1:])
     if not random_scans.size:
-        bound = floors.static(no_prior, information, maps, reached)
+        bound = static.static_bound(no_prior, information, maps, reached)
     else:
         detection_probability = is_measured.any(axis=1).astype(float)
         detection_probability[random_scans] = spec.sensor.detection_probability
         needed = tuple(1 + j for _ in range(is_measured.shape[1]) for j in range(size))
         # At least the coefficients of one coordinate: the others have two.
         settles = rows.shape[2] - 2 * (rows.shape[1] - 1)
-        bound = floors.missed(
+        bound = missed_plots.missed_plots_bound(
             no_prior, information, maps, detection_probability, np.repeat(is_measured, size, axis=1), needed, settles
         )
-    return Floor(floors.CRB, (bound,) * len(axes.filters), bound)
+    return Floor(floors_bound.CRB, (bound,) * len(axes.filters), bound)
 
 
 def products(row: np.ndarray, sigma: np.ndarray, rho: float, t: np.ndarray, period: float) -> np.ndarray:
@@ -75,7 +78,7 @@ def derivatives(
     states = np.zeros((len(t), len(sizes), 3, sum(sizes)))
     start = 0
     for c, coefficient_count in enumerate(sizes):
-        states[:, c, :, start : start + coefficient_count] = floors.polynomial(t, coefficient_count)
+        states[:, c, :, start : start + coefficient_count] = static.polynomial(t, coefficient_count)
         start += coefficient_count
     measured = states if target.frame == "polar" else to_polar(states, polar)
     if (spec.frame == "polar") == (target.frame == "polar"):
@@ -123,7 +126,7 @@ def fluctuating(target: Polynomial, spec: Keys, axes: GivenPlotsAxes, t: np.ndar
         information[:, 0, 0] = sigma_of_plots[:, c] ** -2.0
         pushed = np.pad(np.stack([dt**2 / 2, dt], axis=1) * walk[c], ((0, 0), (0, n - 2)))
         F, Q = np.stack([transition(step, n) for step in dt]), pushed[:, :, None] * pushed[:, None, :]
-        bounds.append(floors.moving(np.zeros((n, n)), information, F, Q, size))
+        bounds.append(moving.moving_bound(np.zeros((n, n)), information, F, Q, size))
     arrays = zip(*(bound[:3] for bound in bounds), strict=True)
     sigma, waited, smoothed = (np.concatenate(columns, axis=-1) for columns in arrays)
     return Bound(sigma, waited, smoothed, bounds[0].patterns)

@@ -7,12 +7,15 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
-from radarsim.studies.sonar import world
-from radarsim.studies.sonar.config import CORRELATED, Keys, Polynomial, Sensor, Target, Turning, correlation_of
-from radarsim.studies.sonar.filters import FilterSpec, Plots
+from radarsim.studies.sonar import conversion, target_motion
+from radarsim.studies.sonar.config import Keys
+from radarsim.studies.sonar.filter_design import FilterSpec, Plots
+from radarsim.studies.sonar.filter_keys import CORRELATED
+from radarsim.studies.sonar.sensor_keys import Sensor, coordinate_correlation
+from radarsim.studies.sonar.target_keys import Polynomial, Target, Turning
 
 NEAREST_M = 1e-3  # a course through the sonar passes it at the distance of a rounding, at rates without meaning
-MOST_OPEN = 9  # scans that may be missed up to which all patterns are enumerated for exact values: 512
+MAX_OPEN_SCANS = 9  # scans that may be missed up to which all patterns are enumerated for exact values: 512
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Scene:
         """All patterns (M, K') of plots in the first scans, with their probabilities (M,).
 
         K' is the number of scans up to which there are at most 2 ** MOST_OPEN patterns."""
-        reach = int(np.searchsorted(np.cumsum(self.certain < 0), MOST_OPEN, side="right"))
+        reach = int(np.searchsorted(np.cumsum(self.certain < 0), MAX_OPEN_SCANS, side="right"))
         free = np.flatnonzero(self.certain[:reach] < 0)
         detected = np.tile(np.maximum(self.certain[:reach], 0), (2 ** len(free), 1))
         detected[:, free] = (np.arange(2 ** len(free))[:, None] >> np.arange(len(free))) & 1
@@ -66,7 +69,7 @@ def build_scene(case: Case) -> Scene:
         sigma = np.column_stack([sigma, np.where(first_sonar, third_sigma, np.inf)])
     nominal = sigma[0].copy()
     if spec.frame != "polar":
-        xx, _, yy = world.converted(*polar[0, :2, 0], *nominal[:2])[2]
+        xx, _, yy = conversion.convert_plainly(*polar[0, :2, 0], *nominal[:2])[2]
         nominal[:2] = np.sqrt(xx), np.sqrt(yy)
     certain = np.full(len(t), 1 if sensor.detection_probability == 1 else -1)
     certain[0] = 1
@@ -77,7 +80,7 @@ def build_scene(case: Case) -> Scene:
         polar=polar,
         sigma=sigma,
         nominal=nominal,
-        rho=np.array([correlation_of(sensor.error_correlation, c) for c in range(sigma.shape[1])]),
+        rho=np.array([coordinate_correlation(sensor.error_correlation, c) for c in range(sigma.shape[1])]),
         walk=spec.target.fluctuation_mps2 * lateral_scale(spec, 1),
         certain=certain,
         period=sensor.scan_period_s,
@@ -110,26 +113,30 @@ def courses(target: Target, t: np.ndarray, third: str | None) -> tuple[np.ndarra
     polar: tuple[np.ndarray, ...]
     cartesian: tuple[np.ndarray, ...]
     if isinstance(target, Polynomial) and target.range_m and target.bearing_rad:
-        polar = world.polynomials([target.range_m, target.bearing_rad], t)
-        cartesian = world.cartesian_states(*polar)
+        polar = target_motion.polynomial_states([target.range_m, target.bearing_rad], t)
+        cartesian = target_motion.cartesian_states(*polar)
     else:
         cartesian = _cartesian_course(target, t)
-        polar = world.polar_states(*cartesian)
+        polar = target_motion.polar_states(*cartesian)
     if third is None:
         return np.stack(polar, axis=1), np.stack(cartesian, axis=1)
-    more = world.polynomials([getattr(target, {"depth": "depth_m", "elevation": "elevation_rad"}[third])], t)
+    more = target_motion.polynomial_states(
+        [getattr(target, {"depth": "depth_m", "elevation": "elevation_rad"}[third])], t
+    )
     return np.stack([*polar, *more], axis=1), np.stack([*cartesian, *more], axis=1)
 
 
 def _cartesian_course(target: Target, t: np.ndarray) -> tuple[np.ndarray, ...]:
     """States (K, 3) in x and y of a target that is given in the cartesian frame."""
     if isinstance(target, Polynomial):
-        return world.polynomials([target.x_m or (), target.y_m or ()], t)
+        return target_motion.polynomial_states([target.x_m or (), target.y_m or ()], t)
     start = (target.x_m, target.y_m, target.speed_mps, target.course_rad)
     if isinstance(target, Turning):
-        return world.turning(*start, [(turn.start_s, turn.end_s, turn.rate_radps) for turn in target.turns], t)
+        return target_motion.turning_states(
+            *start, [(turn.start_s, turn.end_s, turn.rate_radps) for turn in target.turns], t
+        )
     end = math.inf if target.end_s is None else target.end_s
-    return world.accelerating(*start, target.acceleration_mps2, target.start_s, end, t)
+    return target_motion.accelerating_states(*start, target.acceleration_mps2, target.start_s, end, t)
 
 
 def lateral_scale(spec: Keys, power: int) -> np.ndarray:
@@ -154,7 +161,7 @@ def filter_specs(spec: Keys) -> list[FilterSpec]:
                 size=member.degree + 1,
                 length=member.plots or 0,
                 variance=(member.manoeuvre_variance or 0.0) * scale,
-                rho=np.array([correlation_of(rho, c) if correlated else 0.0 for c in range(len(scale))]),
+                rho=np.array([coordinate_correlation(rho, c) if correlated else 0.0 for c in range(len(scale))]),
             )
         )
     return specs

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import notes, statistics
+from radarsim.report import consistency_tables, statistics
 from radarsim.report import tables as common
-from radarsim.report.tables import Columns, leading, stacked
-from radarsim.studies.sonar import exact
-from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
+from radarsim.report.tables import Columns, label_columns, stack_columns
+from radarsim.studies.sonar import closed_forms
+from radarsim.studies.sonar.axes import GivenPlotsAxes, SonarAxes
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Index = tuple[np.ndarray, ...]
-table = common.Tables()
+table = common.TableMakers()
 
 
 # ---- parts of tables ----------------------------------------------------------------------------------------------
@@ -26,7 +26,9 @@ def coordinate_rows(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[In
     Rows are ordered by filter, coordinate, scan."""
     f, c, k = np.nonzero(np.moveaxis(mask, 1, 2))
     names, units = zip(*result.axes.coordinates, strict=True)
-    return (f, k, c), leading(result, f, k, component=common.names(names, c), unit=common.names(units, c))
+    return (f, k, c), label_columns(
+        result, f, k, component=common.pick_names(names, c), unit=common.pick_names(units, c)
+    )
 
 
 # ---- tables -------------------------------------------------------------------------------------------------------
@@ -59,13 +61,13 @@ def _extrapolation(result: CaseResult[SonarAxes]) -> Columns:
 def _curves(result: CaseResult[SonarAxes]) -> Columns:
     """As everywhere. What filters with a test of manoeuvres believe varies much: alarms change their window."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        variance = result.sums["believed"] / common.realisations(result)
+        variance = result.sums["believed"] / common.realisation_counts(result)
     return common.curve_columns(result, np.sqrt(variance))
 
 
 def curves(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
     """The table `curves` alone."""
-    return common.joined(map(_curves, results))
+    return common.join_columns(map(_curves, results))
 
 
 @table("consistency")
@@ -78,7 +80,7 @@ def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
     joint = result.sums["joint"][index]
     mean = statistics.mean_square(joint[:, 0] / size, joint[:, 1] / size**2, n)
     bounds = statistics.normalised_bounds(size * n, looks)
-    nees = notes.normalised("nees", mean, bounds, result.axes.exact_nees[index] / size)
+    nees = consistency_tables.normalised_square_columns("nees", mean, bounds, result.axes.exact_nees[index] / size)
     return {**columns, "n": n.astype(np.int64), **nees}
 
 
@@ -131,7 +133,7 @@ def _plots(result: CaseResult[GivenPlotsAxes]) -> Columns:
     formula: the paper's for degree 1, and its (3) for the acceleration
     bought_percent, formula_bought_percent: reduction by the last of these plots
     """
-    return stacked(
+    return stack_columns(
         [
             _plot_gains(result, f, c, quantity)
             for f, member in enumerate(result.spec.filters)
@@ -147,18 +149,18 @@ def _plot_gains(result: CaseResult[GivenPlotsAxes], f: int, c: int, quantity: st
     n = np.arange(member.degree + 1, len(axes.k) + (quantity != "extrapolated"))
     formula: np.ndarray = np.full(len(n), np.nan)
     if quantity == "acceleration":
-        unit, formula = axes.sigma[c] / axes.scan_period_s**2, np.asarray(exact.sigma_acceleration(n, 1.0))
+        unit, formula = axes.sigma[c] / axes.scan_period_s**2, np.asarray(closed_forms.sigma_acceleration(n, 1.0))
         moments = result.sums["error"][f, n - 1, _components_per_coordinate(result) * c + 2]
     elif quantity == "extrapolated":
         unit, moments = axes.sigma[c], result.sums["ahead"][f, n - 1, c]
     else:
         unit, moments = axes.sigma[c], result.sums["error"][f, n - 1, _components_per_coordinate(result) * c]
     if member.degree == 1:
-        formula_function = exact.sigma_smoothed if quantity == "smoothed" else exact.sigma_extrapolated
+        formula_function = closed_forms.sigma_smoothed if quantity == "smoothed" else closed_forms.sigma_extrapolated
         formula = np.asarray(formula_function(n))
     rms = statistics.root_mean_square(moments[:, 1], moments[:, 3], result.count)
     return {
-        **leading(result, np.full(len(n), f)),
+        **label_columns(result, np.full(len(n), f)),
         "degree": np.full(len(n), member.degree),
         "component": np.full(len(n), axes.coordinates[c][0], dtype=object),
         "what": np.full(len(n), quantity, dtype=object),
@@ -181,7 +183,7 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
     axes = result.axes
     parts: list[Columns] = []
     n = np.arange(2, len(axes.k) + 1)
-    A_formula, B_formula = exact.gains_closed(n)
+    A_formula, B_formula = closed_forms.gains_closed(n)
     for f, member in enumerate(result.spec.filters):
         plain = member.kind in ("growing_memory", "kalman") and not member.manoeuvre_variance and member.degree == 1
         for c, (name, _) in enumerate(axes.coordinates) if plain else ():
@@ -192,9 +194,11 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
             both = statistics.mean(joint[:, 2], joint[:, 3], result.count)
             A = statistics.Estimate(*(bound**2 / unit for bound in rms))
             B = statistics.Estimate(*(bound * axes.scan_period_s / unit for bound in both))
-            columns = leading(result, np.full(len(n), f), component=np.full(len(n), name, dtype=object)) | {"plots": n}
+            columns = label_columns(result, np.full(len(n), f), component=np.full(len(n), name, dtype=object)) | {
+                "plots": n
+            }
             parts.append(columns | {"A": A, "A_formula": A_formula, "B": B, "B_formula": B_formula})
-    return stacked(parts)
+    return stack_columns(parts)
 
 
 @table("conversion", lambda result: result.spec.frame != "polar")
@@ -225,7 +229,7 @@ def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
         "formula_m": float(axes.conversion_bias),
         "bias_to_sigma_range": bias / sensor.sigma_range_m,
     }
-    return common.of_rows([row])
+    return common.columns_from_rows([row])
 
 
 tables = table.made

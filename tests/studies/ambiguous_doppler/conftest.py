@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim.config.experiment import Case
-from radarsim.studies.ambiguous_doppler import config, filters, study
+from radarsim.studies.ambiguous_doppler import config, filter_design, study
 from tests.studies.ambiguous_doppler import naive
 
 RADARS = {  # σ_r, σ_V, Δt, λ of P1's
@@ -55,7 +55,7 @@ def tolerances(case, detected, size=naive.SIZE):
     range_only_options = [
         SimpleNamespace(orders=(member.order,), variances=(member.manoeuvre_variance,), doppler="none")
         for options in case.spec.filters
-        for member in filters.members(options)
+        for member in filter_design.members(options)
     ]
     kalmans = [naive.Kalman(member, case.spec.prior, sigma, radar.scan_period_s) for member in range_only_options]
     estimates, weights = zip(*(naive.rounding_errors(member, detected, size) for member in kalmans), strict=True)

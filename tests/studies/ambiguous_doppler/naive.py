@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from radarsim.studies.ambiguous_doppler.filters import model, prior_variances
+from radarsim.studies.ambiguous_doppler.filter_design import model, prior_variances
 from tests.tolerances import Z, rounding, scaled_condition
 
 SIZE = np.array([1e5, 1e3, 10.0])  # of the ranges, velocities and accelerations that are added up

@@ -3,10 +3,10 @@
 import pytest
 
 import radarsim
-from radarsim.app.configs import load
-from radarsim.config.load import as_yaml
+from radarsim.api.configs import load
+from radarsim.config.yaml_io import as_yaml
 from radarsim.errors import ConfigError
-from radarsim.studies.ambiguous_doppler.words import cures
+from radarsim.studies.ambiguous_doppler.answer import cures
 from tests.tolerances import share_error
 
 RADAR = {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 from radarsim.studies import registry
 

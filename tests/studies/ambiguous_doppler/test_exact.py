@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from radarsim.studies.ambiguous_doppler import filters as exact
-from radarsim.studies.ambiguous_doppler import study
+from radarsim.studies.ambiguous_doppler import exact_errors, study
 from tests.studies.ambiguous_doppler.conftest import (
     FIXED,
     MEMORY,
@@ -163,8 +162,8 @@ def test_no_exact_probability_if_truth_and_filter_differ():
 
 def test_product_of_teunissen():
     """Two scans of a span of two standard deviations: erf(1/√2)² = 0.4660649…"""
-    gains = exact.Gains(
+    gains = exact_errors.Gains(
         np.eye(3), np.zeros((2, 3)), np.zeros((2, 3)), np.array([4.0, 9.0]), np.ones(2), np.zeros((2, 3, 3))
     )
     expected = [0.6826894921370859, 0.6826894921370859**2]
-    assert_rounded(exact.nearest_fold_probability(gains, np.array([4.0, 6.0])), expected, operations=5)
+    assert_rounded(exact_errors.nearest_fold_probability(gains, np.array([4.0, 6.0])), expected, operations=5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarsim.studies.ambiguous_doppler import study
-from radarsim.studies.ambiguous_doppler.kernels import records, sums
+from radarsim.studies.ambiguous_doppler.kernels import layout, realisations
 from tests.studies.ambiguous_doppler import naive
 from tests.studies.ambiguous_doppler.conftest import (
     BEST,
@@ -27,8 +27,8 @@ HOW = {"range only": "none", "oracle": "unfolded", "nearest fold": "nearest"}
 def simulate_lanes(case, lanes=8):
     """Of some realisations: plots as the twins take them, and outputs (B, K, OUTPUT) of the kernels."""
     plan = study.prepare(case)
-    plots, out = sums.simulate_outputs(plan.world, plan.banks, 16)
-    columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.DETECTED]]
+    plots, out = realisations.simulate_outputs(plan.world, plan.banks, 16)
+    columns = plots[:, [layout.RANGE, layout.VELOCITY, layout.UNFOLDED, layout.DETECTED]]
     for lane in range(lanes):
         yield plan, columns[:, :, lane], out[..., lane]
 
@@ -55,8 +55,8 @@ def test_filters_of_one_hypothesis(radar, order, detection):
             x, right = naive.single_hypothesis_states(twin(case, options), plots, plan.world.spans, HOW[options.name])
             has_started = has_started_by_scan(plots)
             tolerance, _ = naive.rounding_errors(twin(case, options), plots[:, 3])
-            assert (np.abs(output[:, records.MEAN : records.MEAN + 3] - x)[has_started] <= tolerance).all()
-            assert np.array_equal(output[has_started, records.RIGHT], right[has_started])
+            assert (np.abs(output[:, layout.MEAN : layout.MEAN + 3] - x)[has_started] <= tolerance).all()
+            assert np.array_equal(output[has_started, layout.RIGHT], right[has_started])
 
 
 @pytest.mark.slow_cases_except("RLS 2-1.0", "RLS 4-0.6")
@@ -86,12 +86,12 @@ def test_remembering_filter(max_hypotheses, prune_below, detection):
         )
         has_started = has_started_by_scan(plots)
         assert len(out) == 1  # the two filters share a list
-        exactly = [records.RIGHT, records.LISTED, records.COUNT]
+        exactly = [layout.RIGHT, layout.LISTED, layout.COUNT]
         assert np.array_equal(out[0][has_started][:, exactly], expected[has_started][:, exactly])
-        difference = (out[0][:, : records.WEIGHTS] - expected)[has_started]
+        difference = (out[0][:, : layout.WEIGHTS] - expected)[has_started]
         of_estimates, of_weights = tolerances(case, plots[:, 3])
         assert (np.abs(difference[:, :6]) <= np.tile(of_estimates, 2)).all()
-        assert np.abs(difference[:, records.PROBABILITY]).max() < of_weights
+        assert np.abs(difference[:, layout.PROBABILITY]).max() < of_weights
 
 
 @pytest.mark.parametrize("detection", [1.0, 0.6])
@@ -113,7 +113,7 @@ def test_remainder_of_two_scans(detection):
         tolerance, _ = tolerances(case, plots[:, 3])
         assert (np.abs(out[0, :, :3] - x)[has_started] <= tolerance).all()
         right = np.abs(solved - plots[:, 2]) < 7.5  # half the smallest span
-        assert np.array_equal(out[0, plots[:, 3] > 0, records.RIGHT], right[plots[:, 3] > 0])
+        assert np.array_equal(out[0, plots[:, 3] > 0, layout.RIGHT], right[plots[:, 3] > 0])
         solved_count += right.sum()
     assert 20 < solved_count < 8 * 11
 
@@ -133,4 +133,4 @@ def test_unbounded_list_is_the_sum_over_all_sequences(scans, variance):
         mean, probability = naive.enumerate_sequences(options, case.spec.prior, sigma, 5.0, plots, spans, 6)
         of_estimates, of_weights = tolerances(case, plots[:, 3], np.array([1000.0, 30.0, 2.0]))
         assert (np.abs(out[0, -1, :3] - mean) <= of_estimates).all()
-        assert abs(out[0, -1, records.PROBABILITY] - probability) < of_weights
+        assert abs(out[0, -1, layout.PROBABILITY] - probability) < of_weights

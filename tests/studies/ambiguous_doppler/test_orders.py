@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim import physics
-from radarsim.app.configs import load
-from radarsim.studies.ambiguous_doppler import filters, study
-from radarsim.studies.ambiguous_doppler.filters import Member
-from radarsim.studies.ambiguous_doppler.kernels import records, sums
+from radarsim.api.configs import load
+from radarsim.physics import targets
+from radarsim.studies.ambiguous_doppler import exact_errors, filter_design, study
+from radarsim.studies.ambiguous_doppler.filter_design import Member
+from radarsim.studies.ambiguous_doppler.kernels import layout, realisations
 from tests.studies.ambiguous_doppler import naive
 from tests.studies.ambiguous_doppler.conftest import RANGE_ONLY, make_case, plan_and_sums, tolerances
 from tests.tolerances import Z, assert_rounded, rounding
@@ -25,8 +25,8 @@ PULSE |= {"start_s": 60.0, "duration_s": 30.0}
 
 def outputs(case):
     plan = study.prepare(case)
-    plots, out = sums.simulate_outputs(plan.world, plan.banks, 8)
-    columns = plots[:, [records.RANGE, records.VELOCITY, records.UNFOLDED, records.DETECTED]]
+    plots, out = realisations.simulate_outputs(plan.world, plan.banks, 8)
+    columns = plots[:, [layout.RANGE, layout.VELOCITY, layout.UNFOLDED, layout.DETECTED]]
     return plan, columns, out
 
 
@@ -39,7 +39,7 @@ def textbook_filters(case):
             (250.0, 15.0),
             10.0,
         )
-        for m in filters.members(case.spec.filters[0])
+        for m in filter_design.members(case.spec.filters[0])
     ]
 
 
@@ -58,7 +58,7 @@ def test_interacting_orders(doppler, detection):
         has_started = np.cumsum(lane_plots[:, 3]) > 0
         of_estimates, of_weights = tolerances(case, lane_plots[:, 3])
         assert (np.abs(out[0, :, :3, lane] - x)[has_started] <= of_estimates).all()
-        assert np.abs(out[0, :, records.WEIGHTS :, lane] - mu)[has_started].max() < of_weights
+        assert np.abs(out[0, :, layout.WEIGHTS :, lane] - mu)[has_started].max() < of_weights
 
 
 @pytest.mark.slow_cases("two orders-1.0", "twelve-1.0")
@@ -86,22 +86,22 @@ def test_orders_within_remembered_hypotheses(max_hypotheses, prune_below, orders
     case = make_case("RLS 2", filters, 6, PULSE | {"start_s": 20.0, "duration_s": 10.0}, **keys)
     plan, plots, out = outputs(case)
     assert len(out) == 1  # the two filters share a list
-    assert plan.banks.estimate_field.tolist() == [records.MEAN, records.BEST]
+    assert plan.banks.estimate_field.tolist() == [layout.MEAN, layout.BEST]
     for lane in range(2):
         lane_plots = plots[:, :, lane]
         expected = naive.interacting_hypothesis_outputs(
             textbook_filters(case), lane_plots, plan.world.spans, 0.95, max_hypotheses, prune_below, 24
         )
         has_started = np.cumsum(lane_plots[:, 3]) > 0
-        exactly = [records.RIGHT, records.LISTED, records.COUNT]
+        exactly = [layout.RIGHT, layout.LISTED, layout.COUNT]
         if prune_below > 0:  # beyond twenty-four folds the twin has none
             assert np.array_equal(out[0][has_started][:, exactly, lane], expected[has_started][:, exactly])
-        difference = (out[0, :, : records.WEIGHTS, lane] - expected[:, : records.WEIGHTS])[has_started]
+        difference = (out[0, :, : layout.WEIGHTS, lane] - expected[:, : layout.WEIGHTS])[has_started]
         of_estimates, of_weights = tolerances(case, lane_plots[:, 3])
         assert (np.abs(difference[:, :6]) <= np.tile(of_estimates, 2)).all()
-        assert np.abs(difference[:, records.PROBABILITY]).max() < of_weights
-        mu = out[0, :, records.WEIGHTS :, lane][:, orders]
-        assert np.abs(mu - expected[:, records.WEIGHTS :])[has_started].max() < of_weights
+        assert np.abs(difference[:, layout.PROBABILITY]).max() < of_weights
+        mu = out[0, :, layout.WEIGHTS :, lane][:, orders]
+        assert np.abs(mu - expected[:, layout.WEIGHTS :])[has_started].max() < of_weights
 
 
 def test_combinations_use_the_estimates_of_their_members():
@@ -109,7 +109,7 @@ def test_combinations_use_the_estimates_of_their_members():
     options = INTERSECTION | {"doppler": "folded"}
     case = make_case("RLS 2", [options | {"estimate": how, "name": how} for how in ("mean", "best")], 6, PULSE)
     plan, _, out = outputs(case)
-    for f, place in enumerate((records.MEAN, records.BEST)):
+    for f, place in enumerate((layout.MEAN, layout.BEST)):
         bank = plan.banks.bank[f]
         parts = out[plan.banks.members[bank, :6]][:, :, place : place + 3]
         assert (np.abs(parts - out[bank][None, :, :3]).min(axis=0) == 0).all()
@@ -120,7 +120,7 @@ def test_intersection_of_intervals():
     case = make_case("RLS 2", [INTERSECTION | {"doppler": "unfolded"}], 15, PULSE)
     plan, _, out = outputs(case)
     options, widths = case.spec.filters[0], plan.banks.shares[plan.banks.bank[0]]
-    members, member_outputs = filters.members(options), out[plan.banks.bank[0]]
+    members, member_outputs = filter_design.members(options), out[plan.banks.bank[0]]
     parts = out[plan.banks.members[plan.banks.bank[0], : len(members)]]
     chosen_orders = set()
     for k in range(15):
@@ -129,7 +129,7 @@ def test_intersection_of_intervals():
                 i = naive.smoothest_meeting(parts[:, k, c, lane], widths[k, : len(members), c])
                 assert member_outputs[k, c, lane] == (0.0 if i is None else parts[i, k, c, lane])
                 if c == 0:
-                    assert member_outputs[k, records.WEIGHTS + members[i].order, lane] == 1
+                    assert member_outputs[k, layout.WEIGHTS + members[i].order, lane] == 1
                     chosen_orders.add(members[i])
     assert len(chosen_orders) > 2  # through a manoeuvre it changes
 
@@ -150,11 +150,11 @@ def test_best_shares():
     """Against the solution of the constrained problem by hand: two independent errors of variances 1 and 3."""
     E = np.broadcast_to(np.diag([1.0, 3.0]), (1, 3, 2, 2))
     expected = np.broadcast_to(np.array([0.75, 0.25])[None, :, None], (1, 2, 3))
-    assert_rounded(filters.best_shares(E, np.ones((2, 3), bool)), expected, condition=3, operations=5)
-    single_shares = filters.best_shares(E, np.array([[True, False, False], [True, True, False]]))
+    assert_rounded(exact_errors.best_shares(E, np.ones((2, 3), bool)), expected, condition=3, operations=5)
+    single_shares = exact_errors.best_shares(E, np.array([[True, False, False], [True, True, False]]))
     assert_rounded(single_shares[0], [[0.75, 0, 0], [0.25, 1, 0]], condition=3, operations=5)
     certain = np.broadcast_to(np.diag([0.0, 3.0]), (1, 3, 2, 2))
-    assert filters.best_shares(certain, np.ones((2, 3), bool))[0, :, 0].tolist() == [1, 0]
+    assert exact_errors.best_shares(certain, np.ones((2, 3), bool))[0, :, 0].tolist() == [1, 0]
 
 
 def test_published_numbers_of_the_manoeuvre():
@@ -164,10 +164,10 @@ def test_published_numbers_of_the_manoeuvre():
     """
     spec, t = load("orders").cases[1].spec, np.arange(15) * 10.0
     members = [Member(order, how, {1: 4.0, 2: 1e-3}[order]) for how in ("unfolded", "none") for order in (1, 2)]
-    gains = [filters.kalman_gains(sigma_1, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for sigma_1 in members]
-    motion = physics.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
-    bias, noise = filters.linear_errors(gains, motion[None], np.array([250.0, 15.0]))
-    E = filters.joint_moments(bias, noise, np.ones(1))[-1, 0]
+    gains = [exact_errors.kalman_gains(sigma_1, spec.prior, np.array([250.0, 15.0]), 10.0, 15) for sigma_1 in members]
+    motion = targets.acceleration_pulse([100e3, -250.0], 20.0, 60.0, 30.0, t)
+    bias, noise = exact_errors.linear_errors(gains, motion[None], np.array([250.0, 15.0]))
+    E = exact_errors.joint_moments(bias, noise, np.ones(1))[-1, 0]
     assert np.sqrt(np.diag(E)[:2]) == pytest.approx([162, 347], abs=0.5)  # as printed
     assert 1 / np.sqrt(np.linalg.inv(E).sum()) == pytest.approx(155, abs=0.5)
     sigma_1, sigma_2 = np.sqrt([noise[-1, i, 0, i, 0] for i in range(2)])

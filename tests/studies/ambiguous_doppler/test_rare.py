@@ -10,13 +10,12 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import chi2
 
 import radarsim
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 from radarsim.kernels.random import stream
-from radarsim.report import rare as report
-from radarsim.studies.ambiguous_doppler import filters, study
-from radarsim.studies.ambiguous_doppler.kernels import records
-from radarsim.studies.ambiguous_doppler.kernels import sums as kernels
+from radarsim.report import rare_events
+from radarsim.studies.ambiguous_doppler import filter_design, importance_sampling, lattice, study
+from radarsim.studies.ambiguous_doppler.kernels import layout, weighted_sums
 from tests.studies.ambiguous_doppler.conftest import (
     FIXED,
     MEMORY,
@@ -48,32 +47,32 @@ def with_seed(plan, seed):
 
 def rate(plan, n, f=0):
     """The weighted share of wrong folds of filter f at the last scan, and its standard error."""
-    weight, square, *_ = simulate_sums(plan, n)["events"][f, -1, kernels.WRONG]
+    weight, square, *_ = simulate_sums(plan, n)["events"][f, -1, weighted_sums.WRONG]
     return weight / n, math.sqrt(square / n - (weight / n) ** 2) / math.sqrt(n)
 
 
 def plain_rate(case, seed, n, f=0):
     """The share of n plain realisations with a wrong fold at the last scan, and its standard error."""
     plan = study.prepare(replace(case, spec=case.spec.model_copy(update={"rare": None})))
-    wrong = n - simulate_sums(with_seed(plan, seed), n)["folds"][f, -1, records.RIGHT_SUM]
+    wrong = n - simulate_sums(with_seed(plan, seed), n)["folds"][f, -1, layout.RIGHT_SUM]
     return wrong / n, math.sqrt(max(wrong, 1)) / n
 
 
 def innovations_of(case):
     options = case.spec.filters[0]
-    return study.linear_innovations(study.prepare(case).world, case.spec, options)
+    return importance_sampling.linear_innovations(study.prepare(case).world, case.spec, options)
 
 
 def plots_covariance(case):
     """Covariance of (V_1, r_2 − r_1, V_2, …) as a filter believes it: what is drawn, process noise, errors of plots."""
     spec, scans = case.spec, case.spec.scans
-    (member,) = filters.members(spec.filters[0])
-    F, Q = filters.model(member.order, member.manoeuvre_variance, spec.radar.scan_period_s)
+    (member,) = filter_design.members(spec.filters[0])
+    F, Q = filter_design.model(member.order, member.manoeuvre_variance, spec.radar.scan_period_s)
     sizes, vectors = np.linalg.eigh(Q)  # of rank one
     root = vectors * np.sqrt(np.maximum(sizes, 0.0))
     wide = 2 + 3 * scans + 2 * scans
     x = np.zeros((3, wide))  # columns: V, a, process noise, errors of ranges and velocities
-    x[1, 0], x[2, 1] = np.sqrt(filters.prior_variances(member.order, spec.prior))
+    x[1, 0], x[2, 1] = np.sqrt(filter_design.prior_variances(member.order, spec.prior))
     rows, first = [], None
     for k in range(scans):
         if k:
@@ -117,7 +116,7 @@ def test_distances_are_half_of_those_between_sequences_if_truth_and_filter_agree
     precision = {"condition": scaled_condition(plots_covariance(case)), "operations": 60}  # ten operations a scan
     assert_rounded(L[1:] @ L[1:].T, np.eye(11), size=1, **precision)  # the first range tells nothing
     m = np.array([[1.0, 0, 0, 0, 0, 0], [0, 1, -1, 0, 2, 0]])
-    spaces = study.sequence_half_spaces(innovations.until(6), m, 0.0)
+    spaces = importance_sampling.sequence_half_spaces(innovations.until(6), m, 0.0)
     assert_rounded(spaces.distance, np.linalg.norm(m @ A.T, axis=1) / 2, **precision)
     assert_rounded(np.linalg.norm(spaces.units, axis=1), np.ones(2), operations=20)
 
@@ -125,17 +124,17 @@ def test_distances_are_half_of_those_between_sequences_if_truth_and_filter_agree
 def test_lattice_vectors_are_complete():
     """Against all whole numbers in a box, of a skew basis."""
     A = np.array([[1.0, 7.9, 3.1], [0.0, 1.0, -4.2], [0.0, 0.0, 1.5], [0.3, -0.2, 0.1]])
-    T = filters.reduce_basis(A, np.eye(3))
+    T = lattice.reduce_basis(A, np.eye(3))
     assert np.array_equal(T, np.rint(T))
     assert np.rint(abs(np.linalg.det(T))) == 1  # that of whole numbers is whole
     assert np.linalg.norm(A @ T, axis=0).max() < np.linalg.norm(A, axis=0).max()
-    vectors = {tuple(m) for m in filters.lattice_vectors(A, T, 5.0, 1000)}
+    vectors = {tuple(m) for m in lattice.lattice_vectors(A, T, 5.0, 1000)}
     box = np.array(list(itertools.product(range(-60, 61), range(-12, 13), range(-4, 5))), dtype=float)
     expected = {tuple(m) for m in box[(np.linalg.norm(box @ A.T, axis=1) <= 5.0) & box.any(axis=1)]}
     assert vectors == expected
     assert len(vectors) == 38
-    with pytest.raises(filters.TooManyVectors):
-        filters.lattice_vectors(A, T, 5.0, 10)
+    with pytest.raises(lattice.TooManyVectors):
+        lattice.lattice_vectors(A, T, 5.0, 10)
 
 
 def simulate_each(plan, n):
@@ -144,9 +143,9 @@ def simulate_each(plan, n):
     room, chosen, weights = np.zeros(8 * normals.shape[1]), np.zeros(8, np.int64), np.zeros(8)
     for i in range(n):
         if i % 8 == 0:
-            kernels.fill_shifted(plan.world, plan.mixture, i, room, chosen, weights)
+            weighted_sums.fill_shifted(plan.world, plan.mixture, i, room, chosen, weights)
         normals[i] = room.reshape(-1, 8)[:, i % 8]
-        wrong[i] = plan.layout.unpack(study.simulate(plan, i, 1))["events"][0, -1, kernels.WRONG, 2]
+        wrong[i] = plan.layout.unpack(study.simulate(plan, i, 1))["events"][0, -1, weighted_sums.WRONG, 2]
     return normals, wrong
 
 
@@ -164,9 +163,11 @@ def test_folds_are_wrong_exactly_in_the_half_spaces(options, keys):
     case = rare_case(options, 5, **keys)
     plan, innovations = study.prepare(case), innovations_of(case)
     if options["hypotheses"] == 1:
-        spaces = study.nearest_fold_half_spaces(innovations)
+        spaces = importance_sampling.nearest_fold_half_spaces(innovations)
     else:
-        spaces = study.half_spaces_within(innovations, study.reduced_bases(innovations), filters.UNLIMITED_DEPTH, 8.5)
+        spaces = importance_sampling.half_spaces_within(
+            innovations, importance_sampling.reduced_bases(innovations), filter_design.UNLIMITED_DEPTH, 8.5
+        )
     normals, wrong = simulate_each(plan, 120)
     assert 30 < wrong.sum() < 90
     assert np.array_equal((normals @ spaces.units.T > spaces.distance).any(axis=1), wrong)
@@ -177,8 +178,12 @@ def test_early_drops_lie_in_a_half_space():
     options, keys = ALL | {"prune_below": 0.05}, {"prior": NARROW, "repetition_rate_hz": 1000.0}
     case = rare_case(options, 6, **keys)
     innovations = innovations_of(case)
-    spaces = study.half_spaces_within(innovations, study.reduced_bases(innovations), -math.log(0.05), 8.0)
-    at_last = study.half_spaces_within(innovations, study.reduced_bases(innovations), filters.UNLIMITED_DEPTH, 8.0)
+    spaces = importance_sampling.half_spaces_within(
+        innovations, importance_sampling.reduced_bases(innovations), -math.log(0.05), 8.0
+    )
+    at_last = importance_sampling.half_spaces_within(
+        innovations, importance_sampling.reduced_bases(innovations), filter_design.UNLIMITED_DEPTH, 8.0
+    )
     normals, wrong = simulate_each(study.prepare(case), 400)
     within = (normals @ spaces.units.T > spaces.distance).any(axis=1)
     assert not (wrong & ~within).any()
@@ -194,7 +199,7 @@ def test_weights_restore_the_normal_law():
     normals, chosen, weights = np.zeros(8 * law.units.shape[1]), np.zeros((n // 8, 8), np.int64), np.zeros((n // 8, 8))
     along = np.empty((n // 8, 8, len(law.shift)))
     for i in range(n // 8):
-        kernels.fill_shifted(plan.world, law, 8 * i, normals, chosen[i], weights[i])
+        weighted_sums.fill_shifted(plan.world, law, 8 * i, normals, chosen[i], weights[i])
         along[i] = normals.reshape(-1, 8).T @ law.units.T
     weights, along, chosen = weights.ravel(), along.reshape(n, -1), chosen.ravel()
     assert abs(weights.mean() - 1) < mean_error(n, weights.std())
@@ -226,7 +231,9 @@ def test_rate_of_two_scans_is_the_integral_over_a_hexagon(hertz):
     """Of two folds all that decides lies in a plane, where the right ones hold a cell of six sides about the origin."""
     case = rare_case(ALL, 2, prior=NARROW, variance=0.0, repetition_rate_hz=hertz)
     innovations = innovations_of(case)
-    spaces = study.half_spaces_within(innovations, study.reduced_bases(innovations), filters.UNLIMITED_DEPTH, 9.0)
+    spaces = importance_sampling.half_spaces_within(
+        innovations, importance_sampling.reduced_bases(innovations), filter_design.UNLIMITED_DEPTH, 9.0
+    )
     basis = np.linalg.svd(spaces.units, full_matrices=False)[2][:2]
     plane = spaces.units @ basis.T
     assert_rounded(np.linalg.norm(plane, axis=1), np.ones(len(plane)), operations=20)
@@ -243,8 +250,8 @@ def test_rate_of_1e_5_lies_between_its_bounds():
     """The nearest two half-spaces never meet, and all of them together bound the rate from above."""
     case = rare_case(MEMORY | {"hypotheses": 1000, "prune_below": 1e-9}, 10, repetition_rate_hz=970.0)
     plan, innovations = study.prepare(case), innovations_of(case)
-    spaces = study.find_half_spaces(innovations, case.spec.filters[0])
-    chance = study.probabilities(spaces)
+    spaces = importance_sampling.find_half_spaces(innovations, case.spec.filters[0])
+    chance = importance_sampling.probabilities(spaces)
     assert spaces.units[0] == pytest.approx(-spaces.units[1], abs=rounding(operations=20))
     mean, error = rate(plan, 20_000)
     assert 3e-6 < mean < 3e-5
@@ -311,17 +318,20 @@ def test_sums_are_those_of_the_weights_and_are_additive():
         assert_rounded(values, parts[name], size=column_sizes(values, 60), operations=60)
     room, chosen, weights = np.zeros(8 * 14), np.zeros((8, 8), np.int64), np.zeros((8, 8))
     for i in range(8):
-        kernels.fill_shifted(plan.world, plan.mixture, 104 + 8 * i, room, chosen[i], weights[i])
+        weighted_sums.fill_shifted(plan.world, plan.mixture, 104 + 8 * i, room, chosen[i], weights[i])
     chosen, weights = chosen.ravel()[:60], weights.ravel()[:60]
     plain = chosen == 0
     assert_rounded(sums["drawn"], [plain.sum(), weights.sum(), weights @ weights], operations=60)
     wrong = np.array(
-        [plan.layout.unpack(study.simulate(plan, 104 + i, 1))["events"][0, -1, kernels.WRONG, 2] for i in range(60)]
+        [
+            plan.layout.unpack(study.simulate(plan, 104 + i, 1))["events"][0, -1, weighted_sums.WRONG, 2]
+            for i in range(60)
+        ]
     )
     of_wrong = [weights @ wrong, weights**2 @ wrong, wrong.sum(), weights**4 @ wrong]
-    assert_rounded(sums["events"][0, -1, kernels.WRONG], of_wrong, operations=60)
+    assert_rounded(sums["events"][0, -1, weighted_sums.WRONG], of_wrong, operations=60)
     assert not sums["events"][1].any()  # the oracle folds nothing
-    assert sums["folds"][0, -1, records.RIGHT_SUM] == (plain & (wrong == 0)).sum()
+    assert sums["folds"][0, -1, layout.RIGHT_SUM] == (plain & (wrong == 0)).sum()
     assert (sums["estimates"] == plain.sum()).all()
     plain_plan = study.prepare(replace(case, spec=case.spec.model_copy(update={"rare": None})))
     first = 104 + int(np.flatnonzero(plain)[0])  # a plain realisation has the noise that it would have
@@ -342,7 +352,7 @@ def test_tables_have_the_rate_with_its_interval():
     table = result.tables["rare"]
     assert list(table.columns[6:13]) == ["n", "rate", "rate_lo", "rate_hi", "events", "n_eff", "variance_factor"]
     row, sums = table.iloc[0], result.cases[0].sums
-    weight, square, number, _ = sums["events"][0, -1, kernels.WRONG]
+    weight, square, number, _ = sums["events"][0, -1, weighted_sums.WRONG]
     assert row["rate"] == weight / 6000
     assert row["events"] == number
     assert_rounded(row["n_eff"], weight**2 / square, operations=3)
@@ -354,7 +364,7 @@ def test_tables_have_the_rate_with_its_interval():
     last = folds[(folds["filter"] == "memory") & (folds["k"] == 8)].iloc[0]
     assert_rounded(last["right"], 1 - row["rate"])
     assert_rounded(last["right_hi"], 1 - row["rate_lo"])
-    weight = sums["events"][0, -1, kernels.BEYOND, 0]
+    weight = sums["events"][0, -1, weighted_sums.BEYOND, 0]
     assert last["beyond"] == weight / 6000
     assert result.curves["n"].max() <= row["plain"]
     assert "by importance sampling" in " ".join(result.answer)
@@ -377,7 +387,7 @@ def test_wrong_folds_of_full_lists_have_a_note():
         assert full["events"] <= total["events"]
         squares = [row["rate"] ** 2 / max(row["n_eff"], 1) for row in (full, total)]
         assert (squares[0] > 0.1 * squares[1]) == is_noted
-        assert (total["note"] == str(report.UNGUIDED)) == is_noted
+        assert (total["note"] == str(rare_events.UNGUIDED)) == is_noted
         assert any("may be too narrow" in line for line in result.warnings) or not is_noted
 
 

@@ -8,16 +8,24 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError, PlotFault
-from radarsim.recorded import fit, plots
-from radarsim.report import notes, statistics
+from radarsim.recordings import csv_rows
+from radarsim.recordings.fit import fit
+from radarsim.report import interval_notes, statistics
 from radarsim.studies import registry
-from radarsim.studies.ambiguous_doppler import figures, study, track
-from radarsim.studies.ambiguous_doppler.kernels import records, rows
+from radarsim.studies.ambiguous_doppler import (
+    fold_resolver,
+    hypothesis_fan,
+    plot_likelihood,
+    recorded_plots,
+    study,
+    tracking,
+)
+from radarsim.studies.ambiguous_doppler.kernels import layout, realisations, recorded_rows
 from radarsim.studies.ambiguous_doppler.tables import FEW_FOLDS
 from tests.answers import answer_texts
-from tests.recorded import whole
+from tests.recordings import whole
 from tests.studies.ambiguous_doppler.conftest import tolerances
 from tests.tolerances import assert_rounded, mean_error
 
@@ -134,8 +142,8 @@ def test_mean_of_fan_is_the_estimate():
     """The weighted mean of the listed hypotheses is the filter's estimate, scan by scan."""
     case = load("ambiguous_rls4").cases[0]
     plan = study.prepare(case)
-    _, out = study.sums.simulate_outputs(plan.world, plan.banks, 0)
-    fan, (tolerance, _) = figures.fan(case, 5, 6), tolerances(case, np.ones(15))
+    _, out = realisations.simulate_outputs(plan.world, plan.banks, 0)
+    fan, (tolerance, _) = hypothesis_fan.fan(case, 5, 6), tolerances(case, np.ones(15))
     for k, (v, a, p) in enumerate(fan.lists):
         mean = out[plan.banks.bank[5], k, :3, 7]
         assert p @ v == pytest.approx(mean[1], rel=0, abs=tolerance[1])
@@ -148,13 +156,13 @@ def test_track_over_simulated_plots_equals_the_study(keys):
     """Recorded at the config's own times, the trackers' estimates are those of the kernels."""
     case = load("ambiguous_rls4", [*keys, "filters.2.hypotheses=2"]).cases[0]
     plan = study.prepare(case)
-    plots, out = study.sums.simulate_outputs(plan.world, plan.banks, 8)
-    columns = track.Recorded().simulated(case, 11)
+    plots, out = realisations.simulate_outputs(plan.world, plan.banks, 8)
+    columns = recorded_plots.FoldedRecordedPlots().simulated(case, 11)
     is_detected = ~np.isnan(columns["range_m"])
     assert np.array_equal(columns["range_m"][is_detected], plots[is_detected, 0, 3])
     assert (np.abs(columns["velocity_mps"][is_detected]) <= plan.world.spans[is_detected] / 2).all()
     recorded_columns = columns | {"velocity_mps": columns["velocity_mps"].copy()}
-    tracks = track.Tracker(case).feed(recorded_columns)
+    tracks = tracking.Tracker(case).feed(recorded_columns)
     started = np.cumsum(is_detected) > 0
     names = [options.name for options in case.spec.filters]
     assert set(names) - set(tracks.filters) == {"oracle"}  # recorded velocities are folded
@@ -189,9 +197,9 @@ def test_track_of_combined_orders_equals_the_study(doppler, more):
     keys[-1] += "acceleration_g: 2, start_s: 60, duration_s: 30}"
     case = load("ambiguous_rls2", [*keys, "baseline=likelihood"]).cases[0]
     plan = study.prepare(case)
-    plots, out = study.sums.simulate_outputs(plan.world, plan.banks, 8)
-    velocity = plots[:, records.UNFOLDED if doppler == "unfolded" else records.VELOCITY, 3]
-    tracks = track.Tracker(case).feed({"t_s": plan.world.t, "range_m": plots[:, 0, 3], "velocity_mps": velocity})
+    plots, out = realisations.simulate_outputs(plan.world, plan.banks, 8)
+    velocity = plots[:, layout.UNFOLDED if doppler == "unfolded" else layout.VELOCITY, 3]
+    tracks = tracking.Tracker(case).feed({"t_s": plan.world.t, "range_m": plots[:, 0, 3], "velocity_mps": velocity})
     for f, name in enumerate(tracks.filters):
         place = plan.banks.estimate_field[f]
         output = out[plan.banks.bank[f], :, place : place + 3, 3]
@@ -209,7 +217,7 @@ def test_track_of_combined_orders_over_gaps():
     t = np.array([0.0, 10, 20, 33, 40, 90, 100])
     z = np.array([np.nan, 1e5, 97.5e3, np.nan, 90e3, 77.5e3, 75e3])
     v = np.array([-250.0, np.nan, -245, -251, np.nan, -240, -250])
-    tracker = track.Tracker(case)
+    tracker = tracking.Tracker(case)
     tracks = tracker.feed({"t_s": t, "range_m": z, "velocity_mps": v})
     assert np.isnan(tracks.estimate[:, 0]).all()
     assert np.isfinite(tracks.estimate[:, 1:, 0]).all()
@@ -225,9 +233,9 @@ def test_track_of_remainders_equals_the_study():
     filter_yaml = "{name: remainder, doppler: remainder, manoeuvre_variance: 1e-3}"
     case = load("ambiguous_rls4", [*keys, f"filters=[{filter_yaml}]"]).cases[0]
     plan = study.prepare(case)
-    _, out = study.sums.simulate_outputs(plan.world, plan.banks, 8)
-    columns = track.Recorded().simulated(case, 11)
-    tracks = track.Tracker(case).feed(columns)
+    _, out = realisations.simulate_outputs(plan.world, plan.banks, 8)
+    columns = recorded_plots.FoldedRecordedPlots().simulated(case, 11)
+    tracks = tracking.Tracker(case).feed(columns)
     has_estimate = np.isfinite(tracks.estimate[0, :, 0])
     assert has_estimate.sum() > 8
     difference = np.abs(tracks.estimate[0] - out[0, :, :3, 3])[has_estimate]
@@ -236,7 +244,9 @@ def test_track_of_remainders_equals_the_study():
 
 def test_remainder_depends_on_the_folded_velocity_only():
     """However many spans too large it is written."""
-    folds = track.FoldResolver(load("ambiguous_rls4", ["radar.repetition_rate_hz=[1000, 1200]"]).cases[0].spec.radar)
+    folds = fold_resolver.FoldResolver(
+        load("ambiguous_rls4", ["radar.repetition_rate_hz=[1000, 1200]"]).cases[0].spec.radar
+    )
     folds.begin_row(0.0, 15.0)
     assert np.isnan(folds.remainder(2.0 + 15 * 2**20))
     folds.begin_row(10.0, 18.0)
@@ -257,7 +267,7 @@ def test_remainder_depends_on_the_folded_velocity_only():
 def test_too_many_folds_are_reported_with_their_row(tmp_path, change, words):
     experiment = load("ambiguous_rls4", ["filters=[{name: memory, doppler: folded, manoeuvre_variance: 1e-3}]"])
     t = np.arange(15) * 10.0
-    plots.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
+    csv_rows.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
     with warnings.catch_warnings(action="error"), pytest.raises(ConfigError) as error:
         whole.track(experiment, tmp_path / "plots.csv")
     assert words in str(error.value)
@@ -268,17 +278,17 @@ def test_too_many_folds_have_no_likelihood():
     case = load("ambiguous_rls4").cases[0]
     t = np.arange(15) * 1e7  # over which a speed may have become anything
     columns = {"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t, "span_mps": np.full(15, 2.0)}
-    likelihood = track.PlotLikelihood(case, case.spec.filters[5], [columns])
+    likelihood = plot_likelihood.PlotLikelihood(case, case.spec.filters[5], [columns])
     assert likelihood(likelihood.stated) == -np.inf
     _, sigma, _ = fit.fit_keys(likelihood).keys  # unless the velocities tell nothing
     assert sigma.value >= 2.0
 
 
 def test_folds_are_counted_before_sequences_are_built():
-    folds = track.FoldResolver(load("ambiguous_rls4").cases[0].spec.radar)
+    folds = fold_resolver.FoldResolver(load("ambiguous_rls4").cases[0].spec.radar)
     folds.begin_row(0.0, 18.0)
-    max_variance = (rows.MAX_SEQUENCES / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
-    assert folds.innovations(np.zeros(1), np.array([max_variance * 0.999])).shape[1] <= rows.MAX_SEQUENCES + 1
+    max_variance = (recorded_rows.MAX_SEQUENCES / 2) ** 2 * 4  # a reach of half as many spans as may be, to either side
+    assert folds.innovations(np.zeros(1), np.array([max_variance * 0.999])).shape[1] <= recorded_rows.MAX_SEQUENCES + 1
     for e, S in (
         (np.zeros(1), max_variance * 1.001),
         (np.zeros(300), max_variance / 299**2),
@@ -293,10 +303,10 @@ def test_fan_of_a_case_with_rare_folds_shows_plain_realisations():
     """The fan holds one filter alone, which need not be the one whose wrong folds are rare."""
     case = load("ambiguous_rare").cases[0]
     filter_index = next(i for i, options in enumerate(case.spec.filters) if (options.hypotheses or 1) > 1)
-    fan = figures.fan(case, filter_index, 3)
+    fan = hypothesis_fan.fan(case, filter_index, 3)
     plain = replace(case, spec=case.spec.model_copy(update={"rare": None}))
     assert case.spec.rare is not None
-    np.testing.assert_array_equal(fan.truth, figures.fan(plain, filter_index, 3).truth)
+    np.testing.assert_array_equal(fan.truth, hypothesis_fan.fan(plain, filter_index, 3).truth)
     assert len(fan.lists) == 3
 
 
@@ -319,16 +329,16 @@ def test_sigma_is_marked_where_few_false_velocities_were_seen():
     """Of filters that unfold, and of what is compared with them; one that needs not is left alone."""
     tables = radarsim.run("ambiguous_rls5", realisations=300, overrides=["scans=12", "baseline=memory"]).tables
     folds = tables["folds"].set_index(["filter", "k"])
-    few = (folds["n"] * folds["beyond"]).round() < statistics.FEW_EVENTS
+    few = (folds["n"] * folds["beyond"]).round() < statistics.MIN_EVENTS
     assert few.any()
     assert not few.all()
     curves, gains = tables["curves"], tables["gains"]
     is_marked = pd.Series([bool(few.get((row.filter, row.k), False)) for row in curves.itertuples()])
     assert (curves["note"] == str(FEW_FOLDS))[~is_marked].sum() == 0
-    assert curves["note"][is_marked].isin([str(FEW_FOLDS), str(notes.HEAVY)]).all()
+    assert curves["note"][is_marked].isin([str(FEW_FOLDS), str(interval_notes.HEAVY_TAILS)]).all()
     assert (curves["note"] == str(FEW_FOLDS)).any()
     late = gains[(gains["filter"] == "range only") & (gains["k"] == 12)]
-    assert late["note"].isin([str(FEW_FOLDS), str(notes.HEAVY)]).all()  # its baseline unfolds
+    assert late["note"].isin([str(FEW_FOLDS), str(interval_notes.HEAVY_TAILS)]).all()  # its baseline unfolds
 
 
 @pytest.mark.parametrize("name", ["no memory", "best hypothesis", "memory"])
@@ -338,9 +348,11 @@ def test_configured_plots_pass_the_checks_while_folds_are_undecided(name):
     tested = []
     for realisation in range(12):
         columns = {
-            key: column for key, column in track.Recorded().simulated(case, realisation).items() if "true" not in key
+            key: column
+            for key, column in recorded_plots.FoldedRecordedPlots().simulated(case, realisation).items()
+            if "true" not in key
         }
-        tracks = track.Tracker(case).feed(columns)
+        tracks = tracking.Tracker(case).feed(columns)
         assert "oracle" not in tracks.filters  # a recording has no true folds
         tested.append(tracks.nis[tracks.filters.index(name), 1:, 0])
     tested = np.concatenate(tested)

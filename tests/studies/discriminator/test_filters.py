@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from radarsim.bursts import burst as model
+from radarsim.bursts import block_sums, estimators, window_schedule
+from radarsim.bursts import fisher as bursts_fisher
 from radarsim.bursts.burst import Burst
 from tests.studies.discriminator import naive as naive
 from tests.tolerances import assert_rounded, scaled_condition, share_error
@@ -20,21 +21,21 @@ PRINTED_PRIOR = np.array([6.1, 67.5, 6.1e3, 183.38e3, 2.426e6])
 
 
 def designer(burst=COMPUTED, sigma=None, **condition):
-    fisher = partial(model.fisher, burst, 5)
-    sigma = model.spreads(fisher(burst.duration_s)) * TIMES if sigma is None else sigma
-    return model.Designer(burst, sigma, fisher, model.Condition(**condition))
+    fisher = partial(bursts_fisher.fisher, burst, 5)
+    sigma = bursts_fisher.spreads(fisher(burst.duration_s)) * TIMES if sigma is None else sigma
+    return window_schedule.Designer(burst, sigma, fisher, window_schedule.Condition(**condition))
 
 
 def test_paper_pairs_three_sigma_with_its_probability():
-    assert model.spread_factor(0.99) == 3.0
-    assert model.spread_factor(0.9) < 3.0 < model.spread_factor(0.999)
+    assert window_schedule.spread_factor(0.99) == 3.0
+    assert window_schedule.spread_factor(0.9) < 3.0 < window_schedule.spread_factor(0.999)
 
 
 @pytest.mark.parametrize(("weights", "threshold"), [([1], 0.1), ([1], 60), ([2, 2], 5), ([0.5] * 5, 1), ([1e6], 1)])
 def test_tail_of_equal_weights_is_chi_square(weights, threshold):
     expected = chi2.sf(threshold / weights[0], len(weights))
     # To the 10⁻¹² that it states; weights of 10⁶ move the pole, at 0, beside the path.
-    found = model.tail_probability(np.array(weights, float), threshold)
+    found = window_schedule.tail_probability(np.array(weights, float), threshold)
     assert found == pytest.approx(expected, rel=1e-12)
 
 
@@ -42,7 +43,7 @@ def test_tail_of_unequal_weights_against_sampling():
     weights, rng = np.array([0.19, 0.05, 2e-3, 1e-7]), np.random.default_rng(1)
     n = 2_000_000
     share = np.mean(rng.standard_normal((n, 4)) ** 2 @ weights > 1.0)
-    expected = model.tail_probability(weights, 1.0)
+    expected = window_schedule.tail_probability(weights, 1.0)
     assert share == pytest.approx(expected, abs=share_error(expected, n))
 
 
@@ -53,7 +54,9 @@ def test_gaussian_condition_is_equation_14():
     (one, _), (other, mu) = d.posterior(before), d.posterior(after)
     # The twin's error is a difference of inverses; of the form, 1 is taken off.
     twin, condition = naive.handover_form(one, other, mu), scaled_condition(np.stack([one, other])).max()
-    assert_rounded(model.excess(values, d.condition), twin - 1.0, size=twin, condition=condition, operations=25)
+    assert_rounded(
+        window_schedule.excess(values, d.condition), twin - 1.0, size=twin, condition=condition, operations=25
+    )
 
 
 def test_computed_schedule():
@@ -77,14 +80,14 @@ def test_each_designed_window_is_the_longest_safe_one():
     windows = d.windows()
     for a, b in itertools.pairwise(windows[:-1]):
         form = d.handover(a * period)
-        shorter, longer = (model.excess(form(after * period).values, d.condition) for after in (b - 1, b + 1))
+        shorter, longer = (window_schedule.excess(form(after * period).values, d.condition) for after in (b - 1, b + 1))
         assert shorter < 0 < longer
 
 
 def losses(d, windows):
     """The probability of each hand-over's loss, as the form's tail has it."""
     forms = [d.handover(a * 1e-5)(b * 1e-5) for a, b in itertools.pairwise(windows)]
-    return [model.tail_probability(form.values, 1.0) for form in forms]
+    return [window_schedule.tail_probability(form.values, 1.0) for form in forms]
 
 
 def test_hand_overs_of_the_paper_are_less_safe_than_designed():
@@ -114,10 +117,10 @@ def test_a_perfect_forecast_needs_one():
 
 
 def test_density_puts_windows_at_geometric_means():
-    assert model.denser([100, 400, 30000], 2) == [100, 200, 400, 3464, 30000]
-    assert model.denser([100, 800], 3) == [100, 200, 400, 800]
-    assert model.denser([5, 6], 2) == [5, 6]  # no room between
-    assert len(model.denser(designer().windows(), 2)) == 25
+    assert window_schedule.densify([100, 400, 30000], 2) == [100, 200, 400, 3464, 30000]
+    assert window_schedule.densify([100, 800], 3) == [100, 200, 400, 800]
+    assert window_schedule.densify([5, 6], 2) == [5, 6]  # no room between
+    assert len(window_schedule.densify(designer().windows(), 2)) == 25
 
 
 def test_direction_is_the_leading_error_of_a_handover():
@@ -125,7 +128,7 @@ def test_direction_is_the_leading_error_of_a_handover():
     d = designer()
     windows = d.windows()
     k, period = 6, 1e-5
-    direction = model.handover_directions(d, windows)[k]
+    direction = window_schedule.handover_directions(d, windows)[k]
     information, mu = d.posterior(windows[k] * period)
     mean_square = direction @ information @ direction / (2 * mu)
     assert_rounded(mean_square, 1.0, condition=scaled_condition(information), operations=25)
@@ -137,7 +140,7 @@ def test_direction_is_the_leading_error_of_a_handover():
 @pytest.mark.parametrize("per_window", [4, 16, 64])
 def test_blocks_end_with_windows_and_grow_with_time(per_window):
     windows = designer().windows()
-    edges = model.block_edges(windows, per_window)
+    edges = block_sums.block_edges(windows, per_window)
     assert set(windows) <= set(edges)
     assert edges[0] == 0
     lengths = np.diff(edges)
@@ -150,7 +153,7 @@ def test_step_root_solves_for_any_coherence():
     rng = np.random.default_rng(3)
     a = rng.normal(size=(5, 5))
     data, precision = a @ a.T * 50, np.array([0, 1, 10, 100, 1000.0])
-    root, share = model.step_root(data, precision)
+    root, share = estimators.step_root(data, precision)
     for coherence in (1.0, 0.5, 0.25):
         built = root.T @ np.diag(1 / (1 - (1 - coherence) * share)) @ root
         matrix = coherence * data + np.diag(precision)
@@ -159,16 +162,16 @@ def test_step_root_solves_for_any_coherence():
 
 
 def test_a_wide_phase_prior_says_nothing():
-    assert model.phase_prior(np.array([6.1, 2.0]))[0] == 0.0
-    np.testing.assert_array_equal(model.phase_prior(np.array([0.5, 2.0])), [4.0, 0.25])
+    assert bursts_fisher.phase_prior(np.array([6.1, 2.0]))[0] == 0.0
+    np.testing.assert_array_equal(bursts_fisher.phase_prior(np.array([0.5, 2.0])), [4.0, 0.25])
 
 
 @pytest.mark.parametrize("per_window", [4, 16, 24])
 def test_merged_blocks_are_few_and_short(per_window):
     windows = designer().windows()
-    edges = model.block_edges(windows, per_window)
+    edges = block_sums.block_edges(windows, per_window)
     for pulses in windows:
-        ends = model.merged(edges, pulses, per_window)
+        ends = block_sums.merged_block_ends(edges, pulses, per_window)
         merged = edges[[0, *ends]]
         assert merged[-1] == pulses
         assert np.diff(merged).max() <= max(1, pulses / per_window)

@@ -6,16 +6,18 @@ from itertools import chain, pairwise
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.bursts import burst as model
+from radarsim.api.configs import load
+from radarsim.bursts import fisher as bursts_fisher
+from radarsim.bursts import window_schedule
 from radarsim.engine.results import CaseResult
-from radarsim.papers.discriminator.interpretations import PRINTED_PRIOR, ExactEvidence, Interpretations, windows
+from radarsim.papers.discriminator.burst_versions import PRINTED_PRIOR
+from radarsim.papers.discriminator.interpretations import ExactEvidence, Interpretations, windows
 from radarsim.papers.interpretations import ImpossibleInterpretation
 from radarsim.papers.study_claims import claims_of
 from radarsim.papers.verdict_rule import CONFIRMED, REFUTED
 from radarsim.papers.verdicts_by_interpretation import judge_claim
 from radarsim.studies import registry
-from radarsim.studies.discriminator import study
+from radarsim.studies.discriminator import scenario
 from tests.tolerances import rounding, scaled_condition
 
 OF = Interpretations()
@@ -51,16 +53,16 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
     for noise, taken in ((9.0, {}), (2.25, {"noise_variance": "2.25", "threshold": "1", "forecast": "multiples"})):
         result = registry.study("discriminator").prepare(cases[noise])
         spec, axes = cases[noise].spec, result.axes
-        burst = study.burst_of(spec)
-        fisher = partial(model.fisher, burst, 5)
-        condition = model.Condition(threshold=float(taken.get("threshold", "0.5")))
-        designer = model.Designer(burst, axes.prior_sigma, fisher, condition)
+        burst = scenario.configured_burst(spec)
+        fisher = partial(bursts_fisher.fisher, burst, 5)
+        condition = window_schedule.Condition(threshold=float(taken.get("threshold", "0.5")))
+        designer = window_schedule.Designer(burst, axes.prior_sigma, fisher, condition)
         times = burst.pulse_period_s * np.array(axes.pulses[0])
         forms = [designer.handover(before)(after).values for before, after in pairwise(times[:-1])]
         # Forms are of inverses; a tail of 0.02 changes by some four times the relative change of its weights.
-        known = np.diag(model.phase_prior(axes.prior_sigma))
+        known = np.diag(bursts_fisher.phase_prior(axes.prior_sigma))
         allowed = 4 * rounding(max(scaled_condition(fisher(t) + known) for t in times), 25)
-        wanted = max(model.tail_probability(form, condition.threshold) for form in forms)
+        wanted = max(window_schedule.tail_probability(form, condition.threshold) for form in forms)
         assert ExactEvidence(OF.interpretation(**taken)).worst_handover("any").value == pytest.approx(
             wanted, rel=allowed
         )

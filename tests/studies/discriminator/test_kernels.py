@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
+from radarsim.bursts import block_sums
 from radarsim.bursts import burst as model
-from radarsim.bursts.kernels import lanes as laned
-from radarsim.bursts.kernels import scoring
+from radarsim.bursts.kernels import scoring, scoring_lanes, sequence_lanes, signal
 from radarsim.bursts.kernels import sequence as kernels
-from radarsim.bursts.kernels import strip as strips
 from radarsim.kernels import lanes
-from radarsim.kernels.compile import aligned_zeros, kernel, part
+from radarsim.kernels.compiler import aligned_zeros, kernel, kernel_part
 from radarsim.kernels.random import stream
-from radarsim.studies.discriminator import kernels as added
+from radarsim.studies.discriminator.kernels import sums as kernels_sums
 from tests.studies.discriminator import naive as naive
 from tests.tolerances import assert_rounded, mean_error, rounding
 
@@ -26,8 +25,8 @@ def burst_of(pulses=600, complex_samples=False, per_pulse=1):
     return model.Burst(10e9, 1e-5, 1e-6, 1e-6 / per_pulse, pulses, 1.3, 0.5, complex_samples)
 
 
-def physics_of(burst, mode=kernels.SAMPLES, image=True):
-    physics = np.zeros(1, scoring.PHYSICS)
+def physics_of(burst, mode=signal.SAMPLES, image=True):
+    physics = np.zeros(1, signal.PHYSICS)
     physics[0] = (
         *(mode, burst.complex_samples, image and not burst.complex_samples, burst.pulses, burst.samples_per_pulse),
         *(burst.amplitude, burst.noise_variance**0.5, 1 / burst.pulses, burst.sampling_period_s / burst.duration_s),
@@ -126,9 +125,9 @@ def test_the_coherent_sum_of_a_clean_burst_is_its_amplitude(complex_samples, per
 def demodulated(burst, theta, reference, per_block=20, image=True, seed=1):
     t, u = noisy(burst, theta, seed)
     edges = np.arange(0, burst.pulses + 1, per_block)
-    physics = physics_of(burst, kernels.DEMODULATED, image)
-    mean, _ = scoring.block_table(physics, edges, model.phase_turns(reference, t), u)
-    scoring.demodulate(physics, edges, rows(u), turns(reference, burst), 0, len(edges) - 1, mean)
+    physics = physics_of(burst, signal.DEMODULATED, image)
+    mean, _ = signal.block_table(physics, edges, model.phase_turns(reference, t), u)
+    signal.demodulate(physics, edges, rows(u), turns(reference, burst), 0, len(edges) - 1, mean)
     return t, u, edges, physics, mean
 
 
@@ -162,7 +161,7 @@ def test_score_of_blocks_is_nearly_that_of_samples(theta, complex_samples):
     found = []
     for shift in (0.0, 0.15):
         state["x"] = turns(theta, burst) + shift * np.array([0.3, 1, 1, 0, 0, 0])
-        for mode in (kernels.SAMPLES, kernels.DEMODULATED):
+        for mode in (signal.SAMPLES, signal.DEMODULATED):
             physics["mode"] = mode
             kernels.evaluate(physics, rows(u), sums, window, state)
             found.append(np.array(state["out"]))
@@ -177,7 +176,7 @@ def test_blocks_keep_the_information_of_the_bend_within_them():
     _, u, _, physics, sums = demodulated(burst, THETA, THETA, per_block=200)
     window, state = window_of(burst, 3200, 16), np.zeros(1, scoring.STATE)[0]
     state["amplitude"], found = 1.0, []
-    for mode in (kernels.SAMPLES, kernels.DEMODULATED):
+    for mode in (signal.SAMPLES, signal.DEMODULATED):
         physics["mode"] = mode
         state["x"] = turns(THETA, burst) + np.array([0, 0, 0, 0, 0.01, 0])
         kernels.evaluate(physics, rows(u), sums, window, state)
@@ -202,18 +201,18 @@ def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):
     phase = model.phase_turns(theta, t)
     edges = np.array([0, 1, 3, 20, 60])
     physics, clean = physics_of(burst), model.signal(burst, phase)
-    mean, factor = scoring.block_table(physics, edges, phase, clean)
+    mean, factor = signal.block_table(physics, edges, phase, clean)
     n = 40_000
     drawn, made = np.empty((2, n, 4, 4))
     samples, other = np.empty((1 + complex_samples, 60)), mean.copy()
-    _, _, sums, a, b = strips.room_for(4)
+    _, _, sums, a, b = sequence_lanes.allocate_work_arrays(4)
     law = np.ascontiguousarray(mean[scoring.Z0 : scoring.Z0 + 4, :4].T)
     for i in range(n):
         if i % 8 == 0:
-            strips.draw_strip(KEY, i, law, factor, a, b, sums)
+            sequence_lanes.draw_strip(KEY, i, law, factor, a, b, sums)
             drawn[i : i + 8] = sums.reshape(4, 4, 8).transpose(2, 0, 1)
-        scoring.draw_samples(physics, KEY, i, rows(clean), samples)
-        scoring.demodulate(physics, edges, samples, turns(theta, burst), 0, 4, other)
+        signal.draw_samples(physics, KEY, i, rows(clean), samples)
+        signal.demodulate(physics, edges, samples, turns(theta, burst), 0, 4, other)
         made[i] = other[scoring.Z0 : scoring.Z0 + 4, :4].T
     for block in range(4):
         scale = np.maximum(made[:, block].std(axis=0), 1e-6)
@@ -233,7 +232,7 @@ def test_drawn_sums_have_the_law_of_demodulated_samples(theta, complex_samples):
 def many_lanes(u, s, c):
     u, s, c = lanes.address(u), lanes.address(s), lanes.address(c)
     for i in range(2000):
-        y, x = laned.sine_cosine(lanes.get(u, i))
+        y, x = scoring_lanes.sine_cosine(lanes.get(u, i))
         lanes.put(s, i, y)
         lanes.put(c, i, x)
 
@@ -255,25 +254,25 @@ def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_puls
     burst = burst_of(complex_samples=complex_samples, per_pulse=per_pulse)
     t = model.sample_times(burst, burst.pulses)
     phase, physics, image = model.phase_turns(theta, t), physics_of(burst), not complex_samples
-    edges = model.block_edges([100, 400, 600], 30)
-    mean, factor = scoring.block_table(physics, edges, phase, model.signal(burst, phase))
-    tables = model.Tables(edges, mean, 30)
+    edges = block_sums.block_edges([100, 400, 600], 30)
+    mean, factor = signal.block_table(physics, edges, phase, model.signal(burst, phase))
+    tables = block_sums.WindowTables(edges, mean, 30)
     first, weights, count = tables.window(400)
     assert count < np.searchsorted(edges, 400)  # some are merged indeed
-    work, sums, drawn, *_ = strips.room_for(len(factor))
+    work, sums, drawn, *_ = sequence_lanes.allocate_work_arrays(len(factor))
     state, window = np.zeros(1, scoring.STATE)[0], window_of(burst, 400)
     state["amplitude"], expected = burst.amplitude, []
     shifts = np.outer(np.linspace(0, 2, 8), [0.3, 1, 1, -0.5, 0.5, 0])
     for lane in range(8):
         _, u = noisy(burst, theta, lane)
-        scoring.demodulate(physics, edges, rows(u), turns(theta, burst), 0, len(factor), mean)
+        signal.demodulate(physics, edges, rows(u), turns(theta, burst), 0, len(factor), mean)
         drawn.reshape(-1, 4, 8)[:, :, lane] = mean[scoring.Z0 : scoring.Z0 + 4, : len(factor)].T
         state["x"] = turns(theta, burst) + shifts[lane]
         kernels.evaluate(physics, rows(u), np.zeros((1, 1)), window, state)
         expected.append(np.array(state["out"]))
-    work.reshape(-1, 8)[laned.B : laned.B + 6] = (shifts * window["powers"]).T
+    work.reshape(-1, 8)[scoring_lanes.B : scoring_lanes.B + 6] = (shifts * window["powers"]).T
     evaluate_merged(*tables.arrays(), first, weights, count, image, burst.amplitude, work, sums, drawn)
-    found = work.reshape(-1, 8)[laned.VALUE : laned.VALUE + 8].T
+    found = work.reshape(-1, 8)[scoring_lanes.VALUE : scoring_lanes.VALUE + 8].T
     noise = np.sqrt(burst.noise_variance * 400 * per_pulse)
     assert found == pytest.approx(np.array(expected), abs=0.02 * noise)
     assert np.abs(np.diff(expected, axis=0)).max() > noise
@@ -283,14 +282,14 @@ def test_merged_blocks_hold_the_same_likelihood(theta, complex_samples, per_puls
 def evaluate_merged(table, weights, first, begin, blocks, image, amplitude, work, sums, drawn):
     table, weights = lanes.address(table), lanes.address(weights)
     work, sums, drawn = lanes.address(work), lanes.address(sums), lanes.address(drawn)
-    laned.merge(drawn, table, weights, first, begin, blocks, sums)
-    laned.score(work, sums, table, first, blocks, image, amplitude)
+    scoring_lanes.merge(drawn, table, weights, first, begin, blocks, sums)
+    scoring_lanes.score(work, sums, table, first, blocks, image, amplitude)
 
 
 def test_noise_of_samples_is_white():
     burst = burst_of(pulses=20_001, complex_samples=True)
     samples = np.empty((2, 20_001))
-    scoring.draw_samples(physics_of(burst), KEY, 1, np.zeros((2, 20_001)), samples)
+    signal.draw_samples(physics_of(burst), KEY, 1, np.zeros((2, 20_001)), samples)
     unit = samples / burst.noise_variance**0.5
     n = unit.size
     assert unit.var() == pytest.approx(1, abs=mean_error(n, np.sqrt(2)))
@@ -300,12 +299,12 @@ def test_noise_of_samples_is_white():
 
 
 def test_bins_are_quarter_octaves():
-    edges, bin_of = added.bin_edges(), kernel(lambda ratio: added.bin_of(ratio))
-    assert len(edges) == added.BINS + 1
+    edges, bin_of = kernels_sums.bin_edges(), kernel(lambda ratio: kernels_sums.bin_index(ratio))
+    assert len(edges) == kernels_sums.BINS + 1
     ratios = np.exp(np.random.default_rng(4).uniform(np.log(edges[0]), np.log(edges[-1]), 1000))
     assert np.array_equal([bin_of(r) for r in ratios], np.searchsorted(edges, ratios, side="right") - 1)
     assert bin_of(0.0) == 0
-    assert bin_of(1e300) == added.BINS - 1
+    assert bin_of(1e300) == kernels_sums.BINS - 1
 
 
 def test_sums_of_errors_against_numpy():
@@ -316,9 +315,9 @@ def test_sums_of_errors_against_numpy():
     errors = rng.normal(0, 2.5, (n, 2, 4, 6))
     potential, posterior = rng.uniform(0.5, 2, (2, 2, 4, 6))
     error, every = np.zeros((2, 2, 4, size, 4))
-    locks, residuals = np.zeros((2, 4, 6)), np.zeros((2, 4, size, added.BINS))
-    sums = added.Sums(error, every, locks, residuals, np.zeros((2, 2)))
-    added.accumulate(errors, options, potential, posterior, sums)
+    locks, residuals = np.zeros((2, 4, 6)), np.zeros((2, 4, size, kernels_sums.BINS))
+    sums = kernels_sums.Sums(error, every, locks, residuals, np.zeros((2, 2)))
+    kernels_sums.accumulate(errors, options, potential, posterior, sums)
     for f, windows in enumerate((4, 2)):
         ratio, narrow = errors[:, f, :windows, :size] / potential[f, :windows, :size], None
         narrow = np.abs(errors[:, f, :windows, :size] / posterior[f, :windows, :size]).max(axis=2)
@@ -351,14 +350,14 @@ def test_amplitude_estimate_and_its_misprint(complex_samples):
     assert_rounded(kernels.estimated_amplitude(physics_of(burst), rows(0 * u), 1), 1e-3)  # a floor, not a root
 
 
-@part
+@kernel_part
 def parabolas(physics, work, sums, peaks, window, state):
     """Puts a likelihood in each lane that falls off with the square of the distance from its peak along x₁."""
-    away = lanes.get(work, laned.X + 1) - lanes.get(lanes.address(peaks), 0)
-    lanes.put(work, laned.VALUE, lanes.full(0.0) - away * away)
+    away = lanes.get(work, scoring_lanes.X + 1) - lanes.get(lanes.address(peaks), 0)
+    lanes.put(work, scoring_lanes.VALUE, lanes.full(0.0) - away * away)
 
 
-search_of_parabolas = kernels.searching(parabolas)
+search_of_parabolas = kernels.search_kernel(parabolas)
 
 
 @kernel
@@ -374,11 +373,11 @@ def test_the_search_at_a_hand_over_ends_at_the_best_of_its_points():
     options["search"], options["spacing"] = 3, 0.25
     window = window_of(burst, burst.pulses)
     window["direction"][1] = 2.0
-    work, peaks, needed = (aligned_zeros(n, lanes.WIDTH) for n in (laned.ROWS, 1, 1))
-    work[laned.X], work[laned.X + 1] = 0.7, 10.0
+    work, peaks, needed = (aligned_zeros(n, lanes.WIDTH) for n in (scoring_lanes.ROWS, 1, 1))
+    work[scoring_lanes.X], work[scoring_lanes.X + 1] = 0.7, 10.0
     peaks[0] = 10.0 + np.array([-9.0, -1.4, -0.6, 0.1, 0.3, 1.1, 9.0, 9.0])
     needed[0] = [1, 1, 1, 1, 1, 1, 1, 0]
     search(physics_of(burst), work, peaks, window, options, needed)
-    assert list(work[laned.X + 1] - 10.0) == [-1.5, -1.5, -0.5, 0.0, 0.5, 1.0, 1.5, 0.0]
-    assert (work[laned.X] == 0.7).all()
-    assert list(work[laned.PASSES]) == [7, 7, 7, 7, 7, 7, 7, 0]  # each point, and the end
+    assert list(work[scoring_lanes.X + 1] - 10.0) == [-1.5, -1.5, -0.5, 0.0, 0.5, 1.0, 1.5, 0.0]
+    assert (work[scoring_lanes.X] == 0.7).all()
+    assert list(work[scoring_lanes.PASSES]) == [7, 7, 7, 7, 7, 7, 7, 0]  # each point, and the end

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from radarsim.bursts.kernels.scoring import SIZE
-from radarsim.studies.discriminator import nearest, study
+from radarsim.studies.discriminator import importance_sampling, nearest_loss
 from tests.studies.discriminator.test_rare import RARELY, lone_window, plan_of
 from tests.studies.discriminator.test_study import BASE
 from tests.tolerances import rounding
@@ -21,14 +21,14 @@ def plan():
 
 @pytest.fixture(scope="module")
 def room(plan):
-    return nearest.Room(plan)
+    return nearest_loss.BurstWorkspace(plan)
 
 
 @pytest.fixture(scope="module")
 def found(plan, room):
     """The losses ahead and behind of some hand-overs, with the linear direction of each."""
-    units = study.directions(plan, 0)
-    return {k: (units[k], tuple(nearest.either_side(room, 0, units[k]))) for k in HAND_OVERS}
+    units = importance_sampling.directions(plan, 0)
+    return {k: (units[k], tuple(nearest_loss.losses_on_both_sides(room, 0, units[k]))) for k in HAND_OVERS}
 
 
 def distance(room, unit, low, high):
@@ -42,10 +42,10 @@ def distance(room, unit, low, high):
 def test_gaussian_errors_pass_their_bounds_along_their_own_maps():
     """A lone window scored from the truth, with little noise: each component is lost at five bounds, on either side."""
     plan = lone_window(0.01)
-    room, maps = nearest.Room(plan), study.linear(plan, 0).errors[0]
+    room, maps = nearest_loss.BurstWorkspace(plan), importance_sampling.window_error_maps(plan, 0).errors[0]
     for c, row in enumerate(maps):
         length = np.linalg.norm(row)
-        for side, loss in zip((1, -1), nearest.either_side(room, 0, row / length), strict=True):
+        for side, loss in zip((1, -1), nearest_loss.losses_on_both_sides(room, 0, row / length), strict=True):
             assert loss.unit @ row == pytest.approx(side * length, rel=1e-3)
             assert loss.distance == pytest.approx(5 * plan.potential[0, 0, c] / length, abs=1 / 64)
 
@@ -54,18 +54,21 @@ def test_a_turn_brings_every_loss_nearer(room, found):
     for unit, losses in found.values():
         assert len(losses) == 2
         for side, loss in zip((1, -1), losses, strict=True):
-            assert loss.distance < nearest.crossing(room, 0, nearest.rounded(side * unit), 1.0, 12.0) - 0.05
+            assert (
+                loss.distance
+                < nearest_loss.distance_to_loss(room, 0, nearest_loss.round_unit(side * unit), 1.0, 12.0) - 0.05
+            )
             assert room.lost(0, loss.distance * loss.unit[None]).all()
             assert not room.lost(0, (loss.distance - 1 / 128) * loss.unit[None]).any()
 
 
 def test_bounds_of_a_component_are_nearer_than_its_linear_map_says(plan, room):
     """Of the phase at the end, on both sides by itself: more than first order is in an estimate at five σ."""
-    unit = study.directions(plan, 0)[-5]
+    unit = importance_sampling.directions(plan, 0)[-5]
     for side in (1, -1):
-        straight = nearest.crossing(room, 0, nearest.rounded(side * unit), 1.0, 12.0)
+        straight = nearest_loss.distance_to_loss(room, 0, nearest_loss.round_unit(side * unit), 1.0, 12.0)
         assert straight == pytest.approx(5.06, abs=0.02)
-        assert nearest.nearest(room, 0, side * unit).distance < straight - 0.08
+        assert nearest_loss.nearest_loss(room, 0, side * unit).distance < straight - 0.08
 
 
 def test_no_direction_around_loses_its_lock_sooner(room, found):
@@ -88,9 +91,9 @@ def test_the_normal_is_that_of_the_boundary(room, found):
     At the linear directions, where the normal is not along them, and in what it says strongly: its own rest beside u.
     """
     for unit, _ in found.values():
-        unit = nearest.rounded(unit)
-        at = nearest.crossing(room, 0, unit, 1.0, 12.0)
-        n = nearest.normal(room, 0, unit, at)
+        unit = nearest_loss.round_unit(unit)
+        at = nearest_loss.distance_to_loss(room, 0, unit, 1.0, 12.0)
+        n = nearest_loss.loss_boundary_normal(room, 0, unit, at)
         beside = n - (n @ unit) * unit
         beside /= np.linalg.norm(beside)
         small = 1e-3
@@ -102,23 +105,23 @@ def test_the_normal_is_that_of_the_boundary(room, found):
 def test_the_conjugate_burst_errs_the_other_way():
     """With complex samples exactly: imaginary parts and forecast turned, real parts as they are."""
     plan = plan_of(RARELY, burst=BASE["burst"] | {"samples": "complex"})
-    room = nearest.Room(plan)
+    room = nearest_loss.BurstWorkspace(plan)
     z = np.random.default_rng(2).standard_normal((8, SIZE + 4 * len(plan.world.factor)))
-    other = np.array([nearest.mirrored(one) for one in z])
+    other = np.array([nearest_loss.mirror_unit(one) for one in z])
     one, two = room.errors(0, z), room.errors(0, other)
     # Where they lock: elsewhere the end of a search is not defined by the arithmetic.
     locked = (np.abs(one) < 5 * plan.potential[0])[..., :5].all(axis=(1, 2))
     assert locked.sum() > 3
     tolerance = plan.options[0]["tolerance"]  # scoring ends at a step of so many σ, squared by the next
     assert (np.abs(one + two)[locked] <= tolerance**2 * plan.potential[0]).all()
-    assert np.array_equal(np.array([nearest.mirrored(each) for each in other]), z)
+    assert np.array_equal(np.array([nearest_loss.mirror_unit(each) for each in other]), z)
 
 
 def test_last_bits_of_a_direction_are_not_in_what_is_found(room, found):
     unit, (ahead, _) = found[9]
     moved = unit * (1 + 1e-12 * np.random.default_rng(3).standard_normal(len(unit)))
-    again = nearest.nearest(room, 0, moved)
-    first = nearest.nearest(room, 0, unit)
+    again = nearest_loss.nearest_loss(room, 0, moved)
+    first = nearest_loss.nearest_loss(room, 0, unit)
     assert again.distance == first.distance
     assert np.array_equal(again.unit, first.unit)
     assert ahead.distance <= first.distance
@@ -127,18 +130,18 @@ def test_last_bits_of_a_direction_are_not_in_what_is_found(room, found):
 
 def test_without_a_normal_the_direction_stays(room, found, monkeypatch):
     unit, _ = found[9]
-    monkeypatch.setattr(nearest, "normal", lambda *_: None)
-    loss = nearest.nearest(room, 0, unit)
-    assert np.array_equal(loss.unit, nearest.rounded(unit))
-    assert loss.distance == nearest.crossing(room, 0, loss.unit, 1.0, 12.0)
+    monkeypatch.setattr(nearest_loss, "loss_boundary_normal", lambda *_: None)
+    loss = nearest_loss.nearest_loss(room, 0, unit)
+    assert np.array_equal(loss.unit, nearest_loss.round_unit(unit))
+    assert loss.distance == nearest_loss.distance_to_loss(room, 0, loss.unit, 1.0, 12.0)
 
 
 def test_a_direction_without_a_loss_has_none(plan, room):
     """The last hand-over is to a window hardly longer, and is always caught."""
-    last = study.directions(plan, 0)[len(plan.axes.pulses[0]) - 1]
-    assert nearest.crossing(room, 0, nearest.rounded(last), 1.0, 12.0) is None
-    assert nearest.nearest(room, 0, last) is None
-    assert not list(nearest.either_side(room, 0, last))
+    last = importance_sampling.directions(plan, 0)[len(plan.axes.pulses[0]) - 1]
+    assert nearest_loss.distance_to_loss(room, 0, nearest_loss.round_unit(last), 1.0, 12.0) is None
+    assert nearest_loss.nearest_loss(room, 0, last) is None
+    assert not list(nearest_loss.losses_on_both_sides(room, 0, last))
 
 
 def test_units_have_length_one(found):

@@ -9,16 +9,14 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import ndtr, ndtri
 
-from radarsim.app.configs import load
-from radarsim.bursts.kernels import lanes
-from radarsim.bursts.kernels import strip as strips
+from radarsim.api.configs import load
+from radarsim.bursts.kernels import scoring_lanes, sequence_lanes, signal
 from radarsim.errors import ConfigError
 from radarsim.kernels.random import fill_normal_strip, stream
-from radarsim.report import rare as report
-from radarsim.report import statistics
-from radarsim.studies.discriminator import kernels as kernels
-from radarsim.studies.discriminator import nearest, study
-from radarsim.studies.discriminator.tables import COUNTED
+from radarsim.report import rare_events, statistics
+from radarsim.studies.discriminator import importance_sampling, nearest_loss, study
+from radarsim.studies.discriminator.kernels import weights as kernels_weights
+from radarsim.studies.discriminator.kernels.sums import LOCKS
 from tests.studies.discriminator.test_study import BASE, FROM_TRUTH
 from tests.tolerances import assert_rounded, rounding
 
@@ -45,7 +43,7 @@ def losses(plan, n, batch=512):
     """Weights (n,), and whether estimator 0 lost its lock at its last window (n,)."""
     k, weights, lost = int(plan.options[0]["windows"]) - 1, [], []
     for first in range(0, n, batch):
-        errors, _, some, _ = study.weighted_estimates(plan, first, min(batch, n - first))
+        errors, _, some, _ = importance_sampling.weighted_estimates(plan, first, min(batch, n - first))
         weights.append(some)
         lost.append((np.abs(errors[:, 0, k]) >= 5 * plan.potential[0, k]).any(axis=1))
     return np.concatenate(weights), np.concatenate(lost)
@@ -74,13 +72,13 @@ def plan():
 def test_errors_are_linear_in_the_normals_near_the_truth():
     """The rows of the maps have the posterior bound as their length, and take small noise to the errors that follow."""
     plan = plan_of(RARELY, burst=BASE["burst"] | {"samples": "complex"})
-    maps = study.linear(plan, 0)
+    maps = importance_sampling.window_error_maps(plan, 0)
     lengths = np.sqrt((maps.errors**2).sum(axis=2)) / plan.posterior[0, :, :5]
     assert lengths == pytest.approx(1, abs=5e-4)
     small = 1e-3
     z = small * np.random.default_rng(1).standard_normal((8, maps.forecast.shape[1]))
     z[:, 5] = 0.0  # no sixth component
-    errors = nearest.Room(plan).errors(0, z)
+    errors = nearest_loss.BurstWorkspace(plan).errors(0, z)
     expected = np.einsum("kcd,nd->nkc", maps.errors, z)
     assert np.abs((errors[:, :, :5] - expected) / (small * plan.posterior[0, :, :5]))[:, 3:].max() < 0.05
 
@@ -91,7 +89,7 @@ def test_maps_take_both_moments_of_a_block_from_each_of_its_normals(plan):
     low = np.tril_indices(4)
 
     def errors(of):
-        return study.linear(replace(plan, world=replace(plan.world, factor=of)), 0).errors
+        return importance_sampling.window_error_maps(replace(plan, world=replace(plan.world, factor=of)), 0).errors
 
     def alone(entry):
         return np.where(np.arange(10) == entry, 1.0, 0.0) * np.ones((len(law), 1))
@@ -112,12 +110,12 @@ def test_maps_take_both_moments_of_a_block_from_each_of_its_normals(plan):
 
 
 def test_directions_are_unit_vectors_of_the_hand_overs(plan):
-    units = study.directions(plan, 0)
+    units = importance_sampling.directions(plan, 0)
     assert len(units) == plan.options[0]["windows"] + 5
     assert_rounded(np.linalg.norm(units, axis=1), np.ones(len(units)), operations=units.shape[1])
-    table = plan.tables[0].reshape(-1, lanes.COLUMNS)
+    table = plan.tables[0].reshape(-1, scoring_lanes.COLUMNS)
     for k, window in enumerate(plan.windows[0]):
-        within = int(table[window["table"] + window["blocks"] - 1, lanes.END])
+        within = int(table[window["table"] + window["blocks"] - 1, scoring_lanes.END])
         used = np.abs(units[k, 6:].reshape(-1, 4)).sum(axis=1)
         assert used[:within].max() > 0
         assert not used[within:].any()  # what comes after the window is not in its estimate
@@ -125,16 +123,16 @@ def test_directions_are_unit_vectors_of_the_hand_overs(plan):
 
 def mixture_draws(plan, count):
     """Projections (M, n) of shifted draws on the mixture's directions, and their weights (n,)."""
-    law, room = plan.mixture, nearest.Room(plan)
+    law, room = plan.mixture, nearest_loss.BurstWorkspace(plan)
     chosen, weights = np.zeros(count, np.int64), np.empty(count)
-    kernels.choose(plan.keys[2], 0, law.cumulative, chosen)
+    kernels_weights.choose(plan.keys[2], 0, law.cumulative, chosen)
     along = np.empty((len(law.shift), count))
     for start in range(0, count, 8):
-        strips.draw_forecasts(plan.keys[1], start, plan.prior_sigma, room.work)
+        sequence_lanes.draw_forecasts(plan.keys[1], start, plan.prior_sigma, room.work)
         fill_normal_strip(plan.keys[0], start, 0, room.a, room.b)
-        kernels.move(law, chosen[start : start + 8], room.work, room.a, room.b)
-        kernels.weigh(law, room.work, room.a, room.b, room.along, weights[start : start + 8])
-        forecasts = room.work[8 * lanes.PRIOR : 8 * (lanes.PRIOR + 6)].reshape(6, 8)
+        kernels_weights.move(law, chosen[start : start + 8], room.work, room.a, room.b)
+        kernels_weights.weigh(law, room.work, room.a, room.b, room.along, weights[start : start + 8])
+        forecasts = room.work[8 * scoring_lanes.PRIOR : 8 * (scoring_lanes.PRIOR + 6)].reshape(6, 8)
         along[:, start : start + 8] = (
             law.weight @ forecasts + law.first @ room.a.reshape(-1, 8) + law.second @ room.b.reshape(-1, 8)
         )
@@ -188,14 +186,14 @@ def lone_window(noise_variance):
         "truth": {"doppler_derivatives": [10e3]},
         "prior": {"spread_over_potential": [100.0, 100.0]},
     }
-    with mock.patch.dict(study.BLOCKS_PER_WINDOW, {study.BLOCK_SUMS: 100}):
+    with mock.patch.dict(study.BLOCKS_PER_WINDOW, {signal.BLOCK_SUMS: 100}):
         return plan_of({**FROM_TRUTH, "name": "a", "schedule": [0.02]}, **keys)
 
 
 def test_a_lone_window_loses_as_its_gaussian_integral_says():
     """Phase and frequency from the truth on: errors are Gaussian, and five bounds are passed once in a million."""
     plan = lone_window(0.1)
-    maps = study.linear(plan, 0).errors[0]
+    maps = importance_sampling.window_error_maps(plan, 0).errors[0]
     spread = np.linalg.norm(maps, axis=1)
     correlation = float(maps[0] @ maps[1] / spread.prod())
     assert correlation == pytest.approx(-math.sqrt(3) / 2, rel=1e-3)
@@ -261,7 +259,7 @@ def test_sums_are_those_of_the_weights_and_add_up(plan):
         size[name] = np.stack([np.sqrt(64 * square), square, np.sqrt(square * fourth), fourth], axis=-1)
     # Σe and Σe³ have terms of either sign, of bursts that lock, within five bounds, and of others.
     assert_rounded(plan.layout.pack(**sums), parts, plan.layout.pack(**size), operations=64)
-    errors, passes, weights, plain = study.weighted_estimates(plan, 100, 64)
+    errors, passes, weights, plain = importance_sampling.weighted_estimates(plan, 100, 64)
     last = int(plan.options[0]["windows"]) - 1
     lost = (np.abs(errors[:, 0, last]) >= 5 * plan.potential[0, last]).any(axis=1)
     assert sums["losses"][0, last, 0] == pytest.approx(
@@ -321,17 +319,17 @@ def test_an_interval_that_few_heavy_weights_make_is_marked():
     spread, closer = (np.exp(by * (middle[middle < 2] - 2)) for by in (3, 1.5))
     every = (equal, mixed, equal[:10], spread, closer)
     sums = np.array([[w.sum(), (w**2).sum(), len(w), (w**4).sum()] for w in every])
-    drawn = report.Drawn(10_000, 1000.0, 10_000.0, 10_300.0)
-    of_spread = report.rows({}, "loss", np.full(2, True), report.Counted(*sums[3:].T), drawn)
+    drawn = rare_events.SamplingWeights(10_000, 1000.0, 10_000.0, 10_300.0)
+    of_spread = rare_events.rate_columns({}, "loss", np.full(2, True), rare_events.EventWeights(*sums[3:].T), drawn)
     assert min(of_spread["n_eff"]) > 90
     assert min(sums[3:, 1] ** 2 / sums[3:, 3]) > 20  # this alone would mark neither
-    assert list(of_spread["note"]) == [report.HEAVY, ""]
-    made = report.rows({}, "loss", np.full(3, True), report.Counted(*sums[:3].T), drawn)
+    assert list(of_spread["note"]) == [rare_events.HEAVY_WEIGHTS, ""]
+    made = rare_events.rate_columns({}, "loss", np.full(3, True), rare_events.EventWeights(*sums[:3].T), drawn)
     assert made["n_eff"] == pytest.approx([40, 115**2 / 205, 10], rel=rounding(operations=3))
-    assert list(made["note"]) == ["", report.HEAVY, report.FEW]
-    common = report.Counted(*np.array([10_000.0 - 19, 10_300.0 - 19, 9981, 1e4]))
-    assert report.note(drawn, common) == report.FEW  # nineteen do not have it
-    assert report.note(drawn, common._replace(weight=common.weight - 1, squared=common.squared - 1)) == ""
+    assert list(made["note"]) == ["", rare_events.HEAVY_WEIGHTS, rare_events.FEW_EVENTS_NOTE]
+    common = rare_events.EventWeights(*np.array([10_000.0 - 19, 10_300.0 - 19, 9981, 1e4]))
+    assert rare_events.weight_notes(drawn, common) == rare_events.FEW_EVENTS_NOTE  # nineteen do not have it
+    assert rare_events.weight_notes(drawn, common._replace(weight=common.weight - 1, squared=common.squared - 1)) == ""
 
 
 @pytest.mark.slow
@@ -339,25 +337,28 @@ def test_every_window_is_marked_by_its_own_weights():
     """Shifts lead to the last window: before it a few weights of any size make a rate, and its interval."""
     result = result_of(4000, RARELY)
     locks, sums = result.tables["locks"], result.cases[0].sums["losses"][0]
-    at = [COUNTED.index(name) for name in ("lock", "always_three", "always_posterior_three")]
+    at = [LOCKS.index(name) for name in ("lock", "always_three", "always_posterior_three")]
     expected = []
     for window in sums[: len(locks)]:
         weight, square, number, fourth = window[at].T
         with np.errstate(invalid="ignore"):
             few, heavy = ~(weight**2 / square >= 20), ~(square**2 / fourth >= 20)
             heavy |= ~((weight**2 / square) ** 2 / number >= 20)
-        said = np.where(few, str(report.FEW), np.where(heavy, str(report.HEAVY), ""))
+        said = np.where(few, str(rare_events.FEW_EVENTS_NOTE), np.where(heavy, str(rare_events.HEAVY_WEIGHTS), ""))
         always = next((f"always: {words}" for words in said[1:] if words), "")
         expected.append(said[0] or always)
     assert list(locks["note"]) == expected
-    assert locks["note"].iloc[0] == str(report.FEW)
+    assert locks["note"].iloc[0] == str(rare_events.FEW_EVENTS_NOTE)
     assert len(set(expected)) > 1
 
 
 def test_weights_whose_mean_is_not_one_are_told():
     made = result_of(300, RARELY).tables["rare"]
-    assert not any("instead of one" in line for line in report.warnings(made))
-    assert any("instead of one" in line for line in report.warnings(made.assign(mean_weight=1.5, mean_weight_se=0.1)))
+    assert not any("instead of one" in line for line in rare_events.mean_weight_warnings(made))
+    assert any(
+        "instead of one" in line
+        for line in rare_events.mean_weight_warnings(made.assign(mean_weight=1.5, mean_weight_se=0.1))
+    )
 
 
 def test_the_interval_of_a_weighted_rate_follows_the_weights():

@@ -5,13 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.bursts import burst as model
-from radarsim.bursts.kernels import scoring
+from radarsim.bursts import estimators, fisher
+from radarsim.bursts.kernels import scoring, sequence_lanes, signal
 from radarsim.bursts.kernels import sequence as kernels
-from radarsim.bursts.kernels import strip as strips
 from radarsim.errors import ConfigError
-from radarsim.studies.discriminator import study
+from radarsim.studies.discriminator import scenario, study
 from tests.studies.discriminator import naive as naive
 from tests.tolerances import mean_error, rounding, sigma_error
 
@@ -139,17 +139,17 @@ def paired_errors(plan, first, count):
     world, last = plan.world, plan.options["windows"] - 1
     blocks, physics = len(world.factor), world.physics.copy()
     samples, made = np.empty(world.clean.shape), world.mean.copy()
-    room, errors = strips.room_for(blocks), np.zeros((8, plan.windows.shape[1], 6))
+    room, errors = sequence_lanes.allocate_work_arrays(blocks), np.zeros((8, plan.windows.shape[1], 6))
     found = np.empty((count, len(plan.options), 6))
     work, sums, drawn = room[:3]
     for start in range(0, count, 8):
         for lane in range(8):
-            scoring.draw_samples(physics, plan.keys[0], first + start + lane, world.clean, samples)
-            scoring.demodulate(physics, world.edges, samples, plan.truth, 0, blocks, made)
+            signal.draw_samples(physics, plan.keys[0], first + start + lane, world.clean, samples)
+            signal.demodulate(physics, world.edges, samples, plan.truth, 0, blocks, made)
             drawn.reshape(-1, 4, 8)[:, :, lane] = made[scoring.Z0 : scoring.Z0 + 4, :blocks].T
-        strips.draw_forecasts(plan.keys[1], first + start, plan.prior_sigma, work)
+        sequence_lanes.draw_forecasts(plan.keys[1], first + start, plan.prior_sigma, work)
         for f, options in enumerate(plan.options):
-            strips.run_strip(physics, drawn, plan.tables, plan.windows[f], options, work, sums, errors)
+            sequence_lanes.run_strip(physics, drawn, plan.tables, plan.windows[f], options, work, sums, errors)
             found[start : start + 8, f] = errors[: count - start, last[f]]
     size = plan.layout.shapes["error"][2]
     ratio = (found / plan.potential[np.arange(len(last)), last])[..., :size]
@@ -209,14 +209,14 @@ def test_a_strong_echo_is_estimated_to_its_bound(variance):
 
 def image_biases(plan, spec, n):
     """Biases of the windows (K,) in standard deviations, as `model.image_bias` foretells them and as n bursts have."""
-    burst, phase = study.burst_of(spec), study.phase_of(spec, study.burst_of(spec))
-    sigma, windows = study.forecast(spec, burst), [int(one) for one in plan.windows["pulses"][:, 0]]
+    burst, phase = scenario.configured_burst(spec), scenario.true_phase(spec, scenario.configured_burst(spec))
+    sigma, windows = scenario.forecast(spec, burst), [int(one) for one in plan.windows["pulses"][:, 0]]
     size = len(sigma)
     means = study.estimate(plan, 0, n)[0][:, :, 0, :size].mean(axis=0) / model.turns_per_parameter(size, 0.3)
-    known = np.diag(model.phase_prior(sigma))
-    found = [m @ (data + known) @ m for m, data in zip(means, model.fisher_sums(burst, size, windows), strict=True)]
+    known = np.diag(fisher.phase_prior(sigma))
+    found = [m @ (data + known) @ m for m, data in zip(means, fisher.fisher_sums(burst, size, windows), strict=True)]
     noise = size / n  # of a mean's square
-    return model.image_bias(burst, sigma, windows, phase.turns), np.sqrt(np.maximum(np.array(found) - noise, 0.0))
+    return fisher.image_bias(burst, sigma, windows, phase.turns), np.sqrt(np.maximum(np.array(found) - noise, 0.0))
 
 
 def fixed_windows(variance):
@@ -228,7 +228,7 @@ def fixed_windows(variance):
 
 
 def test_the_bias_without_the_image_is_the_one_foretold(monkeypatch):
-    monkeypatch.setattr(model, "IMAGE_BIAS", np.inf)
+    monkeypatch.setattr(estimators, "IMAGE_BIAS", np.inf)
     n = 4000
     for variance in (1e-3, 1e-5):
         spec, plan = fixed_windows(variance)
@@ -244,10 +244,10 @@ def test_the_image_is_taken_where_its_bias_would_pass_the_limit():
     at_one = image_biases(plan, spec, 8)[0].max()
     for share, taken in ((0.9, False), (1.1, True)):
         # The forecast is a multiple of the potential spreads, so that all information is by A²/σ².
-        spec, plan = fixed_windows((at_one / (share * model.IMAGE_BIAS)) ** 2)
+        spec, plan = fixed_windows((at_one / (share * estimators.IMAGE_BIAS)) ** 2)
         assert bool(plan.world.physics["image"]) is taken
         foretold, found = image_biases(plan, spec, n)
-        assert foretold.max() == pytest.approx(share * model.IMAGE_BIAS, rel=0.01)
+        assert foretold.max() == pytest.approx(share * estimators.IMAGE_BIAS, rel=0.01)
         assert found == pytest.approx(0 if taken else foretold, abs=mean_error(n))
 
 
@@ -274,7 +274,7 @@ def twin_errors(plan, first, count):
     for i in range(count):
         state["truth"] = plan.truth
         kernels.draw_prior(plan.keys[1], first + i, plan.prior_sigma, state)
-        scoring.draw_samples(world.physics, plan.keys[0], first + i, world.clean, samples)
+        signal.draw_samples(world.physics, plan.keys[0], first + i, world.clean, samples)
         prior = (np.array(state["prior"]) * unit)[:size]
         found[i] = naive.maximum(samples[0], t, 1.0, 2.25, prior, precision, theta, bound) - theta
     return found / bound
@@ -328,9 +328,9 @@ def test_amplitude_is_estimated_or_misprinted():
 
 
 def test_auto_takes_samples_where_block_sums_cannot_serve():
-    assert plan_of(SEQUENCE, engine="auto").world.physics["mode"] == scoring.BLOCK_SUMS
+    assert plan_of(SEQUENCE, engine="auto").world.physics["mode"] == signal.BLOCK_SUMS
     estimated = {**SEQUENCE, "amplitude": "estimated"}
-    assert plan_of(estimated, engine="auto").world.physics["mode"] == scoring.SAMPLES
+    assert plan_of(estimated, engine="auto").world.physics["mode"] == signal.SAMPLES
     with pytest.raises(ConfigError, match="block_sums cannot serve"):
         plan_of(estimated, engine="block_sums")
 

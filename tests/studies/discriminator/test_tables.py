@@ -5,15 +5,15 @@ import re
 import numpy as np
 import pytest
 
-from radarsim.app import run
+from radarsim.api import configs, run
 from radarsim.bursts.burst import phase_turns, sample_times, signal
 from radarsim.papers.discriminator import measures
 from radarsim.papers.evidence import MissingEvidence
-from radarsim.report.drawing import Line
-from radarsim.studies.discriminator import study, words
+from radarsim.report.drawing.model import Line
+from radarsim.studies.discriminator import answer, scenario, study
 from radarsim.studies.discriminator import tables as report
-from radarsim.studies.discriminator.figures import one_burst
-from radarsim.studies.discriminator.kernels import bin_edges
+from radarsim.studies.discriminator.kernels.sums import bin_edges
+from radarsim.studies.discriminator.one_burst import one_burst
 from tests.answers import answer_texts
 from tests.tolerances import rounding, sigma_error
 
@@ -84,13 +84,13 @@ def test_residuals_lie_under_three_bounds(made):
 
 def test_figures_show_the_paper_and_the_locks(made):
     assert made.figures == ("locks", "accuracy", "residuals")
-    panels = made._described["residuals"].panels
+    panels = made._figures_by_name["residuals"].panels
     assert len(panels) == 6
     assert [mark.label for mark in panels[1].marks] == ["median", "3σ", "one burst"]
 
 
 def test_the_burst_that_is_drawn_is_the_first_of_the_run():
-    case = run.load("discriminator").cases[0]
+    case = configs.load("discriminator").cases[0]
     plan = study.prepare(case)
     number = plan.axes.filters.index("cured")
     squares = plan.layout.unpack(study.simulate(plan, 0, 1))["error_all"][number, ..., 1]
@@ -104,22 +104,22 @@ def test_the_burst_that_is_drawn_is_the_first_of_the_run():
 
 def test_swept_cases_are_drawn_against_their_key():
     swept = {"prior.scale": [0.01, 0.1], "burst.noise_variance": [2.25, 9.0]}
-    base = run.load("discriminator_pair").cases[0].spec
+    base = configs.load("discriminator_pair").cases[0].spec
     config = {"study": "discriminator", "sweep": swept, "realisations": 64, "seed": 1} | _plain(base)
     done = run.run(config, threads=1)
     assert done.figures == ("lock_scale_noise_variance",)
     heat, border = (
-        done._described["lock_scale_noise_variance"].panels[0],
-        done._described["lock_scale_noise_variance"].panels[-1],
+        done._figures_by_name["lock_scale_noise_variance"].panels[0],
+        done._figures_by_name["lock_scale_noise_variance"].panels[-1],
     )
     assert heat.marks[0].values.shape == (2, 2)
     assert all(isinstance(mark, Line) for mark in border.marks)
 
 
 def _plain(spec):
-    from radarsim.config.experiment import complete
+    from radarsim.config.identity import all_keys
 
-    return complete(spec)
+    return all_keys(spec)
 
 
 def test_gains_are_left_to_studies_with_common_scans(made):
@@ -127,7 +127,7 @@ def test_gains_are_left_to_studies_with_common_scans(made):
 
 
 def test_answer_names_every_estimator(made):
-    first, others = answer_texts(words, made.cases, made.tables)
+    first, others = answer_texts(answer, made.cases, made.tables)
     names = made.cases[0].axes.filters
     assert first.startswith(f"{names[0]}: ")
     assert all(re.search(rf"(: |; ){re.escape(name)}, \d+(\.\d\d)? % \[", others) for name in names[1:])
@@ -142,7 +142,7 @@ def test_claims_find_their_estimators(made):
 
 def test_the_fall_to_side_lobes_is_that_of_the_likelihood_itself(made):
     """Of the burst without noise: ln L at random phases and frequencies far from the true ones, sample by sample."""
-    burst, rng = study.burst_of(made.cases[0].spec), np.random.default_rng(1)
+    burst, rng = scenario.configured_burst(made.cases[0].spec), np.random.default_rng(1)
     t = sample_times(burst, burst.pulses).ravel()
     theta = np.array([0.0, *measures.DOPPLER])
     true = signal(burst, phase_turns(theta, t))

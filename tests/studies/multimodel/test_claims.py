@@ -53,10 +53,10 @@ def test_blocks_of_the_families(rows):
     assert rows.loc["P2.17", "extension"].tolist() == [False] * 3 + [True] * 3
     full, none = np.full((4, 4), 0.25), np.eye(4)
     for T, extrapolated in ((full, 16), (none, 4)):
-        late, updated = cost.blocks("imm", T, merged_first=False)
+        late, updated = cost.model_counts("imm", T, merged_first=False)
         assert (late.sum(), updated.sum()) == (extrapolated, 4)
-        assert cost.blocks("imm", T)[0].sum() == 4
-        assert [one.sum() for one in cost.blocks("gpb2", T)] == [extrapolated] * 2
+        assert cost.model_counts("imm", T)[0].sum() == 4
+        assert [one.sum() for one in cost.model_counts("gpb2", T)] == [extrapolated] * 2
 
 
 def test_what_the_paper_reports_of_others_is_judged_and_not_counted(transition):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 from tests.tolerances import rounding
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.multimodel import world
-from radarsim.studies.multimodel.world import Phase, fly
+from radarsim import constants
+from radarsim.studies.multimodel import flight
+from radarsim.studies.multimodel.flight import Phase, fly
 from tests.tolerances import assert_rounded
 
 T = np.arange(0, 60.01, 0.5)
@@ -15,12 +16,12 @@ STEPS = 10
 
 def integrate_commands(size, over_s=1.0):
     """What steps of integration leave of a number of a size, after errors of rates for a time."""
-    return STEPS * (world.TOLERANCE * size + 1e-6) * over_s
+    return STEPS * (flight.TOLERANCE * size + 1e-6) * over_s
 
 
 def test_without_air_it_is_a_parabola():
     x = fly((1e5, 2e4, 0), (-800, 300, 50), VACUUM, 1.0, [Phase(0)], T)
-    g = world.STANDARD_GRAVITY_MPS2
+    g = constants.STANDARD_GRAVITY_MPS2
     assert np.allclose(x[:, 0], 1e5 - 800 * T, rtol=0, atol=integrate_commands(1e5))
     assert np.allclose(
         x[:, 3], 2e4 + 300 * T - g * T**2 / 2, rtol=0, atol=integrate_commands(2e4) + integrate_commands(300, T[-1])
@@ -52,7 +53,7 @@ def test_commands_are_followed_with_the_lag():
 
 def test_drag_is_density_times_speed_squared_over_twice_the_coefficient():
     x = fly((0, 3e4, 0), (1500, 0, 0), 5e3, 1.0, [Phase(0)], np.array([0.0, 1.0]))
-    drag = world.DENSITY_KGPM3 * np.exp(-3e4 / world.SCALE_HEIGHT_M) * 1500**2 / 1e4
+    drag = flight.DENSITY_KGPM3 * np.exp(-3e4 / flight.SCALE_HEIGHT_M) * 1500**2 / 1e4
     assert_rounded(x[0, 2], -drag, operations=12)
 
 
@@ -70,9 +71,9 @@ def test_velocity_and_acceleration_are_derivatives_of_position():
 
 
 def test_the_ground_and_the_orbit_are_refused():
-    with pytest.raises(world.ImpossibleFlight, match="hits the ground at"):
+    with pytest.raises(flight.ImpossibleFlight, match="hits the ground at"):
         fly((1e5, 1e3, 0), (-300, 0, 0), 1e4, 1.0, [Phase(0)], T)
-    with pytest.raises(world.ImpossibleFlight, match="orbit"):
+    with pytest.raises(flight.ImpossibleFlight, match="orbit"):
         fly((1e5, 9e4, 0), (-8500, 0, 0), VACUUM, 1.0, [Phase(0)], T)
 
 
@@ -81,7 +82,7 @@ def test_smoothing_reproduces_a_smooth_flight():
     times = np.sort(np.concatenate([[0, 60], rng.uniform(0, 60, 150)]))
     true = fly((1e5, 2e4, 0), (-300, 50, 50), VACUUM, 1.0, [Phase(0)], times)
     t = np.linspace(5, 55, 101)
-    x = world.smoothed_states(times, true[:, 0::3] + rng.normal(size=(len(times), 3)), t)
+    x = flight.smoothed_states(times, true[:, 0::3] + rng.normal(size=(len(times), 3)), t)
     exact = fly((1e5, 2e4, 0), (-300, 50, 50), VACUUM, 1.0, [Phase(0)], np.concatenate([[0], t]))[1:]
     assert np.abs(x - exact)[:, 0::3].max() < 2
     assert np.abs(x - exact)[:, 1::3].max() < 1.5

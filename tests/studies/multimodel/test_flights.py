@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from radarsim.papers.multimodel.interpretations import Interpretations
-from radarsim.studies.multimodel import world
-from radarsim.studies.multimodel.world import FLIGHTS
+from radarsim.studies.multimodel import flight as multimodel_flight
+from radarsim.studies.multimodel.flights import FLIGHTS
 
 T = np.arange(0, 186.2, 0.5)
 UNFLYABLE = {"dive 60"}
@@ -14,10 +14,10 @@ UNFLYABLE = {"dive 60"}
 
 def fly_flight(flight):
     phases = [
-        world.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
+        multimodel_flight.Phase(p.start_s, p.lateral_mps2, p.normal_mps2, p.axial_mps2, p.period_s or 0.0, p.trimmed)
         for p in flight.phases
     ]
-    return world.fly(
+    return multimodel_flight.fly(
         flight.position_m, flight.velocity_mps, flight.ballistic_coefficient_kgpm2, flight.lag_s, phases, T
     )
 
@@ -43,7 +43,7 @@ def test_flights_are_within_the_printed_axes(name):
 
 @pytest.mark.parametrize("name", sorted(UNFLYABLE))
 def test_impossible_flights_say_why(name):
-    with pytest.raises(world.ImpossibleFlight, match="hits the ground"):
+    with pytest.raises(multimodel_flight.ImpossibleFlight, match="hits the ground"):
         fly_flight(FLIGHTS[name])
 
 

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.papers.multimodel.interpretations import Interpretations
 from radarsim.papers.study_claims import claims_of
 from radarsim.studies import registry
-from radarsim.studies.multimodel.world import FLIGHTS
+from radarsim.studies.multimodel.flights import FLIGHTS
 from tests.tolerances import rounding
 
 OF = Interpretations()

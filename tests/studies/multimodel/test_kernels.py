@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 
 from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.studies.multimodel.kernels import hypothesis, records
-from radarsim.studies.multimodel.kernels import strip as strips
-from radarsim.studies.multimodel.kernels.strip import pack_frame
+from radarsim.studies.multimodel.kernels import filter_strip, hypothesis, layout
+from radarsim.studies.multimodel.kernels.plots import pack_frame
 from tests.studies.multimodel import naive
 from tests.tolerances import assert_rounded, rounding, scaled_condition
 
-FAMILIES = {"kalman": records.KALMAN, "gpb1": records.GPB1, "imm": records.IMM, "gpb2": records.GPB2}
+FAMILIES = {"kalman": layout.KALMAN, "gpb1": layout.GPB1, "imm": layout.IMM, "gpb2": layout.GPB2}
 RULES = {
-    "moment": records.MOMENT,
-    "best": records.BEST,
-    "combined": records.COMBINED,
-    "modified_combined": records.MODIFIED,
+    "moment": layout.MOMENT,
+    "best": layout.BEST,
+    "combined": layout.COMBINED,
+    "modified_combined": layout.MODIFIED,
 }
 UPPER = np.triu_indices(3)
 DT = 0.05
@@ -60,30 +59,30 @@ def run_kernel(family, rule, output, kinds, T, p, plots, covariances, x, P, pred
     work, numbers = hypothesis.work_arrays()
     lane_values = work.reshape(-1, WIDTH)
     for i in range(size):
-        h = lane_values[i * records.HYPOTHESIS :]
+        h = lane_values[i * layout.HYPOTHESIS :]
         h[:9] = x[:, None]
         for axis in range(3):
             block = P[3 * axis : 3 * axis + 3, 3 * axis : 3 * axis + 3]
-            h[records.OWN + 6 * axis : records.OWN + 6 * axis + 6] = block[UPPER][:, None]
-        h[records.PROBABILITY] = p[i]
-    strip = rows(scans * records.PLOT)
-    cells = strip.reshape(scans, records.PLOT, WIDTH)
-    cells[:, records.DETECTED] = ~np.isnan(plots).any(axis=1)
-    cells[:, :3], cells[:, records.COVARIANCE : records.DETECTED] = (
+            h[layout.OWN + 6 * axis : layout.OWN + 6 * axis + 6] = block[UPPER][:, None]
+        h[layout.PROBABILITY] = p[i]
+    strip = rows(scans * layout.PLOT)
+    cells = strip.reshape(scans, layout.PLOT, WIDTH)
+    cells[:, layout.DETECTED] = ~np.isnan(plots).any(axis=1)
+    cells[:, :3], cells[:, layout.COVARIANCE : layout.DETECTED] = (
         np.nan_to_num(plots),
         covariances[:, UPPER[0], UPPER[1], None],
     )
-    out = rows(scans * records.OUTPUT)
+    out = rows(scans * layout.OUTPUT)
     models = np.array([[k != "still", k == "accelerated", s] for k, s in kinds], dtype=float).ravel()
     rules = np.array([FAMILIES[family], RULES[rule], RULES[output], prediction])
     intervals, times, reported = np.zeros(scans, dtype=np.int64), np.array([DT]), np.ones(scans, dtype=np.int64)
     transitions = np.ascontiguousarray(T).ravel()
-    strips.filter_strip(
+    filter_strip.filter_strip(
         work, numbers, strip, 0, scans, models, transitions, intervals, times, rules, FRAME, reported, out
     )
-    cells = out.reshape(scans, records.OUTPUT, WIDTH)
-    variances = cells[:, records.VARIANCE : records.VARIANCE + 9]
-    return cells[:, :9], variances, cells[:, records.MODELS : records.MODELS + size], lane_values
+    cells = out.reshape(scans, layout.OUTPUT, WIDTH)
+    variances = cells[:, layout.VARIANCE : layout.VARIANCE + 9]
+    return cells[:, :9], variances, cells[:, layout.MODELS : layout.MODELS + size], lane_values
 
 
 def compare(family, rule, output, size, scans, missing=0.0, lanes=(0,), seed=3):
@@ -135,11 +134,11 @@ def hypothesis_of(cells, lane=0):
     """Mean (9,) and covariance (9, 9) of the hypothesis that begins at a row."""
     P = np.empty((9, 9))
     for axis in range(3):
-        block = cells[records.OWN + 6 * axis :][:6, lane]
+        block = cells[layout.OWN + 6 * axis :][:6, lane]
         for value, i, j in zip(block, *UPPER, strict=True):
             P[3 * axis + i, 3 * axis + j] = P[3 * axis + j, 3 * axis + i] = value
     for pair, (a, b) in enumerate(((0, 1), (0, 2), (1, 2))):
-        block = cells[records.CROSS + 9 * pair :][:9, lane].reshape(3, 3)
+        block = cells[layout.CROSS + 9 * pair :][:9, lane].reshape(3, 3)
         P[3 * a : 3 * a + 3, 3 * b : 3 * b + 3], P[3 * b : 3 * b + 3, 3 * a : 3 * a + 3] = block, block.T
     return cells[:9, lane], P
 

@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim import physics
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.studies.multimodel import STUDY, tables
+from radarsim.physics import frames
+from radarsim.studies.multimodel import STUDY, model_bank, tables, tracking
 from radarsim.studies.multimodel import study as multimodel
-from radarsim.studies.multimodel import track as multimodel_plots
 from tests.physics.antenna import to_biconical
 from tests.studies.multimodel import naive
 from tests.tolerances import mean_error, rounding
@@ -69,9 +68,9 @@ def test_plots_have_the_stated_errors_and_covariances():
     mean = np.array([unpack_covariance(R[:, :, i]) for i in range(R.shape[2])])
     nis = np.einsum("nka,nkab,nkb->nk", error, np.linalg.inv(mean), error)
     assert abs(nis.mean() - 3) < mean_error(nis.size, np.sqrt(6))
-    antenna = physics.to_antenna(truth, physics.rotation(0, np.radians(30)), 12)
+    antenna = frames.to_antenna(truth, frames.rotation(0, np.radians(30)), 12)
     sigma = np.array([2.5, np.radians(0.1), np.radians(0.1)])
-    exact = physics.plot_covariance(to_biconical(antenna), sigma, physics.rotation(0, np.radians(30)))
+    exact = frames.plot_covariance(to_biconical(antenna), sigma, frames.rotation(0, np.radians(30)))
     assert np.allclose(mean.mean(axis=0), exact, rtol=1e-3, atol=1e-3 * np.abs(exact).max())
 
 
@@ -98,9 +97,9 @@ def test_sums_equal_the_twin_on_the_same_plots(sensor, conversion):
         kinds = [(m.motion, m.sigma_acceleration_mps2) for m in options.models]
 
         def powers(s, T=T):
-            return multimodel.filters.transition_powers(T, np.array([s / 0.05]))[0]
+            return model_bank.transition_powers(T, np.array([s / 0.05]))[0]
 
-        p = multimodel.filters.stationary(T)
+        p = model_bank.stationary(T)
         merge, output = options.merge, options.output
         expected = naive.track(options.family, merge, output, kinds, powers, x, P, p, z[3:], covariance[3:], times[3:])
         error = expected[0] - plan.world.truth[3:]
@@ -130,10 +129,10 @@ def test_covariance_at_the_prediction_is_computed_there():
         P[u::3, v::3] = np.tensordot((a, b)[u] * (a, b)[v], covariance[:3], 1)
     P += np.kron(np.eye(3), np.outer(g, g))
     F, Q = naive.motion("accelerated", 20.0, 0.5)
-    turn, sigma = physics.rotation(0, np.radians(30)), np.array([2.5, np.radians(0.1), np.radians(0.1)])
+    turn, sigma = frames.rotation(0, np.radians(30)), np.array([2.5, np.radians(0.1), np.radians(0.1)])
     for k in range(3, len(z)):
-        measured = to_biconical(physics.to_antenna((F @ x)[0::3], turn, 12))
-        x, P, *_ = naive.advance(x, P, F, Q, z[k], physics.plot_covariance(measured, sigma, turn))
+        measured = to_biconical(frames.to_antenna((F @ x)[0::3], turn, 12))
+        x, P, *_ = naive.advance(x, P, F, Q, z[k], frames.plot_covariance(measured, sigma, turn))
         assert np.allclose(sums["error"][0, k - 3, :, 0], x - plan.world.truth[k], rtol=PRECISION, atol=PRECISION * 100)
 
 
@@ -261,11 +260,11 @@ def test_track_over_recorded_plots_equals_the_experiment():
     case = configured_case()
     plan, sensor = case.plan, case.case.spec.sensor
     z, *_ = multimodel.simulate_plots(plan, 0)
-    R = physics.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
-    biconical = to_biconical(physics.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
+    R = frames.rotation(sensor.antenna_azimuth_rad, sensor.antenna_elevation_rad)
+    biconical = to_biconical(frames.to_antenna(z[:, :, 0], R, sensor.antenna_height_m))
     t = np.concatenate([plan.axes.t_s[:1] - 1.5, plan.axes.t_s[:1] - 1.0, plan.axes.t_s[:1] - 0.5, plan.axes.t_s])
-    columns = multimodel_plots.columns(case.case.spec)[0]
-    track = multimodel_plots.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
+    columns = tracking.columns(case.case.spec)[0]
+    track = tracking.track(case.case, dict(zip(columns, [t + 100, *biconical.T], strict=True)))
     sums = plan.layout.unpack(case.simulate(0, 1))
     assert np.isnan(track.estimate[:, :2]).all()
     assert np.allclose(track.estimate[:, 3:], sums["error"][..., 0] + plan.world.truth[3:], rtol=PRECISION, atol=1e-3)
@@ -275,12 +274,12 @@ def test_track_over_recorded_plots_equals_the_experiment():
 
 def test_track_waits_over_gaps_and_plots_beyond_the_edge():
     case = configured_case()
-    columns = multimodel_plots.columns(case.case.spec)[0]
+    columns = tracking.columns(case.case.spec)[0]
     t = np.cumsum(np.random.default_rng(3).uniform(0.02, 3, 9000))
     plots = np.stack([np.full(9000, 5e4), np.full(9000, 0.1), np.full(9000, -0.1)])
     plots[0, 40:60] = np.nan
     plots[1, 70] = 1.5
-    track = multimodel_plots.track(case.case, dict(zip(columns, [t, *plots], strict=True)))
+    track = tracking.track(case.case, dict(zip(columns, [t, *plots], strict=True)))
     assert np.isfinite(track.estimate[:, 2:]).all()
     assert np.isfinite(track.sigma[:, 2:]).all()
     assert (track.sigma[0, 59, ::3] > track.sigma[0, 39, ::3]).all()
@@ -289,8 +288,8 @@ def test_track_waits_over_gaps_and_plots_beyond_the_edge():
 
 def test_a_track_of_two_plots_has_no_estimate():
     case = configured_case()
-    columns = multimodel_plots.columns(case.case.spec)[0]
-    track = multimodel_plots.track(case.case, dict(zip(columns, [np.arange(2.0), *np.full((3, 2), 0.1)], strict=True)))
+    columns = tracking.columns(case.case.spec)[0]
+    track = tracking.track(case.case, dict(zip(columns, [np.arange(2.0), *np.full((3, 2), 0.1)], strict=True)))
     assert np.isnan(track.estimate).all()
 
 
@@ -306,7 +305,7 @@ def test_the_shipped_plots_are_tracked_with_errors_that_fit_sigma():
     path = Path(__file__).parents[3] / "docs" / "examples" / "multimodel.csv"
     table = np.genfromtxt(path, delimiter=",", names=True)
     columns = {name: table[name] for name in ("t_s", "range_m", "elevation_rad", "azimuth_rad")}
-    tracks = multimodel_plots.track(load("multimodel_1hz").cases[0], columns)
+    tracks = tracking.track(load("multimodel_1hz").cases[0], columns)
     f, ballistic = tracks.filters.index("MMA2-122"), (table["t_s"] >= 20) & (table["t_s"] < 125)
     truth = np.stack([table[f"true_{axis}_m"] for axis in "xyz"], axis=1)
     e = (tracks.estimate[f, :, 0::3] - truth)[ballistic] / tracks.sigma[f, :, 0::3][ballistic]

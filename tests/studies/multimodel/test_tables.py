@@ -9,15 +9,16 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import result as output
-from radarsim.language import speaking
+from radarsim.api import result_content
+from radarsim.language.current import use_language
 from radarsim.papers.claims_table import NOT_JUDGED
 from radarsim.papers.multimodel.measures import Evidence
 from radarsim.papers.study_claims import claims_of
 from radarsim.papers.verdict_rule import CONFIRMED
-from radarsim.report import figures, html
-from radarsim.report.drawing import Note
-from radarsim.studies.multimodel import STUDY, words
+from radarsim.report import typeset
+from radarsim.report.drawing import canvas as drawing_canvas
+from radarsim.report.drawing.model import Note
+from radarsim.studies.multimodel import STUDY, answer
 from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, rounding
 
@@ -94,7 +95,7 @@ def test_figures_are_described(result):
     # `families` needs two families and rules.
     assert set(result.figures) == {*STUDY.keys().figure_names, "claims"} - {"families"}
     assert result.figure("trajectory") is not None
-    for panel in result._described["sigma_y"].panels:
+    for panel in result._figures_by_name["sigma_y"].panels:
         tops = [(mark.text, mark.x) for mark in panel.marks if isinstance(mark, Note) and mark.place == "top"]
         end = float(result.cases[0].axes.t_s[-1])
         assert tops == [("start", 10), ("ballistic", 72.5), ("manoeuvre", 147.5), ("after", (170 + end) / 2)]
@@ -103,14 +104,14 @@ def test_figures_are_described(result):
 @pytest.mark.slow
 def test_stage_names_do_not_overlap_and_captions_have_the_others():
     result = radarsim.run("multimodel_recorded", realisations=3)
-    with speaking("ru"):
-        case_figures = output.case_figures(result.cases, result.tables, result.experiment)
+    with use_language("ru"):
+        case_figures = result_content.case_figures(result.cases, result.tables, result.experiment)
     for name in ("sigma_y", "trajectory"):
         assert (
             "Этапы по порядку: начало, прямая, разворот, набор высоты, обратный разворот и после."
             in case_figures[name].caption
         )
-        canvas = figures.render(case_figures[name])
+        canvas = drawing_canvas.render(case_figures[name])
         (*_, axes) = canvas.axes
         boxes = [
             text.get_window_extent() for text in axes.texts if text.get_text() in ("разворот", "набор высоты", "после")
@@ -125,12 +126,12 @@ def test_filters_with_equally_few_operations_are_listed_together():
     counts = result.tables["operations"].query("stage == 'after'").set_index("filter")["operations"]
     fewest = counts[counts == counts.min()].index
     assert set(fewest) == {"MMA1 best", "MMA2 best"}
-    caption = output.case_figures(result.cases, result.tables, result.experiment)["cost"].caption
+    caption = result_content.case_figures(result.cases, result.tables, result.experiment)["cost"].caption
     assert caption.startswith(f"Fewest operations: MMA2 best and MMA1 best ({counts.min():.0f}); ")
 
 
 def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
-    first, height, climb = answer_texts(words, result.cases, result.tables)
+    first, height, climb = answer_texts(answer, result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):
         assert stage in height
         assert stage in climb
@@ -154,12 +155,12 @@ def test_answer_on_several_cases_is_one_sentence():
     columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
     stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
     cases = [SimpleNamespace(name=name, swept=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
-    (sentence,) = answer_texts(words, cases, {"stages": stages})
+    (sentence,) = answer_texts(answer, cases, {"stages": stages})
     assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in sentence
-    single_answer = answer_texts(words, cases, {"stages": stages[stages["filter"] == "b"]})
+    single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})
     assert [line.rpartition("start: ")[2] for line in single_answer] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
     vy_stages = pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)
-    sentence, *_ = answer_texts(words, cases[1:], {"stages": vy_stages})
+    sentence, *_ = answer_texts(answer, cases[1:], {"stages": vy_stages})
     assert sentence == "Least σ of the height in every stage: a; next b, at most 100 % above it."
 
 
@@ -172,5 +173,5 @@ def test_time_per_update_is_only_in_the_record_and_the_report(tmp_path):
     assert all(seconds > 0 for seconds in measured.values())
     page = (folder / "report.html").read_text()
     assert "Cost against accuracy" in page
-    assert html.cell_text(1e9 * measured["Kalman-2 1"]) in page
+    assert typeset.cell_text(1e9 * measured["Kalman-2 1"]) in page
     assert not any("measured, ns" in path.read_text() for path in folder.glob("*.csv"))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from radarsim.physics import manoeuvre_covariance, transition
+from radarsim.physics.motion import manoeuvre_covariance, transition
 
 
 def score(u, variance, x, forecast, precision, size, first, steps=40, tolerance=1e-3):

@@ -2,9 +2,9 @@
 
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
-from radarsim.studies.pulses_to_tracks import words
+from radarsim.studies.pulses_to_tracks import answer
 from tests.tolerances import rounding
 
 ALL = "[range, velocity, acceleration]"
@@ -60,14 +60,14 @@ def test_pulses_by_their_number_a_second_and_a_duration():
 
 
 def test_forecast_wider_than_the_span_warns():
-    assert words.warnings(load("pulses")) == []
-    (line,) = words.warnings(load("pulses", ["prior.sigma_velocity_mps=100"]))
+    assert answer.warnings(load("pulses")) == []
+    (line,) = answer.warnings(load("pulses", ["prior.sigma_velocity_mps=100"]))
     assert line.startswith(
         "pulses: prior.sigma_velocity_mps: 3 σ of the velocity, 300 m/s, are over half the span of 300 m/s"
     )
     many = [f"filters.{n}.hypotheses=9" for n in (2, 3, 4, 6)]
     gated = "filters.5={name: many, observes: [range, velocity], manoeuvre_variance: 1e-3, hypotheses: 9}"
-    assert words.warnings(load("pulses", ["prior.sigma_velocity_mps=100", gated, *many])) == []
+    assert answer.warnings(load("pulses", ["prior.sigma_velocity_mps=100", gated, *many])) == []
 
 
 def test_forecast_without_windows_is_refused():

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.studies import registry
-from radarsim.studies.pulses_to_tracks import kernels as chain
 from radarsim.studies.pulses_to_tracks import study
-from radarsim.studies.pulses_to_tracks.kernels import LISTED, NUMBER, RIGHT, TAKEN, WRONG_FOLD, Sums
+from radarsim.studies.pulses_to_tracks.kernels import block
+from radarsim.studies.pulses_to_tracks.kernels.layout import LISTED, NUMBER, RIGHT, TAKEN, WRONG_FOLD, Sums
 from tests.studies.pulses_to_tracks.conftest import RANGE, SPECTRUM, A, make_case, plan_and_sums
 from tests.studies.pulses_to_tracks.test_kernels import LOCKED_OFF, SPEC, normals, samples_of, textbook_estimate
 from tests.tolerances import sigma_error
@@ -111,7 +111,7 @@ def test_hypotheses_equal_the_textbook_list():
     plan, count = study.prepare(case), 8
     SPEC[:] = [case.spec]
     sums = Sums(**plan.layout.unpack(np.zeros(plan.layout.size)))
-    errors = chain.simulate_block(plan.world, plan.filters, sums, 0, count)
+    errors = block.simulate_block(plan.world, plan.filters, sums, 0, count)
     for f, options in enumerate(LISTS):
         expected, right = textbook_errors(plan, case, f, count)
         # The highest line of a spectrum is defined, of bursts that lose lock too.

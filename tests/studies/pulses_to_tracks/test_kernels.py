@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from radarsim.bursts.burst import turns_per_parameter
-from radarsim.bursts.kernels import lanes, sequence, strip
-from radarsim.bursts.kernels.scoring import SAMPLES, SIZE, STATE
+from radarsim.bursts.kernels import scoring_lanes, sequence, sequence_lanes
+from radarsim.bursts.kernels.scoring import SIZE, STATE
+from radarsim.bursts.kernels.signal import SAMPLES
+from radarsim.kernels import lanes
 from radarsim.kernels.random import fill_normal_pairs
-from radarsim.studies.pulses_to_tracks import filters, study
-from radarsim.studies.pulses_to_tracks import kernels as chain
-from radarsim.studies.pulses_to_tracks.kernels import LOCKED, Sums, allocate_burst_arrays, draw_sums, estimate_bursts
+from radarsim.studies.pulses_to_tracks import scenario, study, window_menu
+from radarsim.studies.pulses_to_tracks.kernels import block
+from radarsim.studies.pulses_to_tracks.kernels.burst_estimate import allocate_burst_arrays, draw_sums, estimate_bursts
+from radarsim.studies.pulses_to_tracks.kernels.layout import LOCKED, Sums
 from tests.studies.pulses_to_tracks import naive
 from tests.studies.pulses_to_tracks.conftest import CURED, IDEAL, RANGE, SEQUENCE, SPECTRUM, A, make_case
 from tests.tolerances import assert_rounded, rounding
@@ -64,11 +67,11 @@ def test_estimator_equals_p4s_on_the_same_sums(plan):
         windows, work = windows_of_filter(plan, f), allocate_burst_arrays(len(plan.world.mean), 1)[0]
         for n in range(8):
             b = plan.world.to_turns @ track_forecasts[n]
-            work[(lanes.PRIOR + 1) * lanes.WIDTH + n], work[(lanes.PRIOR + 2) * lanes.WIDTH + n] = b
+            work[(scoring_lanes.PRIOR + 1) * lanes.WIDTH + n], work[(scoring_lanes.PRIOR + 2) * lanes.WIDTH + n] = b
         options = plan.filters.options[f].copy()
         options["windows"] = len(windows)
         errors = np.zeros((8, len(windows), SIZE))
-        strip.run_strip(
+        sequence_lanes.run_strip(
             *(plan.world.physics[SCAN], room[2], plan.world.tables, windows, options),
             *(work, np.zeros(room[1].size), errors),
         )
@@ -163,7 +166,7 @@ def normals(plan, stream, pair, n):
 def textbook_errors(plan, case, f, count):
     """Errors (K, count, 3) of filter f, one realisation after the other."""
     spec, options = case.spec, case.spec.filters[f]
-    size = filters.parameter_count(options) if options.takes else 0
+    size = window_menu.parameter_count(options) if options.takes else 0
     errors = np.zeros((spec.scans, count, 3))
     designation = normals(plan, 2, 0, count)
     noise = [normals(plan, 0, k, count)[0] for k in range(spec.scans)]
@@ -198,7 +201,7 @@ def textbook_errors(plan, case, f, count):
 
 def textbook_estimate(plan, options, f, k, track, samples, forecast_errors, size):
     """The textbook's estimate of a burst: coefficients (6,), less the truth."""
-    burst = filters.bursts(SPEC[0], np.array([[1e5, 0.0, 0.0]]))[0]
+    burst = scenario.bursts(SPEC[0], np.array([[1e5, 0.0, 0.0]]))[0]
     variance = float(plan.world.physics[k]["sigma"]) ** 2
     forecast = track.x[1:] if plan.filters.filters[f]["track"] else plan.filters.filters[f]["fixed"] * forecast_errors
     b = np.zeros(6)
@@ -210,7 +213,7 @@ def textbook_estimate(plan, options, f, k, track, samples, forecast_errors, size
         spreads = [menu.spreads(e) for e in range(len(menu.windows))]
         fits = [e for e, (v, a) in enumerate(spreads) if v >= track.P[1, 1] ** 0.5 * (1 - 1e-9)]
         entry = max(fits) if fits else 0
-    sigma = filters.theta_spreads(burst, size, menu.spreads(entry))
+    sigma = window_menu.theta_spreads(burst, size, menu.spreads(entry))
     precision = np.zeros(6)
     precision[1:size] = (sigma * turns_per_parameter(size, burst.duration_s))[1:] ** -2.0
     return naive.sequence(samples, variance, b, precision, size, menu.windows[entry])
@@ -238,7 +241,7 @@ def test_chain_equals_the_textbook(count):
     plan = study.prepare(case)
     SPEC[:] = [case.spec]
     values = np.zeros(plan.layout.size)
-    errors = chain.simulate_block(plan.world, plan.filters, Sums(**plan.layout.unpack(values)), 0, count)
+    errors = block.simulate_block(plan.world, plan.filters, Sums(**plan.layout.unpack(values)), 0, count)
     assert len(plan.world.mean) == case.spec.pulses  # a block a sample: sums are the samples
     for f in range(len(USES)):
         expected = textbook_errors(plan, case, f, count)

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
-from radarsim.app.solve import solve
+from radarsim.api.configs import load
+from radarsim.api.design.solve import solve
 from radarsim.bursts.burst import LIGHT_MPS, Burst
 from radarsim.studies import registry
-from radarsim.studies.pulses_to_tracks import filters, study
-from radarsim.studies.pulses_to_tracks.kernels import AGES, LOCKED, TAKEN
+from radarsim.studies.pulses_to_tracks import exact_errors, scenario, study, window_menu
+from radarsim.studies.pulses_to_tracks.kernels.layout import AGES, LOCKED, TAKEN
 from tests.studies.pulses_to_tracks.conftest import (
     CURED,
     IDEAL,
@@ -37,18 +37,18 @@ def test_the_bound_is_that_of_a_sinusoid():
     expected = 0.03 / 2 * omega / (2 * math.pi)
     for size in (2, 3):
         # κ of three powers of time is 286; a length is taken for N T_p, and N² − 1 for a sum.
-        assert_rounded(filters.fisher_bounds(burst, size)[0], expected, condition=286, operations=2 * pulses)
-    assert math.isinf(filters.fisher_bounds(burst, 2)[1])
+        assert_rounded(scenario.fisher_bounds(burst, size)[0], expected, condition=286, operations=2 * pulses)
+    assert math.isinf(scenario.fisher_bounds(burst, 2)[1])
     # Of a chirp: var of the rate of ω, 360/(snr N (N² − 1)(N² − 4) T_p⁴) (Djuric & Kay 1990).
     rate = math.sqrt(360 / (snr * pulses * (pulses**2 - 1) * (pulses**2 - 4))) / period**2
-    bound = filters.fisher_bounds(burst, 3)[1]
+    bound = scenario.fisher_bounds(burst, 3)[1]
     assert_rounded(bound, 0.03 / 2 * rate / (2 * math.pi), condition=286, operations=2 * pulses)
 
 
 def test_power_falls_with_range_and_with_the_pulses_length():
     spec = make_case([RANGE], burst={"snr_range_m": 50e3, "pulse_length_s": 5e-5, "snr_db": 10.0}).spec
     truth = np.array([[100e3, 0.0, 0.0], [50e3, 0.0, 0.0], [50e3, -150.0, 0.0]])
-    power = [0.5 / burst.noise_variance for burst in filters.bursts(spec, truth)]
+    power = [0.5 / burst.noise_variance for burst in scenario.bursts(spec, truth)]
     loss = np.sinc(5e-5 * 2 * 150 / 0.03) ** 2
     expected_db = [10 - 40 * math.log10(2), 10, 10 + 10 * math.log10(loss)]
     # Powers are of a hundredth of a decibel.
@@ -140,7 +140,7 @@ def test_menus_cover_all_forecasts():
     case = make_case([SEQUENCE, SEQUENCE | {"name": "a", "observes": A}], burst={"pulses": 512, "snr_db": 10.0})
     plan = study.prepare(case)
     for options, menu in zip(case.spec.filters, plan.menus, strict=True):
-        widest = filters.widest_forecast(case.spec, options)
+        widest = window_menu.widest_forecast(case.spec, options)
         assert menu.top == widest
         assert len(menu.windows) == menu.levels[0] * menu.levels[1]
         spreads = [menu.spreads(e) for e in range(len(menu.windows))]
@@ -164,7 +164,7 @@ def test_narrow_gate_leaves_range_alone():
 
 def test_only_range_and_idealisations_have_exact_errors():
     case = make_case([RANGE, IDEAL, CURED])
-    has_exact = [filters.has_exact_errors(options) for options in case.spec.filters]
+    has_exact = [exact_errors.has_exact_errors(options) for options in case.spec.filters]
     assert has_exact == [True, True, False]
     axes = study.prepare(case).axes
     assert np.isnan(axes.exact_sigma[2]).all()

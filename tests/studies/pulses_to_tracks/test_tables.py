@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app.configs import load
-from radarsim.report.drawing import Line
-from radarsim.report.statistics import FEW_EVENTS
+from radarsim.api.configs import load
+from radarsim.report.drawing.model import Line
+from radarsim.report.statistics import MIN_EVENTS
 from radarsim.studies import registry
 from radarsim.studies.pulses_to_tracks import study, tables
 from radarsim.studies.pulses_to_tracks.tables import SIGMA_ALL_NOTE
@@ -134,7 +134,7 @@ def test_filter_has_the_same_look_in_all_figures(result):
             looks.setdefault(mark.label, {})[name] = mark.style
     missed = result.tables["locks"].assign(lost=lambda rows: (1 - rows["lock_rate"]) * rows["n"])
     missed = missed.groupby("filter")["lost"].sum().round()
-    often = set(missed[missed >= FEW_EVENTS].index)
+    often = set(missed[missed >= MIN_EVENTS].index)
     assert often
     assert {name for name, looks_by_figure in looks.items() if set(looks_by_figure) == {"sigma_r", "locks"}} == often
     assert all(len(set(looks_by_figure.values())) == 1 for looks_by_figure in looks.values())

@@ -8,11 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from radarsim.app.compare import chart
+from radarsim.api.doppler_chart import chart
 from radarsim.errors import ConfigError
-from radarsim.report.drawing import Note
-from radarsim.studies.range_doppler import chart as drawn
-from radarsim.studies.range_doppler import filters
+from radarsim.report.drawing.model import Note
+from radarsim.studies.range_doppler import closed_form, doppler_gain_figures, steady_state
 from tests.program import command
 from tests.studies.range_doppler import impulse, naive
 from tests.tolerances import assert_rounded
@@ -32,47 +31,48 @@ def random_radars(count, most, seed, decades=2):
 
 def recursion(shares):
     """Exact steady gains (3, n) of radars with these shares (2, n)."""
-    return filters.exact_gains(shares[0] ** -2, shares[1] ** 3)
+    return steady_state.exact_gains(shares[0] ** -2, shares[1] ** 3)
 
 
 def test_a_thousand_random_radars_lie_on_the_chart():
     """Where Δt/τ₁ and Δt/τ₂ are at most 0.05 the closed form is within half a point, up to c of 50 000."""
-    shares = random_radars(1200, filters.SMALL, 1, decades=3)
+    shares = random_radars(1200, closed_form.MAX_STEP, 1, decades=3)
     c = (shares[1] / shares[0]) ** 2
-    shares, c = shares[:, c <= filters.LARGEST][:, :1000], c[c <= filters.LARGEST][:1000]
+    shares, c = shares[:, c <= closed_form.MAX_C][:, :1000], c[c <= closed_form.MAX_C][:1000]
     assert shares.shape == (2, 1000)
     assert c.max() > 1e4
     gains = recursion(shares)
-    away = np.abs(filters.steady_gains(c, shares[1]) - gains)
-    assert away.max() < filters.ERROR_POINTS <= 0.5
-    assert away[:, c <= filters.MODERATE].max() < filters.MODERATE_POINTS
+    away = np.abs(closed_form.steady_gains(c, shares[1]) - gains)
+    assert away.max() < closed_form.ERROR_POINTS <= 0.5
+    assert away[:, c <= closed_form.MODERATE_C].max() < closed_form.MODERATE_POINTS
     # Without the correction: half a point is just exceeded in the range, where Δt/τ₂ is 0.05.
-    limit = np.abs(filters.steady_gains(c) - gains)
-    assert limit.max() < filters.LIMIT_POINTS
+    limit = np.abs(closed_form.steady_gains(c) - gains)
+    assert limit.max() < closed_form.LIMIT_POINTS
     assert limit[:, shares[1] < 0.045].max() < 0.5
 
 
 @pytest.mark.parametrize(
-    ("most", "points"), [(filters.LARGEST, filters.ERROR_POINTS), (filters.MODERATE, filters.MODERATE_POINTS)]
+    ("most", "points"),
+    [(closed_form.MAX_C, closed_form.ERROR_POINTS), (closed_form.MODERATE_C, closed_form.MODERATE_POINTS)],
 )
 def test_where_the_closed_form_is_worst_it_is_within_the_stated_points(most, points):
     """Along the edge: the larger of both shares is 0.05. No bound has much to spare."""
     c = np.geomspace(1e-3, most, 600)
-    shares = filters.SMALL * np.array([np.minimum(c**-0.5, 1.0), np.minimum(c**0.5, 1.0)])
+    shares = closed_form.MAX_STEP * np.array([np.minimum(c**-0.5, 1.0), np.minimum(c**0.5, 1.0)])
     gains = recursion(shares)
-    corrected = np.abs(filters.steady_gains(c, shares[1]) - gains)
-    limit = np.abs(filters.steady_gains(c) - gains)
+    corrected = np.abs(closed_form.steady_gains(c, shares[1]) - gains)
+    limit = np.abs(closed_form.steady_gains(c) - gains)
     assert 0.85 * points < corrected.max() < points
     assert corrected[:2].max() < 0.06  # range and velocity, at any c
-    assert 0.9 * filters.LIMIT_POINTS < limit.max() < filters.LIMIT_POINTS
+    assert 0.9 * closed_form.LIMIT_POINTS < limit.max() < closed_form.LIMIT_POINTS
 
 
 def test_the_correction_is_of_the_first_order():
     """Halving the period takes the error of the limit down by two, that with the correction by four."""
     c, steps = np.full(2, 9.6), np.array([0.04, 0.02])
     gains = recursion(np.array([steps * c**-0.5, steps]))
-    without = filters.steady_gains(c) - gains
-    corrected = filters.steady_gains(c, steps) - gains
+    without = closed_form.steady_gains(c) - gains
+    corrected = closed_form.steady_gains(c, steps) - gains
     # Of errors of one order and the next, which is smaller by a factor of the step.
     assert without[:2, 0] / without[:2, 1] == pytest.approx([2, 2], rel=steps[0])
     assert corrected[:2, 0] / corrected[:2, 1] == pytest.approx([4, 4], rel=steps[0])
@@ -83,7 +83,7 @@ def test_many_radars_at_once_are_as_one_by_one():
     gains = recursion(shares)
     for i in range(40):
         sigma, variance = np.array([1.0, shares[0, i]]), shares[1, i] ** 6
-        states = np.array([filters.steady_state(n, variance, sigma, 1.0) for n in (1, 2)])
+        states = np.array([steady_state.steady_state(n, variance, sigma, 1.0) for n in (1, 2)])
         both = np.sqrt(np.diagonal(states[:, 1], axis1=1, axis2=2))
         allowed = 100 * naive.precision(states, 1 + 1 / shares[1, i])  # of the scans of a memory
         assert gains[:, i] == pytest.approx(100 * (1 - both[1] / both[0]), abs=allowed)
@@ -92,16 +92,19 @@ def test_many_radars_at_once_are_as_one_by_one():
 @pytest.mark.slow_cases("30.0")
 @pytest.mark.parametrize("c", [0.3, 3.0, 30.0])
 def test_the_lines_over_time_are_those_of_the_textbook_and_end_in_the_closed_form(c):
-    t, gain = drawn.limit_course(c)
+    t, gain = doppler_gain_figures.limit_course(c)
     tau_2 = c**-0.5
-    dt = min(1.0, tau_2) / drawn.FINE
+    dt = min(1.0, tau_2) / doppler_gain_figures.SCANS_PER_TIME
     for i in (0, len(t) // 4):
         scans = round(t[i] / dt) + 1
         P = naive.kalman(np.zeros((scans, 2)), 1, 3, tau_2**-6, (1.0, 1.0), dt)[1][2:]  # worse than with the velocity
         wanted = impulse.gains(scans, tau_2**-6, (1.0, 1.0), dt)
         assert gain[i] == pytest.approx(wanted, abs=100 * naive.precision(P))
     # The limit errs by the first order of the period, and by LIMIT_POINTS where it is SMALL.
-    assert gain[-1] == pytest.approx(filters.steady_gains(c), abs=filters.LIMIT_POINTS / drawn.FINE / filters.SMALL)
+    assert gain[-1] == pytest.approx(
+        closed_form.steady_gains(c),
+        abs=closed_form.LIMIT_POINTS / doppler_gain_figures.SCANS_PER_TIME / closed_form.MAX_STEP,
+    )
 
 
 @pytest.mark.slow
@@ -124,7 +127,7 @@ def test_ones_own_radar_is_named_and_marked(made):
     rows = pd.read_csv(made.folder / "chart.csv")
     assert rows["case"].unique().tolist() == ["rls2, as set", "rls1", "rls2", "rls3", "rls4", "rls5"]
     own = rows.iloc[0]
-    states = np.array([filters.steady_state(n, 1e-3, np.array([250.0, 5.0]), 10.0) for n in (1, 2)])
+    states = np.array([steady_state.steady_state(n, 1e-3, np.array([250.0, 5.0]), 10.0) for n in (1, 2)])
     base, twin = states[:, 1, 0, 0]
     allowed = 100 * naive.precision(states, 3)  # a memory is of two scans
     assert own["steady_gain_percent"] == pytest.approx(100 * (1 - np.sqrt(twin / base)), abs=allowed)
@@ -132,16 +135,16 @@ def test_ones_own_radar_is_named_and_marked(made):
 
 def test_the_lines_of_the_map_are_crossed_where_they_say():
     """The number of each line of equal gain stands at a place that has this gain by the solver."""
-    found = drawn.over_groups([], [])
+    found = doppler_gain_figures.gain_map_figure([], [])
     levels = []
     for component, panel in enumerate(found.panels):
         notes = [mark for mark in panel.marks if isinstance(mark, Note)]
         # Chords between places of the map are an eighth of a second difference off, in each number.
-        rows = drawn.map_gains()[component]
+        rows = doppler_gain_figures.map_gains()[component]
         chord = sum(np.abs(np.diff(rows, 2, axis=axis)).max() / 8 for axis in (0, 1))
         levels.append([note.text for note in notes])
         for note in notes:
-            at = filters.exact_gains(np.array([note.x]), np.array([note.y]))
+            at = steady_state.exact_gains(np.array([note.x]), np.array([note.y]))
             assert at[component, 0] == pytest.approx(float(note.text.removesuffix(" %")), abs=chord)
     assert levels == [["20 %", "40 %", "60 %", "80 %"]] * 2 + [["0 %", "20 %", "40 %", "60 %", "80 %"]]
 
@@ -155,9 +158,9 @@ def test_the_page_is_whole_and_fetches_nothing(made):
 
 
 def test_a_name_cannot_break_out_of_the_page():
-    from radarsim.report import html
+    from radarsim.report import render_page
 
-    text = html.live_page("t", ("<main></main>", "", ""), json.dumps([{"name": "</script><script>alert(1)"}]))
+    text = render_page.live_page("t", ("<main></main>", "", ""), json.dumps([{"name": "</script><script>alert(1)"}]))
     assert "</script><script>alert" not in text
     assert "\\u003c/script\\u003e" in text
 
@@ -190,7 +193,7 @@ def test_the_table_on_the_wall_is_the_closed_form():
     rows = re.findall(r"^\| ([\d.]+) \| ([-\d.]+) \| ([-\d.]+) \| ([-\d.]+) \|$", text, re.MULTILINE)
     assert len(rows) == 8
     for c, *gains in rows:
-        assert [float(one) for one in gains] == pytest.approx(filters.steady_gains(float(c)), abs=0.05)
+        assert [float(one) for one in gains] == pytest.approx(closed_form.steady_gains(float(c)), abs=0.05)
 
 
 def test_the_command(tmp_path):
@@ -232,7 +235,7 @@ def test_a_config_given_twice_counts_once_and_figures_are_told(tmp_path):
 def test_a_radar_beyond_the_closed_forms_promise_is_told(sigma_velocity_mps, period, said, tmp_path):
     settings = [f"radar.sigma_velocity_mps={sigma_velocity_mps}", f"radar.scan_period_s={period}"]
     found = chart("rls2", out=tmp_path, overrides=settings, figures=False)
-    assert (filters.groups(250, sigma_velocity_mps, period, 1e-3).c > filters.LARGEST) == bool(said)
+    assert (closed_form.dimensionless_groups(250, sigma_velocity_mps, period, 1e-3).c > closed_form.MAX_C) == bool(said)
     assert ("may be inaccurate" in found.sentences[0]) == bool(said)
     assert said in found.sentences[0]
     if said == "here it is":

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 
 NUMBER = "must be a number"
@@ -150,7 +150,7 @@ def spoil(config: dict, key: str, value: object) -> dict:
 def test_bad_value(good, said, key, value, message):
     from radarsim.studies import registry
 
-    message = message.replace("{studies}", ", ".join(registry.names())).replace("{bands}", BANDS)
+    message = message.replace("{studies}", ", ".join(registry.study_names())).replace("{bands}", BANDS)
     line = message if message.startswith("config: ") else f"config: {key}: {message}"
     lines = said(spoil(good, key, value))
     if value == {} and key.endswith("manoeuvre_variance"):  # a mapping says what it is to make least
@@ -209,7 +209,7 @@ def test_unknown_key(good, said, key, message):
 
 
 def test_the_contracts_example(house, said):
-    from radarsim.config.document import SHIPPED
+    from radarsim.config.find_files import SHIPPED
 
     text = (SHIPPED / "configs/rls2.yaml").read_text()
     house("configs/rls2.yaml", text.replace("sigma_range_m: 250", "sigma_range_m: -250"))
@@ -339,10 +339,10 @@ def test_either_scans_or_a_duration(good, said):
 
 
 def test_a_duration_is_the_scans_that_it_makes(good):
-    from radarsim.config.experiment import canonical, complete
+    from radarsim.config.identity import all_keys, identity_keys
 
     given = load(good).cases[0].spec
     del good["scans"]
     made = load(good | {"duration_s": 140}).cases[0].spec
-    assert canonical(made) == canonical(given)
-    assert complete(made) == complete(given)
+    assert identity_keys(made) == identity_keys(given)
+    assert all_keys(made) == all_keys(given)

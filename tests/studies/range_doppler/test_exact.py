@@ -3,19 +3,12 @@
 import numpy as np
 import pytest
 
-from radarsim import physics
-from radarsim.kernels.algebra import pack
-from radarsim.physics import process_noise, transition
-from radarsim.studies.range_doppler.filters import (
-    Plots,
-    design,
-    error_recursion,
-    least_squares_start,
-    noise_by_time,
-    normalised_error,
-    observation,
-    steady_state,
-)
+from radarsim.kernels.kalman_algebra import pack
+from radarsim.physics import targets
+from radarsim.physics.motion import process_noise, transition
+from radarsim.studies.range_doppler.error_recursion import Plots, error_recursion
+from radarsim.studies.range_doppler.filter_design import design, least_squares_start, noise_by_time, observation
+from radarsim.studies.range_doppler.steady_state import normalised_error, steady_state
 from tests.studies.range_doppler import naive
 from tests.tolerances import assert_rounded, mean_error, scaled_condition
 
@@ -28,7 +21,7 @@ def sigmas(radar, observes, variance=1e-3, scans=15, coefficients=(1e5, -250.0, 
     *sigma, dt = RADARS[radar]
     sigma = np.array(sigma, dtype=float)
     made = design(observes, START[observes], variance, sigma, dt, scans)
-    x = physics.polynomial(coefficients, np.arange(scans) * dt)
+    x = targets.polynomial(coefficients, np.arange(scans) * dt)
     lasting, covariance = error_recursion(made, Plots(sigma), x, dt)
     return lasting[:, :, 0], np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)), made
 
@@ -101,7 +94,7 @@ def test_a_quadratic_truth_leaves_no_bias_and_a_cubic_one_does():
     defect = 0.01 * np.array([dt**3 / 6, dt**2 / 2, dt])
     steady = np.linalg.solve(np.eye(3) - kept @ transition(dt), -kept @ defect)
     # The defect is what is left of ranges of 1e8 m, and is added up over the scans of a memory, two.
-    size = physics.polynomial((1e5, -250.0, 4.0, 0.01), np.array([399 * dt]))[0, 0] / np.array([1, dt, dt**2])
+    size = targets.polynomial((1e5, -250.0, 4.0, 0.01), np.array([399 * dt]))[0, 0] / np.array([1, dt, dt**2])
     assert_rounded(cubic[-1], steady, size=size, condition=2, operations=10)
 
 
@@ -110,7 +103,7 @@ def test_believed_covariance_without_manoeuvre_variance_is_the_true_one():
     sigma = np.array([250.0, 15.0])
     for observes in (1, 2):
         made = design(observes, START[observes], 0.0, sigma, 10.0, 15)
-        x = physics.polynomial([1e5, -250.0, 4.0], np.arange(15) * 10.0)
+        x = targets.polynomial([1e5, -250.0, 4.0], np.arange(15) * 10.0)
         _, covariance = error_recursion(made, Plots(sigma), x, 10.0)
         tolerance = naive.precision(made.believed[START[observes] - 1 :])
         scale = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))[1:]

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from radarsim.app.run import load_all
-from radarsim.physics import manoeuvre_covariance, transition
-from radarsim.studies.range_doppler.track import STARTING, WIDE_ACCELERATION_MPS2, WIDE_VELOCITY_MPS, PlotLikelihood
+from radarsim.api.load_experiments import load_all
+from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.studies.range_doppler.plot_likelihood import WIDE_ACCELERATION_MPS2, WIDE_VELOCITY_MPS, PlotLikelihood
+from radarsim.studies.range_doppler.tracking import START_RANGES
 from tests.tolerances import rounding
 
 T_S = np.array([0.0, 4.0, 9.0, 12.0, 20.0, 26.0, 30.0, 33.0])
@@ -66,7 +67,7 @@ def dense(columns, sigma_range, sigma_velocity, manoeuvre):
     L = factor(joint[np.ix_(order, order)])
     white = solved(L, error[order])
     score = -np.log(np.diagonal(L)) - 0.5 * (np.log(2 * np.pi) + white**2)
-    return float(score[order >= 2 * STARTING].sum())
+    return float(score[order >= 2 * START_RANGES].sum())
 
 
 def factor(C):
@@ -125,7 +126,7 @@ def twin(columns, values, share, bias):
             w = [one[0] / density for one in made]
             x = sum(a * one[1] for a, one in zip(w, made, strict=True))
             P = sum(a * (one[2] + np.outer(one[1] - x, one[1] - x)) for a, one in zip(w, made, strict=True))
-            total += np.log(density) if k >= STARTING else 0.0
+            total += np.log(density) if k >= START_RANGES else 0.0
     return total
 
 

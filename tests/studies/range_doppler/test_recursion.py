@@ -5,9 +5,10 @@ import pytest
 
 from radarsim.papers.range_doppler import filter_versions
 from radarsim.papers.range_doppler.measures import RADARS
-from radarsim.physics import manoeuvre_covariance, transition
-from radarsim.studies.range_doppler import filters
-from radarsim.studies.range_doppler.filters import Plots, design
+from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.studies.range_doppler import error_recursion
+from radarsim.studies.range_doppler.error_recursion import Plots
+from radarsim.studies.range_doppler.filter_design import design
 from tests.studies.range_doppler import naive
 from tests.tolerances import absolute_product, assert_rounded, rounding, scaled_condition
 
@@ -18,11 +19,11 @@ VARIANCES = (1e-5, 1e-3, 1e-1)
 @pytest.mark.parametrize(("start", "scans"), [("weighted", (3, 2)), ("four_and_four", (4, 4))])
 def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scans):
     sigma, dt = np.array(radar[:2], dtype=float), radar[2]
-    found = filter_versions.both(radar, [("random_jerk", v, start) for v in VARIANCES], 29)
+    found = filter_versions.errors_of_both_filters(radar, [("random_jerk", v, start) for v in VARIANCES], 29)
     for observes, of in zip((1, 2), found, strict=True):
         for i, variance in enumerate(VARIANCES):
             one = design(observes, scans[observes - 1], variance, sigma, dt, 29)
-            _, S = filters.error_recursion(one, Plots(sigma), np.zeros((29, 3)), dt)
+            _, S = error_recursion.error_recursion(one, Plots(sigma), np.zeros((29, 3)), dt)
             true = np.sqrt(np.diagonal(S, axis1=1, axis2=2))
             believed = np.sqrt(np.diagonal(one.believed, axis1=1, axis2=2))
             known = one.available
@@ -38,7 +39,7 @@ def test_the_papers_filter_is_the_one_of_one_filter_at_a_time(radar, start, scan
 def test_a_start_with_process_noise_is_a_kalman_filter_without_a_prior(observes):
     sigma, dt = np.array([25.0, 5.0]), 10.0
     Q, variance, push = manoeuvre_covariance(1e-2, dt), 1e-2, np.array([dt**3 / 6, dt**2 / 2, dt])
-    believed, _ = filter_versions.started("process_noise", observes, sigma, dt, Q[None])
+    believed, _ = filter_versions.start_covariances("process_noise", observes, sigma, dt, Q[None])
     # The information form of the filter, from nothing: plot, step, plot, …
     H, R = np.eye(3)[:observes], np.diag(sigma[:observes] ** 2)
     F = transition(dt)
@@ -55,8 +56,8 @@ def test_a_start_with_process_noise_is_a_kalman_filter_without_a_prior(observes)
 def test_the_true_error_of_a_start_with_process_noise_is_that_of_its_weights():
     sigma, dt = np.array([25.0, 5.0]), 10.0
     Q = manoeuvre_covariance(1e-1, dt)[None]
-    believed, true = filter_versions.started("process_noise", 2, sigma, dt, Q)
-    least, _ = filter_versions.started("weighted", 2, sigma, dt, Q)
+    believed, true = filter_versions.start_covariances("process_noise", 2, sigma, dt, Q)
+    least, _ = filter_versions.start_covariances("weighted", 2, sigma, dt, Q)
     gap = np.linalg.eigvalsh(true[0] - least[0])
     assert gap.min() > -rounding(scaled_condition(least[0]), 10) * np.trace(true[0])
     assert gap.max() > 0
@@ -65,13 +66,13 @@ def test_the_true_error_of_a_start_with_process_noise_is_that_of_its_weights():
 
 def test_first_differences_and_unweighted_starts_by_hand():
     sigma, dt, Q = np.array([30.0, 4.0]), 5.0, np.zeros((1, 3, 3))
-    _, true = filter_versions.started("first_differences", 2, sigma, dt, Q)
+    _, true = filter_versions.start_covariances("first_differences", 2, sigma, dt, Q)
     assert_rounded(np.diag(true[0]), [30.0**2, 4.0**2, 2 * 4.0**2 / dt**2], operations=10)
-    _, three = filter_versions.started("first_differences", 1, sigma, dt, Q)
+    _, three = filter_versions.start_covariances("first_differences", 1, sigma, dt, Q)
     assert_rounded(np.diag(three[0]), [30.0**2, 2 * 30.0**2 / dt**2, 6 * 30.0**2 / dt**4], operations=10)
     rows = np.concatenate([np.eye(3)[:2] @ transition(-dt), np.eye(3)[:2]])  # both scans, plain least squares
     weights = np.linalg.inv(rows.T @ rows) @ rows.T
-    _, plain = filter_versions.started("unweighted", 2, sigma, dt, Q)
+    _, plain = filter_versions.start_covariances("unweighted", 2, sigma, dt, Q)
     exact_form = weights @ np.diag(np.tile(sigma**2, 2)) @ weights.T
     size = absolute_product(weights, np.diag(np.tile(sigma**2, 2)), weights.T)
     assert_rounded(plain[0], exact_form, size=size, condition=scaled_condition(rows.T @ rows), operations=10)

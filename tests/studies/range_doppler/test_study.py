@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
-from radarsim.engine.run import collect
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
+from radarsim.engine.collect import collect
 from tests.tolerances import Z
 
 RADARS = ("rls1", "rls2", "rls3", "rls4", "rls5")

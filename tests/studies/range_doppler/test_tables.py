@@ -8,13 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from radarsim.report import figures as drawing
-from radarsim.report import panels, statistics, tables
-from radarsim.report.drawing import Line, Style
+from radarsim.report import key_labels, statistics, tables
+from radarsim.report.drawing import canvas
+from radarsim.report.drawing.model import Line, Style
+from radarsim.studies.range_doppler import answer, steady_state
 from radarsim.studies.range_doppler import figures as range_doppler_figures
-from radarsim.studies.range_doppler import filters
 from radarsim.studies.range_doppler import tables as range_doppler
-from radarsim.studies.range_doppler import words as range_doppler_words
 from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, rounding
 
@@ -80,7 +79,7 @@ def test_the_worst_is_named_by_exact_values():
     rows = rows.assign(
         sigma_lo=rows["sigma"] - 0.3, sigma_hi=rows["sigma"] + 0.3, bias=[-2.0, 1.9], exact_bias=[-1.8, 2.1]
     )
-    clause = range_doppler_words._worst_errors(rows, "r")
+    clause = answer._worst_errors(rows, "r")
     assert clause.text.endswith("at 20 s, largest bias 1.9 m at 20 s")
 
 
@@ -151,7 +150,7 @@ def test_consistency_figure_draws_the_table(paper):
     made = made_of(paper)
     first, second = drawn_of(paper, made)["consistency"].panels
     assert (first.title, second.title) == ("r", "r+Vr")
-    rows = tables.groups(made["consistency"], "case", "filter")
+    rows = tables.group_by(made["consistency"], "case", "filter")
     lines = [mark for mark in second.marks if isinstance(mark, Line)]
     for line, result in zip(lines, paper, strict=True):
         np.testing.assert_array_equal(line.y, rows[result.name, "r+Vr"]["nees"])
@@ -171,7 +170,7 @@ def test_labels_of_settled_points_do_not_touch(expected_radar):
     radars, variances = ("rls1", "rls2", "rls3", "rls4", "rls5"), (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
     results = [expected_radar(radar, v, f"{radar} D_M={v:g}") for radar in radars for v in variances]
     labelled = []
-    for axes in drawing.render(drawn_of(results)["settling"]).axes:
+    for axes in canvas.render(drawn_of(results)["settling"]).axes:
         places = [note.get_window_extent() for note in axes.texts if note.get_text().startswith("10")]
         assert not any(a.overlaps(b) for a, b in combinations(places, 2))
         assert all(one.y1 < axes.get_window_extent().y1 for one in places)
@@ -184,7 +183,7 @@ def test_dynamic_error_is_drawn_where_there_is_one(expected_radar):
     results = [expected_radar("rls2", target=target)]
     made = made_of(results)
     (panel,) = drawn_of(results, made)["dynamic_r"].panels
-    rows = tables.groups(made["curves"], "filter", "component")["r", "r"]
+    rows = tables.group_by(made["curves"], "filter", "component")["r", "r"]
     bias, spread = [mark for mark in panel.marks if isinstance(mark, Line)][:2]
     np.testing.assert_array_equal(bias.y, rows["bias"])
     np.testing.assert_array_equal(spread.y, rows["spread"])
@@ -193,13 +192,13 @@ def test_dynamic_error_is_drawn_where_there_is_one(expected_radar):
 
 def test_answer_tells_the_last_gain_of_each_component(paper):
     made = made_of(paper[1:2])
-    told = answer_texts(range_doppler_words, paper[1:2], made)
+    told = answer_texts(answer, paper[1:2], made)
     assert len(told) == 3
     assert "at 140 s, the last scan, σ is 18.3 % [" in told[0]
     assert "than with range alone" in told[0]
     assert "at best 34.6 % [" in told[0]
-    assert "RLS 1" in answer_texts(range_doppler_words, paper, made_of(paper))[2]
-    assert "higher (RLS 1)" in answer_texts(range_doppler_words, paper, made_of(paper))[2]
+    assert "RLS 1" in answer_texts(answer, paper, made_of(paper))[2]
+    assert "higher (RLS 1)" in answer_texts(answer, paper, made_of(paper))[2]
 
 
 S_BAND = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4}
@@ -209,25 +208,25 @@ S_BAND = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4}
 def test_a_gain_that_has_not_settled_is_quoted_with_that_of_the_long_run(expected_radar, detection, words):
     """Against another solution of the steady state, by doubling."""
     C_theta, Lambda = 60**2 / (4 * 3) ** 2, 4**3 * 1e-3**0.5 / 60
-    known = filters.exact_gains(np.array([C_theta]), np.array([Lambda]))[:, 0]
+    known = steady_state.exact_gains(np.array([C_theta]), np.array([Lambda]))[:, 0]
     results = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection})]
-    told = answer_texts(range_doppler_words, results, made_of(results))[:3]
+    told = answer_texts(answer, results, made_of(results))[:3]
     for sentence, gain in zip(told, known, strict=True):
         assert f"; not settled: {gain:.1f} % lower{words}" in sentence
     longer = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection}, scans=40)]
     if detection == 1:
-        assert "settled" not in " ".join(answer_texts(range_doppler_words, longer, made_of(longer)))
+        assert "settled" not in " ".join(answer_texts(answer, longer, made_of(longer)))
 
 
 def test_a_target_that_breaks_the_model_has_no_gain_of_the_long_run(expected_radar):
     target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 20, "jerk_mps3": 1, "duration_s": 20}
     results = [expected_radar("rls2", radar=S_BAND, target=target)]
-    assert "settled" not in " ".join(answer_texts(range_doppler_words, results, made_of(results)))
+    assert "settled" not in " ".join(answer_texts(answer, results, made_of(results)))
 
 
 def test_of_several_radars_those_are_named_that_have_not_settled(expected_radar):
     results = [expected_radar("rls2", name="mine", radar=S_BAND), expected_radar("rls4", name="rls4")]
-    told = answer_texts(range_doppler_words, results, made_of(results))[0]
+    told = answer_texts(answer, results, made_of(results))[0]
     assert told.count("in the long run") == 1
     assert "not settled: 36.5 % lower (" in told
 
@@ -238,7 +237,7 @@ def test_answer_names_a_baseline_that_observes_more(expected_radar):
         for v in (1e-3, 1e-2)
     ]
     results = [expected_radar("rls2", filters=velocity)]
-    assert "than with filter 'D 0.001'" in answer_texts(range_doppler_words, results, made_of(results))[0]
+    assert "than with filter 'D 0.001'" in answer_texts(answer, results, made_of(results))[0]
 
 
 def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
@@ -274,11 +273,11 @@ def test_answer_tells_the_greatest_loss(expected_radar):
     results = [expected_radar("rls2", 1e-4, target=BRAKING, radar=sharp)]
     made = made_of(results)
     words = greatest_loss(made)
-    assert answer_texts(range_doppler_words, results, made)[0].endswith(f"{words}.")
+    assert answer_texts(answer, results, made)[0].endswith(f"{words}.")
     others = [expected_radar("rls2", name="calm"), expected_radar("rls5", name="fine"), *results]
     made = made_of(others)
     words = greatest_loss(made)
-    assert answer_texts(range_doppler_words, others, made)[0].endswith(f"{words}, with RLS 2.")
+    assert answer_texts(answer, others, made)[0].endswith(f"{words}, with RLS 2.")
 
 
 def test_answer_is_silent_of_a_loss_that_is_none(paper):
@@ -286,7 +285,7 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
     made = made_of(one)
     first = made["gains"][made["gains"]["component"] == "r"]
     assert (first["gain_hi"] > -1).all()
-    assert "at worst" not in answer_texts(range_doppler_words, one, made)[0]
+    assert "at worst" not in answer_texts(answer, one, made)[0]
 
 
 @pytest.mark.parametrize(
@@ -305,11 +304,11 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
 )
 def test_a_gain_in_words(gain, words):
     row = dict(zip(("gain_percent", "gain_lo", "gain_hi", "exact_percent"), gain, strict=False))
-    assert range_doppler_words._gain_text(row) == words
+    assert answer._gain_text(row) == words
 
 
 def test_answer_tells_the_best_variance(swept):
-    told = answer_texts(range_doppler_words, swept, made_of(swept))[0]  # before the gains: it is what is asked
+    told = answer_texts(answer, swept, made_of(swept))[0]  # before the gains: it is what is asked
     assert told.startswith("Best manoeuvre variance D_M")
     assert "RLS 2: r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
 
@@ -321,7 +320,7 @@ def test_a_target_that_breaks_the_model(expected_radar):
     assert made["steady"].empty
     rows = made["curves"][(made["curves"]["component"] == "r") & (made["curves"]["filter"] == "r")]
     worst = rows.loc[rows["sigma"].idxmax()]
-    told = answer_texts(range_doppler_words, results, made)[-1]
+    told = answer_texts(answer, results, made)[-1]
     assert f"r: worst σ of the range {worst['sigma']:.4g} m [" in told
     assert f"at {worst['t_s']:g} s, largest bias " in told
 
@@ -329,7 +328,7 @@ def test_a_target_that_breaks_the_model(expected_radar):
 def test_answer_of_a_single_filter(expected_radar):
     one = {"name": "only", "observes": ["range"], "manoeuvre_variance": 1e-3}
     results = [expected_radar("rls2", filters=[one])]
-    (sentence,) = answer_texts(range_doppler_words, results, made_of(results))
+    (sentence,) = answer_texts(answer, results, made_of(results))
     assert "only: σ of the range at 140 s is 189.3 m" in sentence
 
 
@@ -337,7 +336,7 @@ def test_answer_of_a_single_filter(expected_radar):
 
 
 def told_of(results):
-    return answer_texts(range_doppler_words, results, made_of(results))
+    return answer_texts(answer, results, made_of(results))
 
 
 def test_answer_compares_at_a_common_time(expected_radar):
@@ -354,7 +353,7 @@ def test_answer_compares_at_a_common_time(expected_radar):
 
 
 def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, radar_config):
-    from radarsim.app.configs import load
+    from radarsim.api.configs import load
 
     values = [1e-4, 1e-2, 1.0, 100.0]
     source = {**radar_config("rls2", target=BRAKING), "sweep": {"manoeuvre_variance": values}}
@@ -363,7 +362,7 @@ def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, r
     told = next(one for one in told_of(results) if one.startswith("Best manoeuvre variance"))
     for f, name in enumerate(("r", "r+Vr")):
         best = values[int(worst[:, f].argmin())]
-        text = panels.number(best, powers=True)
+        text = key_labels.format_value(best, powers=True)
         assert f"{name} {text} (σ at worst {worst[:, f].min():.4g} m, at " in told
     assert not any("further cases break the model" in one for one in told_of(results))
 

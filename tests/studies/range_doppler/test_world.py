@@ -9,15 +9,14 @@ import itertools
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
-from radarsim.kernels.algebra import pack
+from radarsim.kernels.kalman_algebra import pack
 from radarsim.kernels.random import fill_normal_pairs
-from radarsim.physics import process_noise
-from radarsim.studies.range_doppler import filters as world
-from radarsim.studies.range_doppler import patterns, study, tuning
-from radarsim.studies.range_doppler.filters import Plots
-from radarsim.studies.range_doppler.kernels import missed
+from radarsim.physics.motion import process_noise
+from radarsim.studies.range_doppler import best_variance, missed_plot_means, missed_plot_patterns, scenario, study
+from radarsim.studies.range_doppler.error_recursion import Plots
+from radarsim.studies.range_doppler.kernels import missed_block
 from tests.studies.range_doppler import naive
 from tests.tolerances import Z, assert_rounded, rounding, scaled_condition, share_error
 
@@ -118,12 +117,12 @@ def textbook(plots, observes, start, Q, dt=DT, sigma=SIGMA):
 def test_each_realisation_is_that_of_a_textbook_filter(changes):
     plan = prepared(**changes)
     problem, dt = plan.problem, plan.problem.dt
-    assert isinstance(problem, missed.Problem)
+    assert isinstance(problem, missed_block.Problem)
     Q = np.zeros((2, 3, 3))
     Q[:, *np.triu_indices(3)] = problem.Q
     Q = Q + np.triu(Q[0], 1).T
     for realisation in (1, 1030):
-        (plots,), (truth,) = missed.simulate_plots(problem, realisation, 1)
+        (plots,), (truth,) = missed_block.simulate_plots(problem, realisation, 1)
         sums = sums_of(plan, 1, realisation)
         for f, observes in enumerate(problem.observes):
             x, P = textbook(plots, observes, problem.start[f], Q[f], dt)
@@ -243,7 +242,7 @@ def test_gain_is_of_those_that_have_both_estimates(seven):
 
     from radarsim.engine.results import CaseResult
     from radarsim.studies.range_doppler import tables
-    from radarsim.studies.range_doppler.filters import least_squares_start
+    from radarsim.studies.range_doppler.filter_design import least_squares_start
 
     plan, _ = seven
     spec = SimpleNamespace(radar=SimpleNamespace(detection_probability=0.75))
@@ -260,17 +259,18 @@ def test_gain_is_of_those_that_have_both_estimates(seven):
 
 @pytest.mark.parametrize("detection", [0.8, 0.5])
 def test_means_over_merged_patterns_are_those_over_all(detection, monkeypatch):
-    monkeypatch.setattr(patterns, "WHOLE", 1 << 15)
-    monkeypatch.setattr(patterns, "FOUND", {})
+    for module in (missed_plot_means, missed_plot_patterns):
+        monkeypatch.setattr(module, "FOLLOWED_PATTERNS", 1 << 15)
+    monkeypatch.setattr(missed_plot_means, "RECENT_MEANS", {})
     plan = prepared(scans=16, radar={"detection_probability": detection, "sigma_bias_range_m": 10})
     plots, axes, later = Plots(SIGMA, np.zeros(2), np.array([10.0, 0.0]), detection), plan.axes, slice(3, None)
     Q = pack(process_noise("random_jerk", VARIANCE, DT))
-    designs = [patterns.Design(observes, start, Q) for observes, start in ((1, 3), (2, 2))]
-    whole = [patterns.mixture(one, plots, plan.problem.truth, DT, 1 << 16, designs) for one in designs]
-    near = {"rtol": patterns.CLOSE / 3}
+    designs = [missed_plot_patterns.Design(observes, start, Q) for observes, start in ((1, 3), (2, 2))]
+    whole = [missed_plot_patterns.mixture(one, plots, plan.problem.truth, DT, 1 << 16, designs) for one in designs]
+    near = {"rtol": missed_plot_patterns.MAX_CHANGE / 3}
     for f, mean in enumerate(whole):
         np.testing.assert_allclose(axes.exact_sigma[f, later], np.sqrt(mean.moment)[later], **near)
-        np.testing.assert_allclose(axes.exact_nees[f, later], mean.nees[later], rtol=patterns.CLOSE)
+        np.testing.assert_allclose(axes.exact_nees[f, later], mean.nees[later], rtol=missed_plot_patterns.MAX_CHANGE)
     left = 1 - np.sqrt(whole[1].beside[0] / whole[0].beside[1])
     np.testing.assert_allclose(1 - axes.exact_gain[1, later] / 100, 1 - left[later], **near)
 
@@ -285,12 +285,13 @@ def test_patterns_followed_to_the_end_piece_by_piece_are_those_side_by_side(most
     truth = prepared(scans=13).problem.truth
     plots = Plots(SIGMA, np.array([30.0, 1.0]), np.array([10.0, 0.5]), 0.6)
     designs = [
-        patterns.Design(observes, start, pack(process_noise("white_jerk", VARIANCE, DT))) for observes, start in STARTS
+        missed_plot_patterns.Design(observes, start, pack(process_noise("white_jerk", VARIANCE, DT)))
+        for observes, start in STARTS
     ]
     for design in designs:
         given = design, plots, truth, DT
-        beside = patterns.mixture(*given, 1 << 13, designs, from_k=from_k)
-        pieces = patterns.mixture(*given, most, designs, from_k=from_k, follow_all=True)
+        beside = missed_plot_patterns.mixture(*given, 1 << 13, designs, from_k=from_k)
+        pieces = missed_plot_patterns.mixture(*given, most, designs, from_k=from_k, follow_all=True)
         for name in ("started", "available", "bias", "moment", "believed", "nees", "beside"):
             size = np.sqrt(beside.moment) if name == "bias" else None
             assert_rounded(getattr(pieces, name), getattr(beside, name), size=size, operations=1 << 13)
@@ -300,16 +301,16 @@ def test_a_shortened_case_has_the_same_exact_errors_where_it_is_asked():
     case = case_of(scans=16, radar={"detection_probability": 0.6})
     whole = study.prepare(case).axes
     for at, k in (({"at_s": 127.0, "at_k": None}, (13, 14)), ({"at_s": None, "at_k": 12}, (12,))):
-        short = study.prepare(study.shortened(case, **at)).axes
+        short = study.prepare(study.shorten_case(case, **at)).axes
         assert len(short.k) == k[-1]
         for one in k:
             found, wanted = short.exact_sigma[:, one - 1], whole.exact_sigma[:, one - 1]
-            np.testing.assert_allclose(found, wanted, rtol=patterns.CLOSE)
+            np.testing.assert_allclose(found, wanted, rtol=missed_plot_patterns.MAX_CHANGE)
             assert np.isfinite(found).all()
 
 
 def test_where_patterns_are_too_many_nothing_is_called_exact(monkeypatch):
-    monkeypatch.setattr(patterns, "PATTERN_SCANS", 8)
+    monkeypatch.setattr(missed_plot_means, "PATTERN_SCANS", 8)
     assert np.isnan(prepared(radar={"detection_probability": 0.75}).axes.exact_sigma).all()
 
 
@@ -404,7 +405,7 @@ def test_a_drawn_flight_begins_elsewhere_and_flies_the_same_accelerations(kind):
             position, velocity = np.array([-along, FLY_BY["distance_m"]]), np.array([FLY_BY["speed_mps"], 0.0])
             rate, begin = 0.0, 0.0
         position, velocity, middle = position + shift[:2], velocity + shift[3:5], velocity
-        _, (truth,) = missed.simulate_plots(problem, realisation, 1)
+        _, (truth,) = missed_block.simulate_plots(problem, realisation, 1)
         # Halves of a step about its middle: a third power of the step of the jerk over 12, and over 24 of its rate, are
         # left out of a place and of a velocity, as long as it turns; 4000 steps are added up.
         step, jerk = 0.02, rate**2 * TURN["speed_mps"]
@@ -430,23 +431,25 @@ def test_how_drawn_flights_leave_the_model_has_the_moments_of_those_flights(targ
     """Mean and covariance in plain NumPy, on flights so widely drawn that the mean counts in the covariance."""
     case = case_of(target=target | DRAWN)
     t = DT * np.arange(9.0)
-    middle = world.true_motion(case)[1]
+    middle = scenario.true_motion(case)[1]
     flown, weights = [], []
-    for share, shifts in world.displacements(world.sigma_flight(case.spec.target)):
-        flown.append(world.left(world.displaced(world.flight(case.spec.target, t), shifts, t), DT))
+    for share, shifts in scenario.displacements(scenario.sigma_flight(case.spec.target)):
+        flown.append(
+            scenario.model_defects(scenario.displaced_motion(scenario.flight(case.spec.target, t), shifts, t), DT)
+        )
         weights.append(share)
-    left, weights = np.concatenate(flown) - world.left(middle[None], DT), np.concatenate(weights)
+    left, weights = np.concatenate(flown) - scenario.model_defects(middle[None], DT), np.concatenate(weights)
     mean = np.average(left, axis=0, weights=weights)
     flat = left.reshape(len(left), -1)
     covariance = np.cov(flat.T, aweights=weights, ddof=0)
-    found = world.drawn_defects(case.spec.target, t, middle)
+    found = scenario.random_defects(case.spec.target, t, middle)
     # Of what is left of places of up to 60 km and of rates, in units of the scan period.
     unit = DT ** np.arange(3.0)
     assert_rounded(found[..., 0] * unit, mean * unit, size=np.abs(middle[:, 0]).max(), operations=30)
     columns = found[..., 1:].reshape(flat.shape[1], -1)
     units, variances = np.tile(unit, len(t)), np.diag(covariance)
     apart = (columns @ columns.T - covariance) * np.outer(units, units)
-    assert np.abs(apart).max() < world.KEPT_SHARE * (variances * units**2).max() * len(variances)
+    assert np.abs(apart).max() < scenario.NEGLIGIBLE_SHARE * (variances * units**2).max() * len(variances)
     assert (np.outer(mean, mean).diagonal() > 1e-4 * np.diag(covariance)).any()
 
 
@@ -456,7 +459,7 @@ def test_the_mean_over_drawn_flights_has_settled(monkeypatch):
     for target in (widest, FLY_BY | {"sigma_position_m": 2400}):
         plans = [prepared(target=target)]
         with monkeypatch.context() as more:
-            more.setattr(world, "NODES", {count: nodes + 2 for count, nodes in world.NODES.items()})
+            more.setattr(scenario, "NODES", {count: nodes + 2 for count, nodes in scenario.NODES.items()})
             plans.append(prepared(target=target))
         one, other = (plan.axes.exact_sigma for plan in plans)
         np.testing.assert_allclose(one, other, rtol=1e-6)  # as NODES has it
@@ -466,13 +469,13 @@ def test_the_search_for_a_variance_sees_the_exact_errors():
     """Of filters that start within a drawn turn, with biases: σ at a given variance is that of the exact recursion."""
     turned = {"target": TURN | DRAWN | {"start_s": 5}, "every_filter": {"initial_scans": 5}}
     case = case_of(radar={"bias_velocity_mps": 1, "sigma_bias_range_m": 30}, **turned)
-    t, x = world.true_motion(case)
-    drawn = world.drawn_defects(case.spec.target, t, x)
+    t, x = scenario.true_motion(case)
+    drawn = scenario.random_defects(case.spec.target, t, x)
     plots = Plots(SIGMA, np.array([0.0, 1.0]), np.array([30.0, 0.0]), 1.0, drawn.shape[2] - 1)
-    seen = tuning.Seen(plots, x, DT, drawn)
+    seen = best_variance.FilterInputs(plots, x, DT, drawn)
     exact = study.prepare(case).axes.exact_sigma
     for one, expected in zip(case.spec.filters, exact, strict=True):
-        np.testing.assert_allclose(tuning.errors(one, np.array([VARIANCE]), seen)[0], expected, rtol=PRECISION)
+        np.testing.assert_allclose(best_variance.errors(one, np.array([VARIANCE]), seen)[0], expected, rtol=PRECISION)
 
 
 @pytest.mark.parametrize(
@@ -518,7 +521,9 @@ def test_the_best_variance_is_that_of_a_grid(over, observes, changes):
     found = float(made({"minimise": "sigma_r", "over": over, "from_k": 4}).manoeuvre_variance[0])
     grid = [*10.0 ** np.arange(-6, 4, 0.5), *found * 2.0 ** np.array([-2, -1, -0.5, 0.5, 1, 2])]
     # A step of the last search and four digits: a least cost, of a curvature of about one a decade², is flat so far.
-    near = 2 / tuning.A_DECADE * (2 / (tuning.POINTS - 1)) ** tuning.CLOSER + np.log10(1 + 5e-4)
+    near = 2 / best_variance.POINTS_PER_DECADE * (
+        2 / (best_variance.POINTS - 1)
+    ) ** best_variance.REFINEMENTS + np.log10(1 + 5e-4)
     assert cost(found) <= min(map(cost, grid)) * (1 + near**2)
 
 
@@ -526,4 +531,4 @@ def test_without_a_manoeuvre_the_best_variance_is_the_least():
     wanted = {"minimise": "sigma_r", "over": "last"}
     one = {"name": "a", "observes": ["range"], "manoeuvre_variance": wanted}
     plan = prepared(filters=[one], target={"kind": "polynomial", "coefficients": [9e4, -200, 1]})
-    assert tuning.at_a_limit(float(plan.axes.manoeuvre_variance[0]), 9, SIGMA, DT)
+    assert best_variance.is_at_limit(float(plan.axes.manoeuvre_variance[0]), 9, SIGMA, DT)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar import exact, filters, world
+from radarsim.studies.sonar import closed_forms, exact, filter_design, least_squares, plot_errors
 from tests.studies.sonar.precision import TERMS, assert_covariances_rounded
 from tests.tolerances import assert_rounded
 
 
 def test_sigma_formulas_have_the_digests_values():
     n = np.arange(2, 9)
-    assert exact.sigma_smoothed(n).round(3).tolist() == [1, 0.913, 0.837, 0.775, 0.724, 0.681, 0.645]
-    assert exact.sigma_extrapolated(n).round(3).tolist() == [2.236, 1.528, 1.225, 1.049, 0.931, 0.845, 0.779]
+    assert closed_forms.sigma_smoothed(n).round(3).tolist() == [1, 0.913, 0.837, 0.775, 0.724, 0.681, 0.645]
+    assert closed_forms.sigma_extrapolated(n).round(3).tolist() == [2.236, 1.528, 1.225, 1.049, 0.931, 0.845, 0.779]
 
 
 @pytest.mark.parametrize(
@@ -25,9 +25,9 @@ def test_sigma_formulas_have_the_digests_values():
 )
 def test_table_of_the_digest(rho, n, optimal, naive, believed):
     t = np.arange(float(n))
-    C = world.error_covariance(np.ones(n), rho, t, 1.0)
-    _, P = exact.generalised_least_squares(t, C, 2)
-    W, plain = exact.generalised_least_squares(t, np.eye(n), 2)
+    C = plot_errors.error_covariance(np.ones(n), rho, t, 1.0)
+    _, P = least_squares.generalised_least_squares(t, C, 2)
+    W, plain = least_squares.generalised_least_squares(t, np.eye(n), 2)
     for covariance, printed in ((P, optimal), (W @ C @ W.T, naive), (plain, believed)):
         assert tuple(np.sqrt(np.diag(covariance)).round(4)) == printed
 
@@ -40,14 +40,14 @@ def test_recursion_of_true_errors_is_that_of_the_weights(rho, size):
     seen = rng.random((4, 12)) > 0.3
     seen[:, :size] = True
     t = np.arange(12) * 5.0
-    plots = filters.Plots(t, seen.astype(float), 5.0, 30.0)
+    plots = filter_design.Plots(t, seen.astype(float), 5.0, 30.0)
     truth = np.stack([9e3 - 4 * t + 0.01 * t**3, -4 + 0.03 * t**2, 0.06 * t], axis=1)
-    steps = world.step_correlations(rho, t, 5.0)
-    C = world.error_covariance(np.full(12, 30.0), rho, t, 5.0)
+    steps = plot_errors.step_correlations(rho, t, 5.0)
+    C = plot_errors.error_covariance(np.full(12, 30.0), rho, t, 5.0)
     for design in (
-        filters.recursive(plots, size),
-        filters.recursive(plots, size, 0.6, 1e-4),
-        filters.recursive(plots, size, 0.0, 1e-3, 0, filters.settled_gain(5.0, 30.0, size, 1e-3)),
+        filter_design.design_recursion(plots, size),
+        filter_design.design_recursion(plots, size, 0.6, 1e-4),
+        filter_design.design_recursion(plots, size, 0.0, 1e-3, 0, filter_design.settled_gain(5.0, 30.0, size, 1e-3)),
     ):
         bias, S = exact.recursive_errors(design.gain, design.carry, t, truth, steps, np.full(12, 30.0), 0.0)
         for m in range(4):
@@ -77,19 +77,19 @@ def unit_weights(design, t, m):
 def test_walk_of_velocity_by_both_ways_of_reckoning():
     """A filter's true error under a random walk of velocity: joint recursion against explicit weights of every push."""
     t, walk = np.arange(9) * 5.0, 0.02
-    plots = filters.Plots(t, np.ones((1, 9)), 5.0, 30.0)
+    plots = filter_design.Plots(t, np.ones((1, 9)), 5.0, 30.0)
     truth = np.zeros((9, 3))
-    design = filters.recursive(plots, 2)
+    design = filter_design.design_recursion(plots, 2)
     _, S = exact.recursive_errors(design.gain, design.carry, t, truth, np.zeros(9), np.full(9, 30.0), walk)
-    first, W, _ = filters.window_weights(plots, 8, 9, 2)
-    C = world.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
+    first, W, _ = filter_design.window_weights(plots, 8, 9, 2)
+    C = plot_errors.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
     _, other = exact.weighted_errors(W, first, t, truth, C, walk, first)
     assert_covariances_rounded(S[0, 1:], np.concatenate([S[0, 1:8], other]))
 
 
 @pytest.mark.filterwarnings("error")
 def test_plots_of_which_one_alone_counts_give_no_rate():
-    plots = filters.Plots(np.array([0.0, 0.5, 1.0]), np.array([[1e-40, 1.0, 0.0]]), 1.0, 30.0)
-    _, W, P = filters.window_weights(plots, 2, 5, 2)
+    plots = filter_design.Plots(np.array([0.0, 0.5, 1.0]), np.array([[1e-40, 1.0, 0.0]]), 1.0, 30.0)
+    _, W, P = filter_design.window_weights(plots, 2, 5, 2)
     assert not W.any()
     assert not P.any()

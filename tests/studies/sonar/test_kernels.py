@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
-from radarsim.studies.sonar import STUDY, world
+from radarsim.studies.sonar import STUDY, conversion, plot_errors
 from tests.studies.sonar import naive as naive
 from tests.studies.sonar.precision import assert_estimates_rounded, losses
 from tests.studies.sonar.test_study import config as configured
@@ -93,7 +93,7 @@ def test_estimates_are_the_twins(sensor):
     rho, probability = sensor.get("error_correlation", 0.0), sensor.get("detection_probability", 1.0)
     missed = [k - 1 for k in sensor.get("missed_scans", ())]
     truth, t = plan.world.truth, np.arange(SCANS) * T
-    errors = np.linalg.cond(world.error_covariance(np.ones(SCANS), rho or 0.6, t, T))
+    errors = np.linalg.cond(plot_errors.error_covariance(np.ones(SCANS), rho or 0.6, t, T))
     for realisation in (0, 5, 12345):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         e, detected = plots(plan, realisation, rho, probability, missed)
@@ -123,7 +123,7 @@ def test_converted_plots_and_their_weights(frame):
     case = load(config(frame, detection_probability=0.8)).cases[0]
     plan = STUDY.prepare(case)
     truth, polar, t = plan.world.truth, plan.axes.polar, np.arange(SCANS) * T
-    convert = world.converted if frame == "cartesian" else world.converted_unbiased
+    convert = conversion.convert_plainly if frame == "cartesian" else conversion.convert_unbiased
     for realisation in (0, 77):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         e, detected = plots(plan, realisation, 0.0, 0.8)
@@ -131,7 +131,9 @@ def test_converted_plots_and_their_weights(frame):
         x, y, (xx, _, yy) = convert(r, b, *SIGMA)
         if frame == "cartesian_unbiased":
             xx, _, yy = np.full((3, SCANS), np.nan)
-            xx[detected], _, yy[detected] = convert(*world.places(r[detected], b[detected]), *SIGMA)[2]
+            xx[detected], _, yy[detected] = convert(*conversion.weighting_positions(r[detected], b[detected]), *SIGMA)[
+                2
+            ]
         for c, (z, variance) in enumerate(((x, xx), (y, yy))):
             # Of a variance the formula's own rounding is relative to the square of the range.
             least = variance[detected].min()

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import radarsim
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.engine.results import Axes
 from radarsim.studies.sonar import PARTS, STUDY
-from radarsim.studies.sonar.clutter.filters import ClutterAxes
-from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
-from radarsim.studies.sonar.world import GivenPlotsAxes, SonarAxes
+from radarsim.studies.sonar.axes import GivenPlotsAxes, SonarAxes
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from tests.studies.sonar.clutter.test_study import config as clutter_config
 from tests.studies.sonar.clutter.test_study import tracker
 from tests.studies.sonar.manoeuvre.test_kernels import config as manoeuvre_config

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from radarsim.app.case_work import CaseWork
-from radarsim.app.configs import load
-from radarsim.studies.sonar import STUDY, world
-from radarsim.studies.sonar import exact as least_squares
+from radarsim.api.case_work import CaseWork
+from radarsim.api.configs import load
+from radarsim.studies.sonar import STUDY, least_squares, plot_errors
 from tests.studies.sonar.precision import TERMS
 from tests.tolerances import Z, assert_rounded, mean_error, scaled_condition, share_error, sigma_error
 
@@ -90,7 +89,7 @@ def test_what_a_filter_says_of_itself_is_as_wrong_as_calculated():
     assert (np.abs(q - exact) / np.sqrt((qq - q**2) / N))[known].max() < Z
     names = plan.axes.filters
     assert exact[names.index("naive"), -1, 0] > 3 * 2
-    C = world.error_covariance(np.ones(20), 0.9, np.arange(20) * 5.0, 5.0)
+    C = plot_errors.error_covariance(np.ones(20), 0.9, np.arange(20) * 5.0, 5.0)
     _, P = least_squares.generalised_least_squares(np.arange(20) * 5.0, C, 2)
     kappa = scaled_condition(P) * np.linalg.cond(C)
     assert_rounded(exact[names.index("augmented"), -1, 0], 2.0, condition=kappa, operations=20 * TERMS)

@@ -5,12 +5,13 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app import result as output
+from radarsim.api import result_content
 from radarsim.papers.study_claims import claims_of
 from radarsim.papers.verdict_rule import CONFIRMED, REFUTED
-from radarsim.report import figures, statistics
-from radarsim.studies.sonar import STUDY, exact, world
-from radarsim.studies.sonar.figures import conversion_figure, plots_figure
+from radarsim.report import statistics
+from radarsim.report.drawing import canvas
+from radarsim.studies.sonar import STUDY, closed_forms, plot_errors
+from radarsim.studies.sonar.smoothing_figures import conversion_figure, plots_figure
 from tests.studies.sonar import counted
 from tests.studies.sonar.precision import LINE, TERMS
 from tests.tolerances import Z, assert_rounded, scaled_condition, sigma_error
@@ -31,10 +32,10 @@ def results():
 
 def test_each_config_has_its_figures_and_they_draw(results):
     for stem, wanted in FIGURES.items():
-        described = output.case_figures(results[stem].cases, results[stem].tables, results[stem].experiment)
+        described = result_content.case_figures(results[stem].cases, results[stem].tables, results[stem].experiment)
         assert wanted <= set(described)
         for name in wanted & {"plots", "believed", "missed", "conversion", "smoothing_gains"}:
-            drawn = figures.render(described[name])
+            drawn = canvas.render(described[name])
             assert drawn.axes
             assert described[name].caption
 
@@ -63,7 +64,7 @@ def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several
 def test_what_a_plot_buys_has_the_papers_formulas(results):
     table = results["sonar_smoothing"].tables["plots"]
     rows = table[(table["degree"] == 1) & (table["component"] == "b") & (table["what"] == "smoothed")]
-    assert (rows["formula"] == exact.sigma_smoothed(rows["plots"])).all()
+    assert (rows["formula"] == closed_forms.sigma_smoothed(rows["plots"])).all()
     assert rows["ratio"].to_numpy() == pytest.approx(rows["formula"].to_numpy(), rel=sigma_error(3000))
     rows = table[(table["what"] == "acceleration") & (table["component"] == "r")]
     assert rows["ratio"].to_numpy() == pytest.approx(rows["formula"].to_numpy(), rel=sigma_error(3000))
@@ -76,7 +77,7 @@ def test_believed_and_consistency(results):
     naive, aware = rows.loc[(case, "naive", "r", 20)], rows.loc[(case, "augmented", "r", 20)]
     assert naive["nees_verdict"] == "optimistic"
     assert naive["nees_lo"] < naive["exact_nees"] < naive["nees_hi"]
-    errors = np.linalg.cond(world.error_covariance(np.ones(20), 0.9, np.arange(20.0), 1.0))
+    errors = np.linalg.cond(plot_errors.error_covariance(np.ones(20), 0.9, np.arange(20.0), 1.0))
     assert_rounded(aware["exact_nees"], 1.0, condition=LINE * errors, operations=20 * TERMS)
     row = made["curves"].set_index(["case", "filter", "component", "k"]).loc[(case, "naive", "r", 20)]
     assert row["believed_sigma"] == pytest.approx(30 * 0.4309, abs=30 * 5e-5)  # four printed digits
@@ -180,10 +181,12 @@ def test_what_is_known_exactly_is_judged_exactly(results):
     bought = own[own["what"].str.startswith("σ of the recursion after 20")]["exact"].item()
     assert_rounded(bought, curves["growing", "r", 20] / curves["growing", "r", 6], **precision)
     ahead = own.loc[own["claim"] == "P3.18", "exact"].to_numpy()
-    assert_rounded(ahead[:2], exact.sigma_extrapolated(np.array([3, 6])) / exact.sigma_extrapolated(2), **precision)
+    assert_rounded(
+        ahead[:2], closed_forms.sigma_extrapolated(np.array([3, 6])) / closed_forms.sigma_extrapolated(2), **precision
+    )
     for n in (2, 3, 5, 8, 20):
         row = own[own["what"] == f"smoothed σ after {n} plots, over the formula"]
-        smoothed = row["exact"].item() * exact.sigma_smoothed(n)
+        smoothed = row["exact"].item() * closed_forms.sigma_smoothed(n)
         assert_rounded(smoothed, curves["growing", "r", n] / sigma, **precision)
 
 

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar import world
+from radarsim.studies.sonar import conversion, plot_errors, target_motion
 from tests.tolerances import assert_rounded, rounding
 
 
 def test_correlation_over_lags_and_gaps():
     t = np.array([0.0, 5.0, 15.0, 20.0])
-    C = world.error_covariance(np.full(4, 2.0), 0.6, t, 5.0)
+    C = plot_errors.error_covariance(np.full(4, 2.0), 0.6, t, 5.0)
     # A power, which is off by a unit, and products.
     assert_rounded(C[0], [4, 4 * 0.6, 4 * 0.6**3, 4 * 0.6**4], operations=4)
-    assert_rounded(world.step_correlations(-0.5, t, 5.0), [0, -0.5, 0.25, -0.5], operations=2)
-    assert_rounded(world.error_covariance(np.full(4, 2.0), -0.5, t, 5.0)[0], [4, -2, -0.5, 0.25], operations=4)
-    assert not world.step_correlations(0.0, t, 5.0).any()
+    assert_rounded(plot_errors.step_correlations(-0.5, t, 5.0), [0, -0.5, 0.25, -0.5], operations=2)
+    assert_rounded(plot_errors.error_covariance(np.full(4, 2.0), -0.5, t, 5.0)[0], [4, -2, -0.5, 0.25], operations=4)
+    assert not plot_errors.step_correlations(0.0, t, 5.0).any()
 
 
 def assert_derivatives(states, t):
@@ -29,21 +29,21 @@ def assert_derivatives(states, t):
 
 def test_frames_are_inverse_and_their_rates_are_derivatives():
     t = np.linspace(0, 400, 4001)
-    r, b = world.polynomials([[9e3, -4, 0.01], [0.3, 2e-3, 1e-6]], t)
-    x, y = world.cartesian_states(r, b)
+    r, b = target_motion.polynomial_states([[9e3, -4, 0.01], [0.3, 2e-3, 1e-6]], t)
+    x, y = target_motion.cartesian_states(r, b)
     assert_derivatives(x, t)
     assert_derivatives(y, t)
     # Of turns by an angle there and back; accelerations are summed with v²/r.
     distance, speed, acceleration = (np.hypot(x[:, i], y[:, i]) for i in range(3))
     size = np.stack([distance, speed, acceleration + speed**2 / distance], axis=1)
-    back = world.polar_states(x, y)
+    back = target_motion.polar_states(x, y)
     assert_rounded(back[0], r, size, operations=24)
     assert_rounded(back[1], b, size / distance[:, None], operations=24)
 
 
 def test_turning_target_keeps_its_speed_and_its_legs_join():
     t = np.linspace(0, 300, 30001)
-    x, y = world.turning(8000, -2000, 6.0, 1.0, [(60.0, 120.0, 0.02), (200.0, 230.0, -0.01)], t)
+    x, y = target_motion.turning_states(8000, -2000, 6.0, 1.0, [(60.0, 120.0, 0.02), (200.0, 230.0, -0.01)], t)
     assert_rounded(np.hypot(x[:, 1], y[:, 1]), np.full(30001, 6.0), operations=6)
     # The trapezoid's error, h²/12 times the second derivative of the rate, and rounding of 10 km over h.
     allowed = 0.01**2 / 12 * 6.0 * 0.02**2 + rounding(operations=8) * 1e4 / 0.01
@@ -62,17 +62,17 @@ def test_conversions_against_quadrature(r, b, sigma_b):
     rr, bb = np.meshgrid(r + sigma_r * nodes, b + sigma_b * nodes, indexing="ij")
     w = np.outer(weights, weights)
     true = np.array([r * np.cos(b), r * np.sin(b)])
-    x, y, _ = world.converted_unbiased(rr, bb, sigma_r, sigma_b)
+    x, y, _ = conversion.convert_unbiased(rr, bb, sigma_r, sigma_b)
     error = np.stack([x - true[0], y - true[1]])
     # As many terms of the target's range; its square in the covariance, the formula's by itself, and terms of σ² r².
     assert_rounded((w * error).sum(axis=(1, 2)), np.zeros(2), r, operations=w.size)
-    _, _, (xx, xy, yy) = world.converted_unbiased(r, b, sigma_r, sigma_b)
+    _, _, (xx, xy, yy) = conversion.convert_unbiased(r, b, sigma_r, sigma_b)
     moments = np.einsum("ikl,jkl,kl->ij", error, error, w)
     assert_rounded(moments, [[xx, xy], [xy, yy]], np.full((2, 2), r**2), operations=20 + w.size * sigma_b**2)
-    x, y, plain = world.converted(rr, bb, sigma_r, sigma_b)
+    x, y, plain = conversion.convert_plainly(rr, bb, sigma_r, sigma_b)
     mean = np.array([(w * (x - true[0])).sum(), (w * (y - true[1])).sum()])
-    assert_rounded(mean, world.conversion_bias(r, sigma_b) * true / r, r, operations=w.size)
-    _, _, plain = world.converted(r, b, sigma_r, sigma_b)
+    assert_rounded(mean, conversion.conversion_bias(r, sigma_b) * true / r, r, operations=w.size)
+    _, _, plain = conversion.convert_plainly(r, b, sigma_r, sigma_b)
     if sigma_b < 0.02:
         # The linear one lacks terms of σ_β⁴ r²/2 and σ_β² σ_r².
         second_order = sigma_b**2 * ((sigma_b * r) ** 2 + sigma_r**2)

@@ -10,10 +10,15 @@ from collections import namedtuple
 from typing import Literal
 
 import numpy as np
-from radarsim.config.fields import Member, Model, Number, Positive, Probability, key
-from radarsim.kernels.traced import atan2, congruent, cos, sin, sqrt, updated, where, wrapped
+from radarsim.config.key_types import Number, Positive, Probability, key
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member
+from radarsim.kernels.formula_functions import atan2, cos, sin, wrap_angle
+from radarsim.kernels.small_matrices import congruence, update
+from radarsim.kernels.tracing import sqrt, where
+from radarsim.report.quantities import Component
 from radarsim.studies.interface import Paper
-from radarsim.studies.onefile import Component, Measured
+from radarsim.studies.onefile import Measured
 from radarsim.studies.stepwise import Steps, StepStudy
 
 
@@ -75,13 +80,13 @@ class Cartesian(Steps):
 
     def predict(state, dt, u, c):
         x, P, own = state
-        return moved(x, dt, own, u), congruent(transition(dt), P), u
+        return moved(x, dt, own, u), congruence(transition(dt), P), u
 
     def update(state, z, u, c):
         x, P, own = state
         square = x[0] * x[0] + x[1] * x[1]
         h = x[1] / square, -x[0] / square, 0.0, 0.0
-        return *updated(x, P, h, wrapped(z[0] - atan2(x[0], x[1])), c.sigma**2), own
+        return *update(x, P, h, wrap_angle(z[0] - atan2(x[0], x[1])), c.sigma**2), own
 
     def estimate(state, u, c):
         x = state[0]
@@ -89,7 +94,7 @@ class Cartesian(Steps):
 
     def covariance(state, u, c):
         (x, P, _), r = state, Cartesian.estimate(state, u, c)[0]
-        return congruent(((x[0] / r, x[1] / r, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)), P)
+        return congruence(((x[0] / r, x[1] / r, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)), P)
 
 
 class Pseudolinear(Cartesian):
@@ -98,7 +103,7 @@ class Pseudolinear(Cartesian):
     def update(state, z, u, c):
         x, P, own = state
         h = cos(z[0]), -sin(z[0]), 0.0, 0.0
-        return *updated(x, P, h, -h[0] * x[0] - h[1] * x[1], c.sigma**2 * (x[0] * x[0] + x[1] * x[1])), own
+        return *update(x, P, h, -h[0] * x[0] - h[1] * x[1], c.sigma**2 * (x[0] * x[0] + x[1] * x[1])), own
 
 
 class ModifiedPolar(Steps):
@@ -125,16 +130,16 @@ class ModifiedPolar(Steps):
     def start(z, u, c):
         x, P, own = Cartesian.start(z, u, c)
         y, J = ModifiedPolar.polar(x)
-        return y, congruent(J, P), own
+        return y, congruence(J, P), own
 
     def predict(state, dt, u, c):
         x, J = ModifiedPolar.cartesian(state[0])
         y, back = ModifiedPolar.polar(moved(x, dt, state[2], u))
-        return y, congruent(back, congruent(transition(dt), congruent(J, state[1]))), u
+        return y, congruence(back, congruence(transition(dt), congruence(J, state[1]))), u
 
     def update(state, z, u, c):
         (y, P, own), least = state, 0.1 / c.range
-        y, P = updated(y, P, (0.0, 0.0, 1.0, 0.0), wrapped(z[0] - y[2]), c.sigma**2)
+        y, P = update(y, P, (0.0, 0.0, 1.0, 0.0), wrap_angle(z[0] - y[2]), c.sigma**2)
         return (y[0], y[1], y[2], where(y[3] < least, least, y[3])), P, own
 
     def estimate(state, u, c):
@@ -142,7 +147,7 @@ class ModifiedPolar(Steps):
 
     def covariance(state, u, c):
         x, J = ModifiedPolar.cartesian(state[0])
-        return Cartesian.covariance((x, congruent(J, state[1]), u), u, c)
+        return Cartesian.covariance((x, congruence(J, state[1]), u), u, c)
 
 
 class Bearings(StepStudy):

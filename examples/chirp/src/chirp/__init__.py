@@ -6,10 +6,14 @@ A linear chirp measures z = r + Δ v: the range, shifted by the velocity times t
 from typing import Annotated, Literal
 
 import numpy as np
-from radarsim.config.fields import Display, Member, Model, Name, NonNegative, Number, Positive, Probability, key
+from radarsim.config.key_types import Name, NonNegative, Number, Positive, Probability, key
+from radarsim.config.marks import DisplayMark
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member
+from radarsim.report.quantities import Component
 from radarsim.studies.interface import Paper
 from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Component, Measured
+from radarsim.studies.onefile import Measured
 
 SIGN = {"up": (1, 1), "down": (-1, -1), "alternating": (1, -1), "none": (0, 0)}  # of Δ, at even and odd scans
 
@@ -17,7 +21,7 @@ SIGN = {"up": (1, 1), "down": (-1, -1), "alternating": (1, -1), "none": (0, 0)} 
 class Radar(Model):
     """A radar whose frequency rises or falls within the pulse."""
 
-    name: Annotated[Name | None, Display()] = key("name", "display name", None)
+    name: Annotated[Name | None, DisplayMark()] = key("name", "display name", None)
     carrier_hz: Positive = key("carrier", "carrier frequency, Hz", symbol="f_0")
     slope_hz_per_s: Positive = key("slope of the chirp", "bandwidth over pulse length, Hz/s", symbol="μ", unit="Hz/s")
     sigma_range_m: Positive = key("σ of the measured range", "standard deviation of a plot, m", symbol="σ_r")

@@ -4,9 +4,9 @@ from typing import Literal
 
 import numpy as np
 
-from radarsim.config.fields import Positive, key, whole
-from radarsim.physics import process_noise
-from radarsim.studies.range_doppler.given import GivenGains, Scans
+from radarsim.config.key_types import Positive, key, whole_number
+from radarsim.physics.motion import process_noise
+from radarsim.studies.range_doppler.package_filters import GivenGains, Scans
 
 
 class Frozen(GivenGains):
@@ -16,7 +16,9 @@ class Frozen(GivenGains):
     manoeuvre_variance: Positive = key(
         "manoeuvre variance", "variance of the random jerk it allows for, (m/s³)²", symbol="D_M", unit="(m/s³)²"
     )
-    freeze_after: whole(1, 100_000) = key("last scan with a gain of its own", "scan whose gain all later ones have")
+    freeze_after: whole_number(1, 100_000) = key(
+        "last scan with a gain of its own", "scan whose gain all later ones have"
+    )
 
     def noise(self, dt_s: float) -> np.ndarray:
         return process_noise("random_jerk", self.manoeuvre_variance, dt_s)

@@ -8,10 +8,15 @@ from collections import namedtuple
 from statistics import NormalDist
 from typing import Literal
 
-from radarsim.config.fields import Member, Model, Positive, key
-from radarsim.kernels.traced import atan2, congruent, cos, dot, exp, greatest, log, sin, sqrt, times, updated, where
+from radarsim.config.key_types import Positive, key
+from radarsim.config.model import Model
+from radarsim.config.study_keys import Member
+from radarsim.kernels.formula_functions import atan2, cos, exp, log, sin
+from radarsim.kernels.small_matrices import congruence, dot, times, update
+from radarsim.kernels.tracing import maximum, sqrt, where
+from radarsim.report.quantities import Component
 from radarsim.studies.interface import Paper
-from radarsim.studies.onefile import Component, Measured
+from radarsim.studies.onefile import Measured
 from radarsim.studies.stepwise import Steps, StepStudy
 
 
@@ -66,7 +71,7 @@ def moved(x, P, F, q, T):
     """A state and its covariance T later, with accelerations of variance q that stay for T."""
     pp, pv, vv = q * T**4 / 4, q * T**3 / 2, q * T**2
     noise = pp, 0.0, pv, 0.0, pp, 0.0, pv, vv, 0.0, vv
-    return tuple(dot(row, x) for row in F), tuple(a + b for a, b in zip(congruent(F, P), noise, strict=True))
+    return tuple(dot(row, x) for row in F), tuple(a + b for a, b in zip(congruence(F, P), noise, strict=True))
 
 
 def rows(z, c):
@@ -98,7 +103,7 @@ class Linear(Steps):
     def update(state, z, u, c):
         x, P = state
         for h, value, R in rows(z, c):
-            x, P = updated(x, P, h, value - dot(h, x), R)
+            x, P = update(x, P, h, value - dot(h, x), R)
         return x, P
 
     def estimate(state, u, c):
@@ -160,11 +165,11 @@ class Models(Steps):
             for h, value, R in rows(z, c.plot):
                 e, S = value - dot(h, x), dot(h, times(P, h)) + R
                 likelihood = likelihood - 0.5 * (e * e / S + log(S))
-                x, P = updated(x, P, h, e, R)
+                x, P = update(x, P, h, e, R)
             made.append((x, P))
             logs.append(likelihood)
-        top = greatest(greatest(logs[0], logs[1]), logs[2])
-        p = tuple(one * exp(greatest(of - top, -600.0)) for one, of in zip(state[1], logs, strict=True))
+        top = maximum(maximum(logs[0], logs[1]), logs[2])
+        p = tuple(one * exp(maximum(of - top, -600.0)) for one, of in zip(state[1], logs, strict=True))
         return tuple(made), tuple(one / (p[0] + p[1] + p[2]) for one in p)
 
     def estimate(state, u, c):
@@ -226,7 +231,7 @@ claims:
         return World(*sigma, *own, begins, ends, t.acceleration_mps2, t.sigma_acceleration_mps2)
 
     def begin(self, c, w):
-        speed = greatest(c.speed + c.sigma_speed * w[2], 0.3 * c.speed)
+        speed = maximum(c.speed + c.sigma_speed * w[2], 0.3 * c.speed)
         return c.place * w[0], c.place * w[1], speed, atan2(w[3], w[4]), 0.0
 
     def move(self, state, dt, c, w):

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import radarsim
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 
 from learned.network import COLUMNS, SCALE_M, WEIGHTS, Inner, unit
 

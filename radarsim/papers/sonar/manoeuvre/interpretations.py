@@ -18,8 +18,8 @@ from radarsim.papers.interpretations import ChangedResults, Interpretation, Pape
 from radarsim.papers.sonar.manoeuvre import measures
 from radarsim.papers.sonar.measures import Evidence as SonarEvidence
 from radarsim.report.statistics import Estimate
-from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre.exact import switched_window
+from radarsim.studies.sonar.manoeuvre import detection_laws
+from radarsim.studies.sonar.manoeuvre.switched_window import switched_window
 
 ENOUGH, DETECTS, SINGLE, SWITCHES = "P3.3", "P3.8", "P3.9", "P3.10"
 
@@ -41,15 +41,15 @@ class Interpretations(PaperInterpretations):
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
         if claim.id == ENOUGH:
             plots, criterion = _enough(interpretation["high_accuracy"])
-            return [replace(part, what=criterion, measure=lambda seen: exact_number(plots)) for part in claim.parts]
+            return [replace(part, what=criterion, measure=lambda evidence: exact_number(plots)) for part in claim.parts]
         if claim.id == SINGLE:
             strength = self.settings(interpretation)["shift"]
-            probability = float(exact.detection(1.0, strength))
-            what = f"alarms a test at k = 1, five plots, acceleration of {strength:g} σ_a"
+            probability = float(detection_laws.detection(1.0, strength))
+            quantity = f"alarms a test at k = 1, five plots, acceleration of {strength:g} σ_a"
             if strength == 1:
-                what = claim.parts[0].what
+                quantity = claim.parts[0].what
             return [
-                replace(part, what=what, measure=lambda seen: exact_number(probability), exact=None)
+                replace(part, what=quantity, measure=lambda evidence: exact_number(probability), exact=None)
                 for part in claim.parts
             ]
         if claim.id == SWITCHES and "plots" in self.settings(interpretation):
@@ -66,30 +66,38 @@ class Interpretations(PaperInterpretations):
         target = case.spec.target
         if abs(target.acceleration_mps2) not in STRENGTHS:
             return None
-        taken = self.settings(interpretation)
-        changes: dict[str, Any] = {"target": target.model_copy(update={"end_s": target.start_s + taken["lasts_s"]})}
+        settings = self.settings(interpretation)
+        changes: dict[str, Any] = {"target": target.model_copy(update={"end_s": target.start_s + settings["lasts_s"]})}
         if interpretation["tests"] == "batches":
             changes["detectors"] = tuple(
-                one.model_copy(update={"test_every": one.plots}) if one.test_every == 1 else one
-                for one in case.spec.detectors
+                detector_keys.model_copy(update={"test_every": detector_keys.plots})
+                if detector_keys.test_every == 1
+                else detector_keys
+                for detector_keys in case.spec.detectors
             )
-        changes["filters"] = tuple(_with_rate(one, taken["switching_rate"]) for one in case.spec.filters)
+        changes["filters"] = tuple(
+            _with_rate(filter_keys, settings["switching_rate"]) for filter_keys in case.spec.filters
+        )
         return replace(case, spec=case.spec.model_copy(update=changes))
 
     def evidence(
-        self, claim: Claim, interpretation: Interpretation, seen: ChangedResults | None, of: PaperClaims
+        self,
+        claim: Claim,
+        interpretation: Interpretation,
+        changed_results: ChangedResults | None,
+        paper_claims: PaperClaims,
     ) -> Evidence:
-        if seen is None:
+        if changed_results is None:
             return SonarEvidence((), {}, {})
-        return super().evidence(claim, interpretation, seen, of)
+        return super().evidence(claim, interpretation, changed_results, paper_claims)
 
 
 def _enough(criterion: str) -> tuple[int, str]:
     """Fewest plots that meet a criterion of high accuracy, by the closed forms after (2), and what these are."""
     n = np.arange(2, 100)
-    smoothed, ahead = 2 * (2 * n - 1) / (n * (n + 1)), 2 * (2 * n + 1) / (n * (n - 1))  # variances, of a plot's
-    met, what = {
-        "predicted as measured": (ahead <= 1, "whose extrapolation is no worse than a plot"),
+    smoothed, extrapolated = 2 * (2 * n - 1) / (n * (n + 1)), 2 * (2 * n + 1) / (n * (n - 1))  # variances, of a plot's
+    is_met, meaning = {
+        "predicted as measured": (extrapolated <= 1, "whose extrapolation is no worse than a plot"),
         "half the variance": (smoothed <= 0.5, "that smooth to half of a plot's variance"),
         "under 5 % more": (
             np.append(np.sqrt(smoothed[1:] / smoothed[:-1]) > 0.95, True),
@@ -97,29 +105,36 @@ def _enough(criterion: str) -> tuple[int, str]:
         ),
         "two thirds": (smoothed <= (2 / 3) ** 2, "that smooth to two thirds of a plot's σ"),
     }[criterion]
-    return int(n[met][0]), f"fewest plots {what}"
+    return int(n[is_met][0]), f"fewest plots {meaning}"
 
 
 EXTREMES = (measures.WEAK, measures.STRONG)
 STRENGTHS = (0.1, 0.8)  # m/s²: the weakest and the strongest manoeuvre of the shipped sweep
 
 
-def _with_rate(one: Any, rate: float) -> Any:
+def _with_rate(filter_keys: Any, rate: float) -> Any:
     """An adaptive filter with the interpretation's rate of false alarms."""
-    if one.detector is None or rate == measures.USUAL or one.detector.false_alarm_probability is None:
-        return one
-    return one.model_copy(update={"detector": one.detector.model_copy(update={"false_alarm_probability": rate})})
+    if (
+        filter_keys.detector is None
+        or rate == measures.USUAL_FALSE_ALARM_RATE
+        or filter_keys.detector.false_alarm_probability is None
+    ):
+        return filter_keys
+    return filter_keys.model_copy(
+        update={"detector": filter_keys.detector.model_copy(update={"false_alarm_probability": rate})}
+    )
 
 
 def _delay(part: Part, until: str, rate: float) -> Part:
-    """A part on times to see a manoeuvre, at the interpretation's rate and of what it wants to be seen."""
-    at = "k = 1" if rate == measures.AT_ONE else f"{rate:g} false alarms a test"
-    seen = f"mean time to detect {'the beginning' if until == 'beginning' else until} of the {part.cases[0]} at {at}"
+    """A part on the time to detect a manoeuvre, with the interpretation's rate of false alarms and its event."""
+    rate_words = "k = 1" if rate == measures.FALSE_ALARM_RATE_AT_ONE else f"{rate:g} false alarms a test"
+    event = "the beginning" if until == "beginning" else until
+    quantity = f"mean time to detect {event} of the {part.cases[0]} at {rate_words}"
     if part.statement == "time":
-        return with_arguments(replace(part, what=f"{seen}, 8 plots over 5"), until=until, rate=rate)
+        return with_arguments(replace(part, what=f"{quantity}, 8 plots over 5"), until=until, rate=rate)
     if part.statement == "not worth while":
-        what = f"{seen}, over 5 plots against the best of 4–5"
-        return with_arguments(replace(part, what=what), until=until, rate=rate)
+        comparison = f"{quantity}, over 5 plots against the best of 4–5"
+        return with_arguments(replace(part, what=comparison), until=until, rate=rate)
     return part
 
 
@@ -129,11 +144,11 @@ def _switched(part: Part, memory: str, *, plots: int, switching_rate: float, **_
     acceleration = STRENGTHS[EXTREMES.index(part.cases[0])]
 
     def measure(_: Any) -> Estimate:
-        of = switched_window(
-            _course(acceleration), SIGMA_M, PERIOD_S, plots, plots, float(exact.threshold(switching_rate))
+        window = switched_window(
+            _course(acceleration), SIGMA_M, PERIOD_S, plots, plots, float(detection_laws.threshold(switching_rate))
         )
-        held = of.line if degree == 1 else of.parabola
-        return exact_number(float(np.sqrt(np.mean(held**2) / np.mean(of.switched**2))))
+        errors = window.line if degree == 1 else window.parabola
+        return exact_number(float(np.sqrt(np.mean(errors**2) / np.mean(window.switched**2))))
 
     return replace(part, what=part.what.replace("five plots", memory), measure=measure)
 

@@ -7,33 +7,32 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.papers.evidence import Curve, MissingEvidence, ratio
-from radarsim.papers.sonar.measures import FOUND, Evidence, Key
+from radarsim.papers.sonar.measures import CASE_FINDERS, Evidence, Key
 from radarsim.report.statistics import Z95, Estimate
-from radarsim.studies.sonar.config import Filter
-from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
+from radarsim.studies.sonar.filter_keys import Filter
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 
-USUAL = 0.01  # false alarms a test
-AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a Gaussian outside one σ
+USUAL_FALSE_ALARM_RATE = 0.01  # false alarms a test
+FALSE_ALARM_RATE_AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a Gaussian outside one σ
 
 
-# ---- the cases ----------------------------------------------------------------------------------------------------
 def _by_strength(results: Sequence[CaseResult]) -> list[CaseResult[ManoeuvreAxes]]:
     """The cases of an accelerating target with detectors in the polar frame, from the weakest manoeuvre on."""
-    found = [
+    manoeuvres = [
         r for r in results if r.spec.frame == "polar" and r.spec.detectors and r.spec.target.kind == "accelerating"
     ]
-    found = [r for r in found if r.axes.manoeuvre_s and (r.axes.phase == 1).any()]
-    return sorted(found, key=lambda r: abs(r.spec.target.acceleration_mps2))
+    manoeuvres = [r for r in manoeuvres if r.axes.manoeuvre_s and (r.axes.phase == 1).any()]
+    return sorted(manoeuvres, key=lambda r: abs(r.spec.target.acceleration_mps2))
 
 
 def _weakest(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
-    found = _by_strength(results)
-    return found[0] if len(found) > 1 else None
+    manoeuvres = _by_strength(results)
+    return manoeuvres[0] if len(manoeuvres) > 1 else None
 
 
 def _strongest(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
-    found = _by_strength(results)
-    return found[-1] if len(found) > 1 else None
+    manoeuvres = _by_strength(results)
+    return manoeuvres[-1] if len(manoeuvres) > 1 else None
 
 
 def _of_one_sigma(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
@@ -41,16 +40,15 @@ def _of_one_sigma(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | 
 
 
 WEAK, STRONG, EQUAL = "weakest manoeuvre", "strongest manoeuvre", "manoeuvre of one σ_a"
-FOUND.update({WEAK: _weakest, STRONG: _strongest, EQUAL: _of_one_sigma})
+CASE_FINDERS.update({WEAK: _weakest, STRONG: _strongest, EQUAL: _of_one_sigma})
 
 
-# ---- the numbers --------------------------------------------------------------------------------------------------
-def _detector(result: CaseResult[ManoeuvreAxes], plots: int, what: str, value: float) -> tuple[int, int]:
-    """Number of the detector of so many plots that tests at every scan, and of its threshold; raises Missing."""
-    for d, one in enumerate(result.spec.detectors):
-        given = getattr(one, what) or ()
-        if one.plots == plots and one.test_every == 1 and value in given:
-            return d, given.index(value)
+def _detector(result: CaseResult[ManoeuvreAxes], plots: int, threshold_key: str, value: float) -> tuple[int, int]:
+    """Index of the detector of so many plots that tests at every scan, and of its threshold; else MissingEvidence."""
+    for d, detector in enumerate(result.spec.detectors):
+        thresholds = getattr(detector, threshold_key) or ()
+        if detector.plots == plots and detector.test_every == 1 and value in thresholds:
+            return d, thresholds.index(value)
     raise MissingEvidence((plots, value))
 
 
@@ -68,29 +66,31 @@ def _last(result: CaseResult[ManoeuvreAxes]) -> int:
     return int(np.flatnonzero(result.axes.phase == 1)[-1])
 
 
-def thresholds_ratio(seen: Evidence, key: Key, more: int, few: int) -> float:
+def thresholds_ratio(evidence: Evidence, key: Key, more: int, few: int) -> float:
     """Accelerations at the thresholds of two detectors of the same false alarms: algebra."""
-    result, found = seen.case(key), []
+    result, accelerations = evidence.case(key), []
     for plots in (more, few):
-        d, _ = _detector(result, plots, "false_alarm_probability", USUAL)
+        d, _ = _detector(result, plots, "false_alarm_probability", USUAL_FALSE_ALARM_RATE)
         name = result.spec.detectors[d].name
-        rows = seen.tables["thresholds"]
+        rows = evidence.tables["thresholds"]
         rows = rows[(rows["case"] == result.name) & (rows["filter"] == name) & (rows["component"] == "r")]
-        near = (rows["false_alarm_probability"] - USUAL).abs().idxmin()
-        found.append(rows.loc[near, "threshold_acceleration"])
-    return float(found[0] / found[1])
+        nearest = (rows["false_alarm_probability"] - USUAL_FALSE_ALARM_RATE).abs().idxmin()
+        accelerations.append(rows.loc[nearest, "threshold_acceleration"])
+    return float(accelerations[0] / accelerations[1])
 
 
-def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL) -> Estimate:
+def mean_delay(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL_FALSE_ALARM_RATE) -> Estimate:
     """Mean time from the beginning to the first alarm in the range, s; where there is none, to the manoeuvre's end."""
     return _mean_time(result, plots, rate, 1)
 
 
-def both_ends(result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL) -> Estimate:
+def mean_delay_of_both_ends(
+    result: CaseResult[ManoeuvreAxes], plots: int, rate: float = USUAL_FALSE_ALARM_RATE
+) -> Estimate:
     """`mean_delay`, and from the end to the first test without an alarm: their sum, taken as independent."""
-    one, other = (_mean_time(result, plots, rate, phase) for phase in (1, 2))
-    half = float(np.hypot(one.hi - one.value, other.hi - other.value))
-    value = one.value + other.value
+    beginning, end = (_mean_time(result, plots, rate, phase) for phase in (1, 2))
+    half = float(np.hypot(beginning.hi - beginning.value, end.hi - end.value))
+    value = beginning.value + end.value
     return Estimate(value, value - half, value + half)
 
 
@@ -110,75 +110,79 @@ def _mean_time(result: CaseResult[ManoeuvreAxes], plots: int, rate: float, phase
 
 
 Until = Literal["beginning", "beginning and end"]
-DELAYS = {"beginning": mean_delay, "beginning and end": both_ends}
+DELAYS = {"beginning": mean_delay, "beginning and end": mean_delay_of_both_ends}
 
 
-def delays_ratio(seen: Evidence, key: Key, more: int, few: int, until: Until, rate: float) -> Estimate:
+def delays_ratio(evidence: Evidence, key: Key, more: int, few: int, until: Until, rate: float) -> Estimate:
     """Mean delays of two detectors, taken as independent."""
-    result, delay = seen.case(key), DELAYS[until]
+    result, delay = evidence.case(key), DELAYS[until]
     return ratio(delay(result, more, rate), delay(result, few, rate))
 
 
-def further(seen: Evidence, key: Key, enough: Sequence[int], until: Until, rate: float) -> Estimate:
+def delay_of_more_plots(evidence: Evidence, key: Key, enough: Sequence[int], until: Until, rate: float) -> Estimate:
     """Least mean delay of detectors of more plots than `enough`, over the least of these, less 1, in %; as independent.
-    Negative where more plots see it sooner."""
-    of = _delays(seen, key, until, rate)
-    more = [one for n, one in of.items() if n > max(enough)]
-    few = [one for n, one in of.items() if n in enough]
-    least = [min(ones, key=lambda one: one.value) for ones in (more, few)]
-    return Estimate(*(part - 100 for part in ratio(least[0], least[1], 100)))
+    Negative where more plots detect it sooner."""
+    delays = _delays(evidence, key, until, rate)
+    more = [delay for n, delay in delays.items() if n > max(enough)]
+    few = [delay for n, delay in delays.items() if n in enough]
+    shortest = [min(delays_of_group, key=lambda delay: delay.value) for delays_of_group in (more, few)]
+    return Estimate(*(percent - 100 for percent in ratio(shortest[0], shortest[1], 100)))
 
 
-def fastest(seen: Evidence, key: Key, until: Until, rate: float) -> Estimate:
+def fastest_detector(evidence: Evidence, key: Key, until: Until, rate: float) -> Estimate:
     """Plots of the detector with the least mean delay; the interval spans all that cannot be distinguished from it."""
-    of = _delays(seen, key, until, rate)
-    best = min(of, key=lambda plots: of[plots].value)
-    near = [plots for plots in of if of[plots].lo <= of[best].hi]
+    delays = _delays(evidence, key, until, rate)
+    best = min(delays, key=lambda plots: delays[plots].value)
+    near = [plots for plots in delays if delays[plots].lo <= delays[best].hi]
     return Estimate(float(best), float(min(near)), float(max(near)))
 
 
-def _delays(seen: Evidence, key: Key, until: Until, rate: float) -> dict[int, Estimate]:
+def _delays(evidence: Evidence, key: Key, until: Until, rate: float) -> dict[int, Estimate]:
     """Mean delays by plots, of the detectors that test at every scan at a rate of false alarms."""
-    result = seen.case(key)
-    tested = (one for one in result.spec.detectors if one.test_every == 1)
-    every = [one.plots for one in tested if rate in (one.false_alarm_probability or ())]
-    return {plots: DELAYS[until](result, plots, rate) for plots in every}
+    result = evidence.case(key)
+    detectors = (detector for detector in result.spec.detectors if detector.test_every == 1)
+    plot_counts = [detector.plots for detector in detectors if rate in (detector.false_alarm_probability or ())]
+    return {plots: DELAYS[until](result, plots, rate) for plots in plot_counts}
 
 
-def exact_detected_at_one(seen: Evidence, key: Key) -> float:
+def exact_detected_at_one(evidence: Evidence, key: Key) -> float:
     """`detected_at_one` of the exact law."""
-    return float(_at_one(seen, key)["exact"])
+    return float(_at_one(evidence, key)["exact"])
 
 
-def detected_at_one(seen: Evidence, key: Key) -> Estimate:
+def detected_at_one(evidence: Evidence, key: Key) -> Estimate:
     """Share of alarms of five plots at k = 1 at the last scan of the manoeuvre of one σ_a."""
-    row = _at_one(seen, key)
+    row = _at_one(evidence, key)
     return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
 
 
-def _at_one(seen: Evidence, key: Key) -> Mapping[str, Any]:
-    result = seen.case(key)
+def _at_one(evidence: Evidence, key: Key) -> Mapping[str, Any]:
+    result = evidence.case(key)
     d, _ = _detector(result, 5, "threshold_k", 1.0)
     name, k = result.spec.detectors[d].name, int(result.axes.k[_last(result)])
-    return seen.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
+    return evidence.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
 
 
-def degrees_ratio(seen: Evidence, key: Key, degree: int) -> Estimate:
+def degrees_ratio(evidence: Evidence, key: Key, degree: int) -> Estimate:
     """σ over the run of growing memory of a held degree, over that of the degree switched by five plots."""
-    filters = [f for _, f in seen.members(seen.case(key))]
-    held = next((f.name for f in filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
+    filters = [f for _, f in evidence.members(evidence.case(key))]
+    fixed = next((f.name for f in filters if (f.kind, f.degree) == ("growing_memory", degree)), None)
     switched = next((f.name for f in filters if _by_five(f)), None)
-    if held is None or switched is None:
+    if fixed is None or switched is None:
         raise MissingEvidence((key,))
-    over_run = [_over_run(seen.curve(key, name, "r").since(5)) for name in (held, switched)]
+    over_run = [_over_run(evidence.curve(key, name, "r").since(5)) for name in (fixed, switched)]
     return ratio(over_run[0], over_run[1])
 
 
-def _by_five(one: Filter) -> bool:
-    own = one.detector
-    if own is None or one.response == "shorten_memory" or (one.end_after or 1) != 1:
+def _by_five(filter_keys: Filter) -> bool:
+    detector = filter_keys.detector
+    if detector is None or filter_keys.response == "shorten_memory" or (filter_keys.end_after or 1) != 1:
         return False
-    return own.plots == 5 and own.false_alarm_probability == USUAL and own.coordinates == "each"
+    return (
+        detector.plots == 5
+        and detector.false_alarm_probability == USUAL_FALSE_ALARM_RATE
+        and detector.coordinates == "each"
+    )
 
 
 def _over_run(curve: Curve) -> Estimate:

@@ -1,7 +1,7 @@
 "use strict";
 // σ(k) and gains of both filters, exactly, and how they are drawn. No server: the recursion runs here.
 const radar = (() => {
-  // ---- the recursion (radarsim/studies/range_doppler/filters.py and exact.py are the same in Python) ----
+  // ---- the recursion (radarsim/studies/range_doppler/error_recursion.py and exact.py are the same in Python) ----
   const at = (M, f) => M.map((row, i) => row.map((_, j) => f(i, j)));
   const times = (A, B) => at(A, (i, j) => A[i].reduce((sum, a, n) => sum + a * B[n][j], 0));
   const turned = (A) => at(A, (i, j) => A[j][i]);
@@ -49,7 +49,7 @@ const radar = (() => {
     return { one, two, gain };
   }
 
-  // ---- the closed form (radarsim/studies/range_doppler/filters.py) ----
+  // ---- the closed form (radarsim/studies/range_doppler/closed_form.py) ----
   function variances(c) {
     let A = 2 + Math.SQRT2 * c ** 0.25;
     for (let n = 0; n < 60; n++) A -= (A ** 4 - 8 * A - 4 * c) / (4 * A ** 3 - 8);

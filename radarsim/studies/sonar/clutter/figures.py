@@ -1,4 +1,4 @@
-"""P3's figures of tracks among false plots: a map, confirmation, track life and accuracy, false tracks, classes."""
+"""Figures of tracks among false plots: confirmation, track life and accuracy, false tracks, classes."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -6,22 +6,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import few, listed, term, tr
-from radarsim.report import panels, tables, wording
-from radarsim.report.drawing import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
-from radarsim.studies.sonar.clutter.filters import (
-    ClutterAxes,
-    TrackerSpec,
-    gate_threshold,
-    tracker_specs,
-    tracking_conditions,
-)
-from radarsim.studies.sonar.clutter.tables import ENDED
-from radarsim.studies.sonar.clutter.track import confirmed_tracks, false_plots, target_plots
-from radarsim.studies.sonar.config import Keys
+from radarsim.language.translate import join_names, shorten_names, term, tr
+from radarsim.report import case_selection, figure_lines, key_labels, math_text, panel_layout, tables, wording
+from radarsim.report.drawing.model import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.map_figure import map_figure
+from radarsim.studies.sonar.clutter.tables import ENDED_TRACK_EVENT
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 SWEPT_KEYS = {  # columns of the table `tracking`, and the keys whose values they hold
     "false_plots_per_km2": "sensor.false_plots_per_km2",
@@ -34,7 +28,11 @@ ZERO_FACTOR = 3.0  # between zero and the smallest positive value on a logarithm
 UPPER_END_STYLE = Style(GREY, None, 4)
 MAX_LEVEL_SHARE = 0.02  # of its largest value: a quantity that changes less over a sweep is not drawn, only named
 Results = Sequence[CaseResult[ClutterAxes]]
-DRAWN_FROM = {"confirmation": ("tracks",), "track_life": ("tracking", "curves", "rare"), "false_tracks": ("tracking",)}
+TABLES_OF_FIGURES = {
+    "confirmation": ("tracks",),
+    "track_life": ("tracking", "curves", "rare"),
+    "false_tracks": ("tracking",),
+}
 
 
 def figures(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
@@ -60,9 +58,9 @@ def axis_over(result: CaseResult[ClutterAxes], column: str, table: "pd.DataFrame
     """An axis of the swept values of a column of SWEPT_KEYS, and the rows with their positions on it.
 
     It is logarithmic if the values span more than a factor of twenty; zero then stands left of the smallest one."""
-    label, values = panels.axis_of(result, SWEPT_KEYS[column]), np.unique(table[column].to_numpy(float))
+    label, values = key_labels.key_axis_label(result, SWEPT_KEYS[column]), np.unique(table[column].to_numpy(float))
     positive = values[values > 0]
-    if not len(positive) or positive[-1] / positive[0] <= panels.WIDE:
+    if not len(positive) or positive[-1] / positive[0] <= panel_layout.LOG_RATIO:
         return Axis(label), table
     if values[0] > 0:
         return Axis(label, "log"), table
@@ -83,46 +81,54 @@ def with_line_names(tracking: "pd.DataFrame", column: str, result: CaseResult[Cl
 
     result is one of the cases."""
     other_keys = [key for key in SWEPT_KEYS if key != column and tracking[key].nunique() > 1]
-    names = tracking["filter"].map(panels.literal).astype(object)
+    names = tracking["filter"].map(key_labels.escape_dollars).astype(object)
     for key in other_keys:
-        symbol = panels.symbol_of(result, SWEPT_KEYS[key])
-        names = names + [f", {symbol} = {panels.with_its_unit(result, SWEPT_KEYS[key], v)}" for v in tracking[key]]
+        symbol = key_labels.key_symbol(result, SWEPT_KEYS[key])
+        names = names + [
+            f", {symbol} = {key_labels.value_with_unit(result, SWEPT_KEYS[key], v)}" for v in tracking[key]
+        ]
     return tracking.assign(filter=names)
 
 
 def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | None:
     """Probability of a confirmed track against time: a panel for each case, a line for each tracker."""
-    groups = tables.groups(tracks, "case", "filter")
+    groups = tables.group_by(tracks, "case", "filter")
     confirmed = ("t_s", "confirmed", "confirmed_lo", "confirmed_hi", "exact_confirmed")
     figure_panels: list[Panel] = []
-    shown_results = panels.spread_out(results, panels.MOST)
+    shown_results = case_selection.pick_evenly(results, case_selection.MAX_CASES)
     for result in shown_results:
         marks = []
         for n, f in enumerate(result.axes.filters):
             if (result.name, f) in groups:
                 rows = groups[result.name, f]
-                marks.append(panels.line(rows, confirmed, panels.literal(f), n))
-                marks.append(panels.line(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7)))
+                marks.append(figure_lines.line_from_rows(rows, confirmed, key_labels.escape_dollars(f), n))
+                marks.append(
+                    figure_lines.line_from_rows(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7))
+                )
         if marks:
             keys = ((tr("thin: kept at that time"), Style(0, 0, None, 0.7)),) if not figure_panels else ()
             y = Axis(tr("probability"), limits=(0, 1))
-            figure_panels.append(Panel(panels.time_axis(), y, tuple(marks), _swept_values(result), keys, direct=False))
+            figure_panels.append(
+                Panel(panel_layout.time_axis(), y, tuple(marks), _swept_values(result), keys, direct=False)
+            )
     if not figure_panels:
         return None
     caption = (
         tr(
             "Probability that a track of the target was confirmed by that time, of {realisations}; thin "
             "lines: that a confirmed track exists and is on the target. Bands: 95 % intervals.",
-            realisations=panels.realisations(results),
+            realisations=case_selection.realisations_text(results),
         )
-    ) + panels.cases_left_out(results, shown_results)
+    ) + case_selection.cases_left_out_remark(results, shown_results)
     title = tr("Probability of a confirmed track")
     return Figure("confirmation", title, caption, tuple(figure_panels), min(2, len(figure_panels)), PAGE_MM)
 
 
 def _swept_values(result: CaseResult[ClutterAxes]) -> str:
     """The swept keys of a case and their values, at length."""
-    pairs = ((panels.key_label(result, key).text, panels.with_its_unit(result, key, v)) for key, v in result.swept)
+    pairs = (
+        (key_labels.key_label(result, key).text, key_labels.value_with_unit(result, key, v)) for key, v in result.swept
+    )
     return ", ".join(f"{name}: {value}" for name, value in pairs)
 
 
@@ -144,18 +150,18 @@ def life_figure(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") 
             clauses.append(quantity.clause)
     if not figure_panels:
         return None
-    text = listed(clauses)
+    text = join_names(clauses)
     caption = tr(
         "{panels}, of {realisations}. Bands: 95 % intervals.",
         panels=text[0].upper() + text[1:],
-        realisations=panels.realisations(results),
+        realisations=case_selection.realisations_text(results),
     )
     if not_drawn := [text for text in level_quantities if text]:
         caption += " " + tr(
-            "Not drawn, as it does not change over the sweep: {quantities}.", quantities=listed(not_drawn)
+            "Not drawn, as it does not change over the sweep: {quantities}.", quantities=join_names(not_drawn)
         )
     columns = min(2, len(figure_panels))
-    width = panels.WIDE_MM if columns == 1 else PAGE_MM
+    width = panel_layout.WIDE_MM if columns == 1 else PAGE_MM
     return Figure("track_life", tr("Track life and accuracy"), caption, tuple(figure_panels), columns, width, 58)
 
 
@@ -172,7 +178,7 @@ class _LifeQuantity(NamedTuple):
 
     @property
     def axis(self) -> Axis:
-        label = panels.with_unit(self.name, self.unit)
+        label = key_labels.label_with_unit(self.name, self.unit)
         return Axis(label, "log") if self.is_logarithmic else Axis(label, limits=(0, None))
 
 
@@ -181,11 +187,13 @@ def _life_quantities(
 ) -> tuple[_LifeQuantity, ...]:
     """The quantities of the figure of track life; the share of ended tracks replaces the life where it was sampled."""
     cases = tracking[["case", *SWEPT_KEYS]].drop_duplicates("case")
-    at_end = tables.where(tables_by_name["curves"], component="r", k=last_scan).merge(cases, on="case", how="left")
+    at_end = tables.select_rows(tables_by_name["curves"], component="r", k=last_scan).merge(
+        cases, on="case", how="left"
+    )
     life = _LifeQuantity("life_s", "life", tr("track life"), "s", True, tracking, tr(LIFE_CAPTION))
     rare_events = tables_by_name.get("rare")
     if rare_events is not None:
-        ended = rare_events[rare_events["sought"] & (rare_events["event"] == ENDED)]
+        ended = rare_events[rare_events["sought"] & (rare_events["event"] == ENDED_TRACK_EVENT)]
         if len(ended):
             name, rates = tr("share of tracks ended by the last scan"), ended.merge(cases, on="case", how="left")
             life = _LifeQuantity("rate", "rate", name, "", True, rates, tr(ENDS_CAPTION))
@@ -205,8 +213,8 @@ def _level_quantity(name: str, unit: str, values: np.ndarray) -> str:
     if not len(values):
         return ""
     bounds = dict.fromkeys(wording.number(float(end), 3) for end in (values.min(), values.max()))
-    number = " ".join(filter(None, ("–".join(bounds), panels.unit_of(unit))))
-    return f"{wording.spoken(name)} ({number})"
+    number = " ".join(filter(None, ("–".join(bounds), key_labels.unit_label(unit))))
+    return f"{math_text.plain_text(name)} ({number})"
 
 
 def _lines(table: "pd.DataFrame", x: str, value: str, bounds: str) -> list[Line]:
@@ -215,7 +223,7 @@ def _lines(table: "pd.DataFrame", x: str, value: str, bounds: str) -> list[Line]
     for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
         rows = rows.sort_values(x).replace(np.inf, np.nan)
         lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{bounds}_lo", f"{bounds}_hi"))
-        lines.append(panels.line(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), str(name), n))
+        lines.append(figure_lines.line_from_rows(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), str(name), n))
     return lines
 
 
@@ -241,13 +249,13 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
     caption = tr(
         "False tracks confirmed per hour in the whole sector; every false plot starts a tentative track. Plots that "
         "confirm it: {rules}. {realisations} per case. Bands and bars: 95 % intervals.",
-        rules="; ".join(f"{rule} ({few(names)})" for rule, names in rules.items()),
-        realisations=panels.realisations(results),
+        rules="; ".join(f"{rule} ({shorten_names(names)})" for rule, names in rules.items()),
+        realisations=case_selection.realisations_text(results),
     )
     if zero_names := rows.groupby("filter", sort=False)[rate].sum().loc[lambda rates: rates == 0].index.tolist():
-        caption += " " + tr("Zero throughout, so not drawn: {names}.", names=few(zero_names))
+        caption += " " + tr("Zero throughout, so not drawn: {names}.", names=shorten_names(zero_names))
     panel = Panel(x, Axis(tr("false tracks per hour"), "log"), marks, keys=keys, direct=False)
-    return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panels.WIDE_MM)
+    return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panel_layout.WIDE_MM)
 
 
 def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
@@ -256,7 +264,7 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
     table = classes[(classes["case"] == case.name) & (classes["n_false"] > 0)]
     if table.empty:
         return None
-    table = table.assign(filter=table["filter"].map(panels.literal))
+    table = table.assign(filter=table["filter"].map(key_labels.escape_dollars))
     x = Axis(tr("threshold of the score"))
     false = _lines(table[table["false_called_true"] > 0], "threshold", "false_called_true", "false")
     true = _lines(table, "threshold", "true_called_false", "true")
@@ -273,118 +281,10 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
         "Error rates of declaring a track true once its score (logarithm of the likelihood ratio) "
         "reaches a threshold, of {realisations} of each kind. Left: tracks started by false plots, at "
         "most exp(−threshold) of them (bound). Right: the target's first tracks. Bands: 95 % intervals.",
-        realisations=panels.realisations(results),
+        realisations=case_selection.realisations_text(results),
     ) + (tr(" Case: {swept}.", swept=_swept_values(case)) if case.swept else "")
     return (
         Figure("track_classes", tr("True and false tracks by score"), caption, tuple(figure_panels), 2, PAGE_MM)
         if figure_panels
         else None
     )
-
-
-MAP_MARGIN_M = 2500.0  # around the target's course
-GATE_INTERVAL_SCANS = 4  # scans between the gates that the map shows
-Curve = tuple[np.ndarray, np.ndarray]  # distances north and east, m
-
-
-def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
-    """A map of realisation 0 of a case near the target's course.
-
-    The course and the target's plots, false plots, and the confirmed tracks and gates of the first tracker that has to
-    find its plots."""
-    spec, axes = result.spec, result.axes
-    z, true = target_plots(axes.world, axes.detections, 0)
-    course = _north_east(*true.T)
-    (south, north), (west, east) = ((side.min() - MAP_MARGIN_M, side.max() + MAP_MARGIN_M) for side in course)
-    scans, (false_north, false_east) = _plots_within(axes, z, (south, north), (west, east))
-    f, tracks, gates = _tracks_and_gates(spec, scans, course)
-    marks = [_map_line((false_north, false_east), tr("false plots"), Style(GREY, None, 0, 1.1, 1.0))]
-    curves = (
-        (tr("its gates"), gates, Style(3, 0, None, 0.6)),
-        (tr("other tracks"), tracks[1:], Style(GREY, 0, None, 1.0)),
-        (tr("track nearest to the course"), tracks[:1], Style(2, 0, None, 1.8)),
-    )
-    for label, group, style in curves:
-        marks += [_map_line(curve, "" if n else label, style) for n, curve in enumerate(group)]
-    marks.append(_map_line(course, tr("target"), Style(1, 1, None)))
-    marks.append(_map_line(_north_east(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
-    caption = tr(
-        "Confirmed tracks near the target: {tracks}, among {false} false plots in {k} scans. The target's course and "
-        "plots, the false plots of all scans, the tracks, and at every fourth scan the gate of the one nearest to the "
-        "course, in realisation 0 of {name}, tracker {tracker}.",
-        tracks=len(tracks),
-        false=len(false_north),
-        name=panels.plain_label(result),
-        tracker="" if f is None else spec.filters[f].name,
-        k=len(axes.k),
-    )
-    x_axis = Axis(tr("distance east, km"), limits=(west / 1e3, east / 1e3))
-    y_axis = Axis(tr("distance north, km"), limits=(south / 1e3, north / 1e3))
-    panel, title = Panel(x_axis, y_axis, tuple(marks), direct=False, equal=True), tr("Plots, gates and tracks")
-    return Figure("track_map", title, caption, (panel,), width_mm=panels.WIDE_MM, panel_height_mm=100)
-
-
-def _plots_within(
-    axes: ClutterAxes, z: np.ndarray, north_limits: tuple[float, float], east_limits: tuple[float, float]
-) -> tuple[list[tuple[float, np.ndarray, np.ndarray]], Curve]:
-    """Scans (t, r, b) with the target's plots z (K, 2) and the false plots within limits; and these false plots."""
-    scans, false_positions = [], []
-    for k, t in enumerate(np.cumsum(axes.world.dt)):
-        r, b = false_plots(axes.field, 0, k)
-        x, y = _north_east(r, b)
-        is_near = (north_limits[0] < x) & (x < north_limits[1]) & (east_limits[0] < y) & (y < east_limits[1])
-        false_positions.append(np.stack([x[is_near], y[is_near]]))
-        target_plot = z[k][:, None] if np.isfinite(z[k, 0]) else np.zeros((2, 0))
-        r, b = np.concatenate([target_plot, np.stack([r[is_near], b[is_near]])], axis=1)
-        scans.append((float(t), r, b))
-    north, east = np.concatenate(false_positions, axis=1)
-    return scans, (north, east)
-
-
-def _tracks_and_gates(
-    spec: Keys, scans: Sequence[tuple[float, np.ndarray, np.ndarray]], course: Curve
-) -> tuple[int | None, list[Curve], list[Curve]]:
-    """The first tracker that has to find its plots, its confirmed tracks, and gates of the nearest track.
-
-    Tracks are ordered by their distance to the course."""
-    specs = tracker_specs(spec)
-    f = next((i for i, tracker in enumerate(specs) if tracker.association != "known"), None)
-    if f is None:
-        return None, [], []
-    histories = confirmed_tracks(specs[f], tracking_conditions(spec), scans)
-    states = [np.array(track.states) for track in histories]
-    track_curves = [_north_east(track_states[:, 0], track_states[:, 2]) for track_states in states]
-    order = sorted(range(len(histories)), key=lambda n: _median_distance(track_curves[n], course))
-    gates = [
-        _gate_outline(gate, specs[f])
-        for n in order[:1]
-        for k, gate in zip(histories[n].scans, histories[n].gates, strict=True)
-        if not k % GATE_INTERVAL_SCANS
-    ]
-    return f, [track_curves[n] for n in order], [gate for gate in gates if np.isfinite(gate[0]).all()]
-
-
-def _map_line(curve: Curve, label: str, style: Style) -> Line:
-    return Line(curve[1] * 1e-3, curve[0] * 1e-3, label, style)
-
-
-def _north_east(r: np.ndarray, b: np.ndarray) -> Curve:
-    """Distances north and east of a position in range and bearing."""
-    return r * np.cos(b), r * np.sin(b)
-
-
-def _median_distance(track: Curve, course: Curve) -> float:
-    """The median distance of a track's points to the course, m."""
-    north, east = (
-        track_values[:, None] - course_values for track_values, course_values in zip(track, course, strict=True)
-    )
-    return float(np.median(np.hypot(north, east).min(axis=1)))
-
-
-def _gate_outline(gate: np.ndarray, tracker: TrackerSpec) -> Curve:
-    """The edge of a gate on the map; an open gate is drawn as if its probability were 0.9999."""
-    angle, (r, b, rr, rb, bb) = np.linspace(0, 2 * np.pi, 61), gate
-    size = np.sqrt(gate_threshold(min(tracker.gate_probability, 0.9999)))
-    low = rb / np.sqrt(rr)
-    u, v = size * np.cos(angle), size * np.sin(angle)
-    return _north_east(r + np.sqrt(rr) * u, b + low * u + np.sqrt(max(bb - low**2, 0.0)) * v)

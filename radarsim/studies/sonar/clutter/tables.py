@@ -1,4 +1,6 @@
-"""Tables of trackers among false plots (P3).
+"""Tables of trackers among false plots.
+
+docs/sonar_clutter.md defines confirmed, tentative, kept, lost and dropped.
 
 docs/sonar_clutter.md says what confirmed, tentative, kept, lost and dropped mean."""
 
@@ -8,21 +10,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import rare, statistics
+from radarsim.report import rare_events, statistics
 from radarsim.report import tables as common
 from radarsim.report.row_notes import notes_where
-from radarsim.report.statistics import Z95, Estimate, Values
-from radarsim.report.tables import Columns, leading, of_rows, stacked
-from radarsim.studies.sonar.clutter.filters import ClutterAxes
-from radarsim.studies.sonar.clutter.kernels import tracker
-from radarsim.studies.sonar.clutter.kernels.rare import DROPPED, DROPPED_AFTER, END_KINDS, LOST, LOST_AFTER
+from radarsim.report.statistics import Estimate
+from radarsim.report.tables import Columns, columns_from_rows, label_columns, stack_columns
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.intervals import mean_event_time, poisson_rate, ratio_of_sums
+from radarsim.studies.sonar.clutter.kernels import track_sums
+from radarsim.studies.sonar.clutter.kernels.rare_ends import DROPPED, DROPPED_AFTER, END_KINDS, LOST, LOST_AFTER
 
 if TYPE_CHECKING:
     import pandas as pd
 
-table = common.Tables()
-FALSE = "false track"
-ENDED = "target's track ended"
+
+table = common.TableMakers()
+FALSE_TRACK_EVENT = "false track"
+ENDED_TRACK_EVENT = "target's track ended"
 MIN_SHARE = 0.05  # of a rate: a smaller part of it does not decide whether its interval holds
 KINDS_BY_EVENT = {"target's track dropped": [DROPPED, DROPPED_AFTER], "target's track lost": [LOST, LOST_AFTER]}
 BESIDE_KINDS = [DROPPED_AFTER, LOST_AFTER]
@@ -43,14 +47,14 @@ def mean_false_plots(result: CaseResult[ClutterAxes]) -> float:
     return result.spec.sensor.false_plots_per_km2 * result.axes.area_m2 / 1e6
 
 
-def held_tracks(result: CaseResult[ClutterAxes], index: tuple[Any, ...]) -> rare.Counted:
+def held_tracks(result: CaseResult[ClutterAxes], index: tuple[Any, ...]) -> rare_events.EventWeights:
     """Weighted numbers of tracks that false plots began and that lived for 1 … K scans; index of filter and scan."""
-    return rare.Counted(*np.moveaxis(result.sums["held"][index], -1, 0))
+    return rare_events.EventWeights(*np.moveaxis(result.sums["held"][index], -1, 0))
 
 
-def sampling_weights(result: CaseResult[ClutterAxes], f: int | np.ndarray) -> rare.Drawn:
+def sampling_weights(result: CaseResult[ClutterAxes], f: int | np.ndarray) -> rare_events.SamplingWeights:
     """The sampling weights of tracks of filter f that false plots begin, where false tracks are rare."""
-    return rare.Drawn(result.count, *np.moveaxis(result.sums["drawn"][f], -1, 0))
+    return rare_events.SamplingWeights(result.count, *np.moveaxis(result.sums["drawn"][f], -1, 0))
 
 
 def false_track_rates(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate, np.ndarray, np.ndarray]:
@@ -59,53 +63,19 @@ def false_track_rates(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate
     The numbers are those of all realisations; where false tracks are rare, weighted."""
     if "held" not in result.sums:
         begun = result.sums["begun"][f]
-        alive, newly_confirmed = begun[:, tracker.FALSE_KEPT].sum(), begun[:, tracker.FALSE_FOUND].sum()
+        alive, newly_confirmed = (
+            begun[:, track_sums.FALSE_CONFIRMED].sum(),
+            begun[:, track_sums.FALSE_NEWLY_CONFIRMED].sum(),
+        )
         return statistics.rate(newly_confirmed, result.count), alive, newly_confirmed
     confirmed = held_tracks(result, (f, 0))
-    return rare.rate(confirmed, sampling_weights(result, f)), held_tracks(result, (f,)).weight.sum(), confirmed.weight
-
-
-# ---- statistics ------------------------------------------------------------------------------------------------------
-def poisson_rate(count: Values, exposure: Values) -> Estimate:
-    """The rate of Poisson events over an exposure with Garwood's 95 % interval, approximated by Wilson and Hilferty."""
-    count = np.asarray(count, dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        low = count * np.maximum(1 - 1 / (9 * count) - Z95 / (3 * np.sqrt(count)), 0) ** 3
-        high = (count + 1) * (1 - 1 / (9 * (count + 1)) + Z95 / (3 * np.sqrt(count + 1))) ** 3
-        return Estimate(count / exposure, np.where(count > 0, low, 0.0) / exposure, high / exposure)
-
-
-def ratio_of_sums(sums: np.ndarray, n: int) -> Estimate:
-    """The ratio Σa/Σb with its 95 % interval, from sums (5,) Σa, Σa², Σb, Σb², Σab over n realisations.
-
-    The interval is that of the logarithm, from the spread of a − R b over realisations (the delta method). Without any
-    event it is that of a Poisson number; without exposure it is NaN."""
-    a, aa, b, bb, ab = (float(number) for number in sums)
-    if b <= 0:
-        return Estimate(np.nan, np.nan, np.nan)
-    if a <= 0 or n < 2:
-        return Estimate(*(float(number) for number in poisson_rate(a, b)))
-    value = a / b
-    spread = np.sqrt(max(aa - 2 * value * ab + value**2 * bb, 0.0) * n / (n - 1)) / b
-    factor = float(np.exp(statistics.student(n - 1) * spread / value))
-    return Estimate(value, value / factor, value * factor)
-
-
-def mean_event_time(times: np.ndarray, counts: np.ndarray) -> Estimate:
-    """The mean time of events with counts (K,) at times (K,), with its 95 % interval."""
-    n = counts.sum()
-    if n < 1:
-        return Estimate(np.nan, np.nan, np.nan)
-    mean = float(times @ counts / n)
-    half = (
-        float(statistics.student(n - 1) * np.sqrt((times - mean) ** 2 @ counts / n / max(n - 1, 1)))
-        if n > 1
-        else np.inf
+    return (
+        rare_events.event_rate(confirmed, sampling_weights(result, f)),
+        held_tracks(result, (f,)).weight.sum(),
+        confirmed.weight,
     )
-    return Estimate(mean, mean - half, mean + half)
 
 
-# ---- tables ----------------------------------------------------------------------------------------------------------
 @table("tracks")
 def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
     """By scan: tracks of the target.
@@ -118,17 +88,17 @@ def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
     filter_indices, K, n = tracker_indices(result), len(result.axes.k), result.count
     counts = np.asarray(result.sums["counts"])[filter_indices]
     kinds_by_column = {
-        "tentative": tracker.TRYING,
-        "lost": tracker.LOST,
-        "dropped": tracker.DROPPED,
-        "tentative_dropped": tracker.FAILED,
+        "tentative": track_sums.TENTATIVE_COUNT,
+        "lost": track_sums.LOST_COUNT,
+        "dropped": track_sums.DROPPED_COUNT,
+        "tentative_dropped": track_sums.TENTATIVE_DROPPED_COUNT,
     }
     return {
-        **leading(result, np.repeat(filter_indices, K), np.tile(np.arange(K), len(filter_indices))),
+        **label_columns(result, np.repeat(filter_indices, K), np.tile(np.arange(K), len(filter_indices))),
         "n": np.full(len(filter_indices) * K, n),
-        "confirmed": statistics.rate(np.cumsum(counts[:, :, tracker.FOUND], axis=1).ravel(), n),
+        "confirmed": statistics.rate(np.cumsum(counts[:, :, track_sums.FIRST_CONFIRMED_COUNT], axis=1).ravel(), n),
         "exact_confirmed": result.axes.exact_confirmed[filter_indices].ravel(),
-        "kept": statistics.rate(counts[:, :, tracker.KEPT].ravel(), n),
+        "kept": statistics.rate(counts[:, :, track_sums.CONFIRMED_COUNT].ravel(), n),
         **{name: counts[:, :, kind].ravel().astype(np.int64) for name, kind in kinds_by_column.items()},
     }
 
@@ -155,15 +125,18 @@ def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
     false_tracks_per_hour ± false [1/h]: rate of confirmed false tracks over the sector
     false_tracks_at_once, false_life_s: mean number of these at a time, and mean life of one
     """
-    return of_rows([_summary(result, f) for f in tracker_indices(result)])
+    return columns_from_rows([_summary(result, f) for f in tracker_indices(result)])
 
 
 def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
     member, sensor, n = result.spec.filters[f], result.spec.sensor, result.count
     counts, ratios = (result.sums[name][f] for name in ("counts", "ratios"))
-    first_confirmed, (false, alive, false_found) = counts[:, tracker.FOUND], false_track_rates(result, f)
+    first_confirmed, (false, alive, false_found) = (
+        counts[:, track_sums.FIRST_CONFIRMED_COUNT],
+        false_track_rates(result, f),
+    )
     ends_per_hour = Estimate(
-        *(rate * scans_per_hour(result) for rate in ratio_of_sums(ratios[tracker.ENDS_PER_SCAN], n))
+        *(rate * scans_per_hour(result) for rate in ratio_of_sums(ratios[track_sums.ENDS_PER_SCAN], n))
     )
     any_false = sensor.false_plots_per_km2 > 0
     false_per_hour = Estimate(*(mean_false_plots(result) * scans_per_hour(result) * rate for rate in false))
@@ -172,7 +145,7 @@ def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
             *(3600.0 / np.float64(rate) for rate in (ends_per_hour.value, ends_per_hour.hi, ends_per_hour.lo))
         )
         false_life = alive * result.axes.scan_period_s / false_found
-        in_gate = counts[:, tracker.FALSE].sum() / counts[:, tracker.LOOKED].sum()
+        in_gate = counts[:, track_sums.FALSE_IN_GATE_COUNT].sum() / counts[:, track_sums.GATE_COUNT].sum()
     return {
         **{"case": result.name, "filter": result.axes.filters[f], "association": member.association},
         **{"gate_probability": member.gate_probability, "m": member.rule.m, "of": member.rule.n, "n": n},
@@ -181,11 +154,14 @@ def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
         "false_in_gate": in_gate,
         "confirmed": statistics.rate(first_confirmed.sum(), n),
         "time_to_confirm_s|time": mean_event_time(np.asarray(result.axes.t_s, dtype=float), first_confirmed),
-        "kept_at_end|kept": statistics.rate(counts[-1, tracker.KEPT], n),
-        **{"lost": int(counts[:, tracker.LOST].sum()), "dropped": int(counts[:, tracker.DROPPED].sum())},
+        "kept_at_end|kept": statistics.rate(counts[-1, track_sums.CONFIRMED_COUNT], n),
+        **{
+            "lost": int(counts[:, track_sums.LOST_COUNT].sum()),
+            "dropped": int(counts[:, track_sums.DROPPED_COUNT].sum()),
+        },
         "ends_per_hour|ends": ends_per_hour,
         "life_s|life": life,
-        "wrong_share|wrong": ratio_of_sums(ratios[tracker.WRONG_PER_PLOT], n),
+        "wrong_share|wrong": ratio_of_sums(ratios[track_sums.WRONG_PER_PLOT], n),
         "false_confirmed": false if any_false else Estimate(0.0, 0.0, 0.0),
         "exact_false_confirmed": result.axes.exact_begun[f].sum() if any_false else 0.0,
         "false_tracks_per_hour|false": false_per_hour,
@@ -207,19 +183,19 @@ def _gates(result: CaseResult[ClutterAxes]) -> Columns:
     false_in_gate ± false: mean number of false plots in it
     """
     counts, filters = np.asarray(result.sums["counts"]), result.spec.filters
-    f, k = np.nonzero(counts[:, :, tracker.LOOKED] > 0)
+    f, k = np.nonzero(counts[:, :, track_sums.GATE_COUNT] > 0)
     rows = counts[f, k]
     gate = np.array([member.gate_probability for member in filters])
     matched = np.array([member.association == "known" and not member.manoeuvre_variance for member in filters])
     exact = np.where(matched & has_straight_course(result) & (not result.spec.target.fluctuation_mps2), gate, np.nan)
     return {
-        **leading(result, f, k),
-        "n": rows[:, tracker.LOOKED].astype(np.int64),
-        "plots": rows[:, tracker.PLOTS].astype(np.int64),
-        "inside": statistics.rate(rows[:, tracker.INSIDE], rows[:, tracker.PLOTS]),
+        **label_columns(result, f, k),
+        "n": rows[:, track_sums.GATE_COUNT].astype(np.int64),
+        "plots": rows[:, track_sums.TARGET_PLOT_COUNT].astype(np.int64),
+        "inside": statistics.rate(rows[:, track_sums.PLOTS_IN_GATE_COUNT], rows[:, track_sums.TARGET_PLOT_COUNT]),
         "exact_inside": exact[f],
-        "false_in_gate|false": poisson_rate(rows[:, tracker.FALSE], rows[:, tracker.LOOKED]),
-        "exact_false_in_gate": rows[:, tracker.EXPECTED] / rows[:, tracker.LOOKED],
+        "false_in_gate|false": poisson_rate(rows[:, track_sums.FALSE_IN_GATE_COUNT], rows[:, track_sums.GATE_COUNT]),
+        "exact_false_in_gate": rows[:, track_sums.EXPECTED_FALSE_COUNT] / rows[:, track_sums.GATE_COUNT],
     }
 
 
@@ -249,7 +225,7 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
     true, false = scores[:, :, :-1].reshape(2, -1)
     n_true, n_false = np.broadcast_to(scores[:, :, -1:], scores[:, :, :-1].shape).reshape(2, -1)
     return {
-        **leading(result, np.repeat(filter_indices, len(thresholds))),
+        **label_columns(result, np.repeat(filter_indices, len(thresholds))),
         "threshold": np.tile(thresholds, len(filter_indices)),
         "n_true": n_true.astype(np.int64),
         "true_called_false|true": statistics.rate(n_true - true, n_true),
@@ -269,7 +245,7 @@ def _rare(results: Sequence[CaseResult[ClutterAxes]]) -> "pd.DataFrame | None":
     track dropped, target's track lost; of further realisations, so that no other table changes by that.
     """
     makers = {"held": _rare_false, "ended": _rare_ends}
-    return rare.table(
+    return rare_events.rate_table(
         [make_rows(result) for result in results for name, make_rows in makers.items() if name in result.sums]
     )
 
@@ -280,34 +256,43 @@ def _rare_false(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
     is_shown[:, 0] = True
     row, k = np.nonzero(is_shown)
     f, sought = filter_indices[row], k == 0
-    rows = rare.rows(
-        leading(result, f, k), f"{FALSE} held", sought, held_tracks(result, (f, k)), sampling_weights(result, f)
+    rows = rare_events.rate_columns(
+        label_columns(result, f, k),
+        f"{FALSE_TRACK_EVENT} held",
+        sought,
+        held_tracks(result, (f, k)),
+        sampling_weights(result, f),
     )
-    return {**rows, "event": np.where(sought, FALSE, rows["event"])}
+    return {**rows, "event": np.where(sought, FALSE_TRACK_EVENT, rows["event"])}
 
 
 def _rare_ends(result: CaseResult[ClutterAxes]) -> dict[str, Any]:
-    return stacked([_ended(result, f) for f in tracker_indices(result)])
+    return stack_columns([_ended(result, f) for f in tracker_indices(result)])
 
 
 def _ended(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
     by_scan, last = np.cumsum(result.sums["ended"][f], axis=0), len(result.axes.k) - 1
     ended = by_scan.sum(axis=1)
     k = np.flatnonzero((ended[:, 2] > 0) | (np.arange(last + 1) == last))
-    weights, total = rare.Drawn(result.count, *result.sums["ended_drawn"][f]), rare.Counted(*ended[k].T)
-    curve = rare.rows(leading(result, np.full(len(k), f), k), ENDED, k == last, total, weights)
+    weights, total = (
+        rare_events.SamplingWeights(result.count, *result.sums["ended_drawn"][f]),
+        rare_events.EventWeights(*ended[k].T),
+    )
+    curve = rare_events.rate_columns(
+        label_columns(result, np.full(len(k), f), k), ENDED_TRACK_EVENT, k == last, total, weights
+    )
     curve["note"] = ends_note(weights, by_scan[k], mean_false_plots(result) > 0)
-    label = leading(result, np.array([f]), np.array([last]))
+    label = label_columns(result, np.array([f]), np.array([last]))
     parts = [curve]
     for event, kinds in KINDS_BY_EVENT.items():
-        event_counts = rare.Counted(*by_scan[last, kinds].sum(axis=0)[:, None])
-        rows = rare.rows(label, event, np.array([False]), event_counts, weights)
+        event_counts = rare_events.EventWeights(*by_scan[last, kinds].sum(axis=0)[:, None])
+        rows = rare_events.rate_columns(label, event, np.array([False]), event_counts, weights)
         parts.append(rows | {"note": ends_note(weights, by_scan[[last]], mean_false_plots(result) > 0, kinds)})
-    return stacked(parts)
+    return stack_columns(parts)
 
 
 def ends_note(
-    weights: rare.Drawn, ended: np.ndarray, among_false: bool, kinds: Sequence[int] = range(END_KINDS)
+    weights: rare_events.SamplingWeights, ended: np.ndarray, among_false: bool, kinds: Sequence[int] = range(END_KINDS)
 ) -> np.ndarray:
     """Notes (n,) on the rates at which tracks end in some of the ways, from sums (n, END_KINDS, 4).
 
@@ -315,17 +300,17 @@ def ends_note(
     beside the target's, have large weights, which the total does not show while they are few. So a part of the total is
     judged as well if by its interval it may exceed MIN_SHARE of the rate; the part beside the target's always, because
     it seems small where such tracks were missed. among_false: whether there are false plots."""
-    total = rare.Counted(*ended[:, list(kinds)].sum(axis=1).T)
-    noted_counts, rate = [total], rare.rate(total, weights).value
+    total = rare_events.EventWeights(*ended[:, list(kinds)].sum(axis=1).T)
+    noted_counts, rate = [total], rare_events.event_rate(total, weights).value
     parts = [(event_kinds, MIN_SHARE) for event_kinds in KINDS_BY_EVENT.values() if len(event_kinds) < len(kinds)]
     parts += [([kind for kind in kinds if kind in BESIDE_KINDS], 0.0)] if among_false else []
     for part_kinds, min_share in parts:
-        part_counts = rare.Counted(*ended[:, part_kinds].sum(axis=1).T)
-        matters = rare.rate(part_counts, weights).hi > min_share * rate
+        part_counts = rare_events.EventWeights(*ended[:, part_kinds].sum(axis=1).T)
+        matters = rare_events.event_rate(part_counts, weights).hi > min_share * rate
         pairs = zip(part_counts, total, strict=True)
-        noted_counts.append(rare.Counted(*(np.where(matters, part, all_ends) for part, all_ends in pairs)))
-    total_note, any_note = rare.note(weights, total), rare.note(weights, *noted_counts)
-    in_part = notes_where(any_note != "", rare.IN_PART)
+        noted_counts.append(rare_events.EventWeights(*(np.where(matters, part, all_ends) for part, all_ends in pairs)))
+    total_note, any_note = rare_events.weight_notes(weights, total), rare_events.weight_notes(weights, *noted_counts)
+    in_part = notes_where(any_note != "", rare_events.IN_PART)
     return np.where(total_note != "", total_note, in_part)
 
 

@@ -1,32 +1,20 @@
-"""Sonar filters whose gains all realisations share (P3, fixed pattern of plots), and the world that they observe.
+"""Sonar filters whose gains all realisations share (P3, fixed pattern of plots).
 
-As in `linear`, chunks stay in cache, scans are outermost, and each formula is one plain loop. A state has four rows:
+Chunks of realisations stay in cache, scans are outermost, and each formula is one plain loop. A state has four rows:
 value, rate, acceleration and the carried error of the last plot. Coordinates (range, bearing, depth) are filtered
 separately, each with its own schedule of gains. A window applies weights to a ring of the last plots. Where the pattern
-of plots differs between realisations, the filters of `patterns` are used instead."""
+of plots differs between realisations, the filters of `realisation_gains` are used instead."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.algebra import constant_acceleration, predicted
-from radarsim.kernels.compile import inline, kernel, part, summing
-from radarsim.kernels.random import U, normals
-from radarsim.studies.sonar.kernels.steps import copy_row
+from radarsim.kernels.compiler import inline, kernel, kernel_part, summing_kernel
+from radarsim.kernels.kalman_algebra import constant_acceleration, predict_state
+from radarsim.studies.sonar.kernels.small_matrices import copy_row
+from radarsim.studies.sonar.kernels.world import move_and_measure
 
 CHUNK = 512
-
-
-class World(NamedTuple):
-    """Targets and plots of K scans in C coordinates; C is even: an unused coordinate is zero."""
-
-    plots: np.ndarray  #: (2,) key of their noise
-    motion: np.ndarray  #: (2,) key of that of the motion
-    dt: np.ndarray  #: (K,) interval before a scan
-    truth: np.ndarray  #: (K, C, 3)
-    steps: np.ndarray  #: (K, C) correlation of an error with that of the previous scan
-    fresh: np.ndarray  #: (K, C) standard deviation of its new part
-    walk: np.ndarray  #: (C,) that of a random acceleration, constant over each interval
 
 
 class SharedBank(NamedTuple):
@@ -55,77 +43,31 @@ class Sums(NamedTuple):
     estimates: np.ndarray  #: (F, K, C, 3)
 
 
-# ---- the world ----------------------------------------------------------------------------------------------------
-@part
-def push(key, first, pair, dt, walk, c0, c1):
-    """Move the deviations of value and rate from the course, c0 and c1 (2, n), by random accelerations walk (2,)."""
-    k0, k1, start, walk_0, walk_1 = key[0], key[1], U(first), walk[0], walk[1]
-    for i in range(c0.shape[1]):
-        a, b = normals(k0, k1, start + U(i), pair)
-        a, b = walk_0 * a, walk_1 * b
-        c0[0, i] += dt * (c0[1, i] + 0.5 * dt * a)
-        c0[1, i] += dt * a
-        c1[0, i] += dt * (c1[1, i] + 0.5 * dt * b)
-        c1[1, i] += dt * b
-
-
-@part
-def measure(key, first, pair, step, fresh, mean, c0, c1):
-    """Compute the plots of two coordinates c0 and c1 (3, n): plots in row 0, errors in row 1, deviations in row 2.
-
-    An error becomes step · error + fresh · normal (P3 eq. 15), stationary from the first plot on; step, fresh and mean
-    (2,)."""
-    k0, k1, start = key[0], key[1], U(first)
-    step_0, step_1, fresh_0, fresh_1 = step[0], step[1], fresh[0], fresh[1]
-    mean_0, mean_1 = mean[0], mean[1]
-    for i in range(c0.shape[1]):
-        a, b = normals(k0, k1, start + U(i), pair)
-        a, b = step_0 * c0[1, i] + fresh_0 * a, step_1 * c1[1, i] + fresh_1 * b
-        c0[1, i], c1[1, i] = a, b
-        c0[0, i] = mean_0 + c0[2, i] + a
-        c1[0, i] = mean_1 + c1[2, i] + b
-
-
-@kernel
-def move_and_measure(world, first, k, plots):
-    """Compute scan k of all coordinates in place.
-
-    plots (C, 4, n) holds plot, error, and deviation of value and rate; C is even."""
-    pairs = plots.shape[0] // 2
-    for p in range(pairs):
-        c0, c1 = plots[2 * p], plots[2 * p + 1]
-        if k > 0 and (world.walk[2 * p] > 0.0 or world.walk[2 * p + 1] > 0.0):
-            push(world.motion, first, k * pairs + p, world.dt[k], world.walk[2 * p : 2 * p + 2], c0[2:], c1[2:])
-        step, fresh = world.steps[k, 2 * p : 2 * p + 2], world.fresh[k, 2 * p : 2 * p + 2]
-        measure(world.plots, first, k * pairs + p, step, fresh, world.truth[k, 2 * p : 2 * p + 2, 0], c0, c1)
-
-
-# ---- one scan of a filter -----------------------------------------------------------------------------------------
-@part
+@kernel_part
 def scan_value(x, z, dt, gain):
     """Update a filter that assumes white errors with one scan, in place: x (>= 3, n), plots z (n,), gain (>= 3,)."""
     (r, v, a), F = (x[0], x[1], x[2]), constant_acceleration(dt)
     g0, g1, g2 = gain[0], gain[1], gain[2]
     for i in range(z.size):
-        p, q, s = predicted((r[i], v[i], a[i]), F)
+        p, q, s = predict_state((r[i], v[i], a[i]), F)
         residual = z[i] - p
         r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
 
 
-@part
+@kernel_part
 def scan_carried(x, z, dt, carry, gain):
     """Update a filter that assumes correlated errors with one scan, in place: x (4, n), the last row is the error."""
     (r, v, a, e), F = (x[0], x[1], x[2], x[3]), constant_acceleration(dt)
     g0, g1, g2, g3 = gain[0], gain[1], gain[2], gain[3]
     for i in range(z.size):
-        p, q, s = predicted((r[i], v[i], a[i]), F)
+        p, q, s = predict_state((r[i], v[i], a[i]), F)
         carried = carry * e[i]
         residual = z[i] - p - carried
         r[i], v[i], a[i] = p + g0 * residual, q + g1 * residual, s + g2 * residual
         e[i] = carried + g3 * residual
 
 
-@part
+@kernel_part
 def window(x, ring, weights):
     """Estimates x (>= 3, n) as weights (3, L) of the plots in the ring (L, n)."""
     for j in range(3):
@@ -137,7 +79,7 @@ def window(x, ring, weights):
                     x[j, i] += weight * ring[q, i]
 
 
-@part
+@kernel_part
 def advance(bank, x, ring, plots, k, dt):
     """Update all filters in all coordinates with scan k, in place.
 
@@ -155,7 +97,6 @@ def advance(bank, x, ring, plots, k, dt):
                 scan_value(x[f, c], plots[c, 0], dt, bank.gain[f, k, c])
 
 
-# ---- sums ---------------------------------------------------------------------------------------------------------
 @inline
 def powers(e):
     """e, e², e³, e⁴."""
@@ -163,7 +104,7 @@ def powers(e):
     return e, ee, e * ee, ee * ee
 
 
-@summing
+@summing_kernel
 def error_sums(x, y, shift, truth, inverse, n):
     """Sums over the first n realisations of the errors of a state x (>= 3, n).
 
@@ -191,7 +132,7 @@ def error_sums(x, y, shift, truth, inverse, n):
     return (a1, a2, a3, a4, b1, b2, b3, b4, c1, c2, c3, c4), (p0, p1, p2), (q1, q2, r1, r2)
 
 
-@summing
+@summing_kernel
 def ahead_sums(x, shift, truth, dt, n):
     """Sums over the first n realisations of e, e², e³, e⁴ of the value extrapolated by dt, against the truth then."""
     half = 0.5 * dt * dt
@@ -202,7 +143,7 @@ def ahead_sums(x, shift, truth, dt, n):
     return s1, s2, s3, s4
 
 
-@part
+@kernel_part
 def add_sums(bank, x, plots, truth, k, n, baseline, sums):
     """Add the errors at scan k: x (F, C, 4, CHUNK), plots (C, 4, CHUNK), truth (C, 3)."""
     for f in range(x.shape[0]):
@@ -221,7 +162,7 @@ def add_sums(bank, x, plots, truth, k, n, baseline, sums):
                     sums.joint[f, k, c, q] += joint[q]
 
 
-@part
+@kernel_part
 def add_ahead(bank, x, plots, truth, k, dt, n, sums):
     """Add the errors at scan k of values extrapolated from scan k - 1, where the state was complete."""
     for f in range(x.shape[0]):
@@ -232,7 +173,7 @@ def add_ahead(bank, x, plots, truth, k, dt, n, sums):
                     sums.ahead[f, k - 1, c, q] += powers_of_error[q]
 
 
-@part
+@kernel_part
 def keep_errors(x, plots, truth, errors):
     """Write the errors of x (F, C, 4, CHUNK) to errors (F, C, S, n)."""
     for f in range(errors.shape[0]):

@@ -13,10 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.kernels.algebra import dot, times
-from radarsim.kernels.compile import inline, part
-from radarsim.kernels.lanes import address, full, get, get6, total, where_greater
-from radarsim.studies.sonar.kernels.steps import GROUPS, leading_inverse
+from radarsim.kernels.compiler import inline, kernel_part
+from radarsim.kernels.kalman_algebra import dot, times
+from radarsim.kernels.lane_matrices import get6
+from radarsim.kernels.lanes import address, full, get, total, where_greater
+from radarsim.studies.sonar.kernels.small_matrices import GROUPS, leading_inverse
 
 
 class Course(NamedTuple):
@@ -43,7 +44,7 @@ def rows_of(x, course, c, n, used):
     return Rows(address(x), address(shift), address(truth), address(n), address(used))
 
 
-@part
+@kernel_part
 def component_sums(j, rows, base, out):
     """Write the number of estimates, Σe, Σe², Σe³, Σe⁴ and Σe²f² of component j to out (6,).
 
@@ -71,7 +72,7 @@ def nominal_errors(rows, i, units):
     )
 
 
-@part
+@kernel_part
 def joint_sums(rows, P, size, units, out):
     """Write Σ of the diagonal of P, where estimated, and Σq, Σq², Σp, Σp², where the state is complete, to out (7,).
 
@@ -96,7 +97,7 @@ def joint_sums(rows, P, size, units, out):
     out[3], out[4], out[5], out[6] = total(q1), total(q2), total(p1), total(p2)
 
 
-@part
+@kernel_part
 def ahead_sums(rows, size, dt, out):
     """Write Σe, Σe², Σe³, Σe⁴ of the value extrapolated by dt, where the state was complete, to out (4,)."""
     x, truth, zero = rows.x, rows.truth[0], full(0.0)
@@ -110,7 +111,7 @@ def ahead_sums(rows, size, dt, out):
     out[0], out[1], out[2], out[3] = total(s1), total(s2), total(s3), total(s4)
 
 
-@part
+@kernel_part
 def add_sums(rows, P, size, x_base, size_base, units, index, out, sums):
     """Add the errors of one filter in one coordinate to sums at index (f, k, c); units (σ, period), out (7,) scratch.
 
@@ -133,7 +134,7 @@ def add_sums(rows, P, size, x_base, size_base, units, index, out, sums):
         joint[power] += out_address[3 + power]
 
 
-@part
+@kernel_part
 def add_ahead(rows, size, dt, scratch, sums_ahead):
     """Add the errors of the value extrapolated by dt to sums_ahead (4,); scratch is the address of an array (4,)."""
     ahead_sums(rows, size, dt, scratch)

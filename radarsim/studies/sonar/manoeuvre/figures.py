@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language import numeral, term, tr
-from radarsim.report import panels, tables
-from radarsim.report.drawing import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
-from radarsim.studies.sonar.figures import case_lines, manoeuvre_lines
-from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre.exact import ManoeuvreAxes
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import term, tr
+from radarsim.report import case_selection, figure_lines, key_labels, panel_layout, tables
+from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.studies.sonar.manoeuvre import detection_laws
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from radarsim.studies.sonar.sigma_figure import case_lines, manoeuvre_lines
 
 if TYPE_CHECKING:
     import pandas as pd
 
-USUAL = 0.01  # false alarms per test at which detectors are compared, or the nearest rate to it
+USUAL_FALSE_ALARM_RATE = 0.01  # false alarms per test at which detectors are compared, or the nearest rate to it
 MAX_PANELS = 4
 SYMBOLS = {
     **{"course": term("course"), "speed": term("speed"), "x_ahead": term("$x$ ahead"), "y_ahead": term("$y$ ahead")},
@@ -26,7 +27,7 @@ SYMBOLS = {
 RATIOS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)  # ticks of a measured over a believed σ
 STRENGTHS = ("acceleration_mps2", "rate_radps")  # keys that say how strong a manoeuvre is
 Results = Sequence[CaseResult[ManoeuvreAxes]]
-DRAWN_FROM = {"roc": ("detections",), "detection": ("detections",), "delay": ("delays",)}
+TABLES_OF_FIGURES = {"roc": ("detections",), "detection": ("detections",), "delay": ("delays",)}
 
 
 def figures(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") -> dict[str, Figure | None]:
@@ -52,8 +53,8 @@ def figures(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") -> d
 
 def spread_cases(results: Results) -> tuple[list[CaseResult[ManoeuvreAxes]], str]:
     """Four of the cases at most, evenly spaced from the first to the last, and words on the others."""
-    chosen = panels.spread_out(results, MAX_PANELS)
-    return chosen, panels.cases_left_out(results, chosen)
+    chosen = case_selection.pick_evenly(results, MAX_PANELS)
+    return chosen, case_selection.cases_left_out_remark(results, chosen)
 
 
 def _with_sentence(figure: Figure | None, sentence: str) -> Figure | None:
@@ -67,24 +68,24 @@ def first_component(rows: "pd.DataFrame", detector: str) -> "pd.DataFrame":
     return rows[rows["component"] == rows["component"].iloc[0]]
 
 
-def usual(rows: "pd.DataFrame", detector: str) -> "pd.DataFrame":
+def usual_rows(rows: "pd.DataFrame", detector: str) -> "pd.DataFrame":
     """The rows of a detector, first coordinate, at the threshold whose false alarm rate is nearest the usual one."""
     rows = first_component(rows, detector)
-    distance = (np.log(rows["false_alarm_probability"]) - np.log(USUAL)).abs()
+    distance = (np.log(rows["false_alarm_probability"]) - np.log(USUAL_FALSE_ALARM_RATE)).abs()
     return rows[distance <= distance.min() + 1e-9]
 
 
-def every_scan(result: CaseResult[ManoeuvreAxes]) -> list[str]:
+def usual_detectors(result: CaseResult[ManoeuvreAxes]) -> list[str]:
     """The detectors that test at every scan and whose false alarm rate is about the usual one."""
     names = []
     for detector, limits in zip(result.spec.detectors, result.axes.thresholds, strict=True):
-        rates = exact.false_alarm(limits[0])
-        if detector.test_every == 1 and np.min(np.abs(np.log(rates / USUAL))) < 0.1:
+        rates = detection_laws.false_alarm(limits[0])
+        if detector.test_every == 1 and np.min(np.abs(np.log(rates / USUAL_FALSE_ALARM_RATE))) < 0.1:
             names.append(detector.name)
     return names
 
 
-def last_of(rows: "pd.DataFrame", phase: str) -> "pd.DataFrame":
+def last_test_of_phase(rows: "pd.DataFrame", phase: str) -> "pd.DataFrame":
     """The rows of the last test of a phase."""
     rows = rows[rows["phase"] == phase]
     return rows[rows["k"] == rows["k"].max()]
@@ -95,9 +96,9 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
     figure_panels: list[Panel] = []
     for result in results:
         rows, marks = detections[detections["case"] == result.name], []
-        for n, name in enumerate(every_scan(result)):
+        for n, name in enumerate(usual_detectors(result)):
             steady, manoeuvring = (
-                last_of(first_component(rows, name), phase).sort_values("threshold_k")
+                last_test_of_phase(first_component(rows, name), phase).sort_values("threshold_k")
                 for phase in ("steady", "manoeuvre")
             )
             if not len(steady) or not len(manoeuvring):
@@ -105,10 +106,16 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
             shift = manoeuvring["shift"].iloc[0]
             if np.isfinite(shift):
                 share = np.geomspace(3e-4, 0.5, 60)
-                marks.append(Line(share, exact.detection(exact.threshold(share), shift), name, Style(n, n)))
+                marks.append(
+                    Line(share, detection_laws.detection(detection_laws.threshold(share), shift), name, Style(n, n))
+                )
             points = manoeuvring.assign(false_alarms=steady["probability"].to_numpy())
             label = "" if np.isfinite(shift) else name
-            marks.append(panels.line(points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)))
+            marks.append(
+                figure_lines.line_from_rows(
+                    points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)
+                )
+            )
         if marks:
             x = Axis(tr("false alarms a test"), "log", limits=(3e-4, 0.5))
             y = Axis(tr("detection probability"), limits=(0, 1))
@@ -134,29 +141,31 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
     figure_panels = []
     for other_keys, members in families.items():
         members.sort(key=lambda r: dict(r.swept)[key])
-        strength = panels.axis_factor(members[0], key) * np.array([dict(r.swept)[key] for r in members], dtype=float)
+        strength = key_labels.key_axis_factor(members[0], key) * np.array(
+            [dict(r.swept)[key] for r in members], dtype=float
+        )
         marks = []
-        for n, name in enumerate(every_scan(members[0])):
+        for n, name in enumerate(usual_detectors(members[0])):
             points = [_last_row(r, detections, name) for r in members]
             exact_column = ("exact",) if all(np.isfinite(point["exact"]) for point in points) else ()
             columns = ("probability", "lo", "hi", *exact_column)
-            marks.append(panels.line_of(strength, points, columns, name, Style(n, n, n)))
-        title = ", ".join(panels.with_its_unit(members[0], k, v) for k, v in other_keys)
-        x, y = Axis(panels.axis_of(members[0], key)), Axis(tr("detection probability"), limits=(0, 1))
+            marks.append(figure_lines.line_from_tables(strength, points, columns, name, Style(n, n, n)))
+        title = ", ".join(key_labels.value_with_unit(members[0], k, v) for k, v in other_keys)
+        x, y = Axis(key_labels.key_axis_label(members[0], key)), Axis(tr("detection probability"), limits=(0, 1))
         figure_panels.append(Panel(x, y, tuple(marks), title, direct=False))
     caption = tr(
         "Probability of an alarm of detectors in the range at about {usual:g} false alarms a test, at "
         "the last scan of the manoeuvre (for a steady target, at the last scan), against the manoeuvre's "
         "strength. Bands: 95 % intervals; a band that is not visible is narrower than the line.",
-        usual=USUAL,
+        usual=USUAL_FALSE_ALARM_RATE,
     )
     return _figure_of_panels("detection", tr("Detection against the strength of the manoeuvre"), caption, figure_panels)
 
 
 def _last_row(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame", name: str) -> "pd.Series":
-    rows = usual(detections[detections["case"] == result.name], name)
-    during = last_of(rows, "manoeuvre")
-    return (during if len(during) else last_of(rows, "steady")).iloc[0]
+    rows = usual_rows(detections[detections["case"] == result.name], name)
+    during = last_test_of_phase(rows, "manoeuvre")
+    return (during if len(during) else last_test_of_phase(rows, "steady")).iloc[0]
 
 
 def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
@@ -166,11 +175,13 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
         rows, marks = delays[delays["case"] == result.name], []
         detectors = zip(result.spec.detectors, result.axes.independent, strict=True)
         independent_names = [detector.name for detector, independent in detectors if independent]
-        for n, name in enumerate([*every_scan(result), *independent_names]):
-            alarms = usual(rows, name)
+        for n, name in enumerate([*usual_detectors(result), *independent_names]):
+            alarms = usual_rows(rows, name)
             alarms = alarms[alarms["event"] == "alarm"]
             if len(alarms):
-                marks.append(panels.line(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n))
+                marks.append(
+                    figure_lines.line_from_rows(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n)
+                )
         if marks:
             x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("alarm raised"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
@@ -179,20 +190,20 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
         "manoeuvre began, at about {usual:g} false alarms a test. It is known exactly where windows do "
         "not overlap and tests are independent; overlapping windows have no closed form. Bands: 95 % "
         "intervals.",
-        usual=USUAL,
+        usual=USUAL_FALSE_ALARM_RATE,
     )
     return _figure_of_panels("delay", tr("How soon a manoeuvre is detected"), caption, figure_panels)
 
 
 def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     """Probability that filters assign to a manoeuvre, against time."""
-    groups = tables.groups(modes, "case", "filter", "component")
+    groups = tables.group_by(modes, "case", "filter", "component")
     figure_panels = []
     for result in results:
         lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))
         y = Axis(tr("probability of a manoeuvre"), limits=(0, 1))
         figure_panels.append(
-            Panel(panels.time_axis(), y, (*manoeuvre_lines(result), *lines), _swept_values(result), direct=False)
+            Panel(panel_layout.time_axis(), y, (*manoeuvre_lines(result), *lines), _swept_values(result), direct=False)
         )
     caption = tr(
         "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean "
@@ -215,14 +226,14 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
                 n - len(result.axes.filters) / 2
             )
             columns = ("x", "ratio", "ratio_lo", "ratio_hi")
-            marks.append(panels.line(filter_rows.assign(x=x), columns, str(f), Style(n, None, n)))
+            marks.append(figure_lines.line_from_rows(filter_rows.assign(x=x), columns, str(f), Style(n, None, n)))
         low, high = at_time["ratio"].min(), at_time["ratio"].max()
         ratio_ticks = tuple(
             (float(value), numeral(f"{value:g}")) for value in RATIOS if low <= value <= high or value == 1
         )
         y = Axis(tr("measured / computed $\\sigma$"), "log", ticks=ratio_ticks)
         figure_panels.append(Panel(Axis("", ticks=ticks), y, tuple(marks), tr("t = {t_s:g} s", t_s=t_s), direct=False))
-    case = f" ({panels.plain(_swept_values(result))})" if result.swept else ""
+    case = f" ({key_labels.without_markup(_swept_values(result))})" if result.swept else ""
     caption = (
         tr(
             "σ about the truth over the one computed from the track's covariance to first order{case}, "
@@ -230,13 +241,13 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
             case=case,
             count=result.count,
         )
-    ) + panels.cases_left_out(results, results[:1])
+    ) + case_selection.cases_left_out_remark(results, results[:1])
     return _figure_of_panels("uses", tr("Quantities derived from a track"), caption, figure_panels, 2)
 
 
 def _swept_values(result: CaseResult[ManoeuvreAxes]) -> str:
     """The swept values, a strength with its unit."""
-    return ", ".join(panels.with_its_unit(result, key, value) for key, value in result.swept)
+    return ", ".join(key_labels.value_with_unit(result, key, value) for key, value in result.swept)
 
 
 def _figure_of_panels(

@@ -9,19 +9,20 @@ false_alarm_probability: of the threshold, by the χ² law"""
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import notes, statistics
+from radarsim.report import consistency_tables, interval_notes, statistics
 from radarsim.report import tables as common
-from radarsim.report.tables import Columns, interval_columns, leading
-from radarsim.studies.sonar.exact import sigma_acceleration
-from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre.exact import QUANTITIES, ManoeuvreAxes
+from radarsim.report.tables import Columns, interval_columns, label_columns
+from radarsim.studies.sonar.closed_forms import sigma_acceleration
+from radarsim.studies.sonar.manoeuvre import detection_laws
+from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
+from radarsim.studies.sonar.manoeuvre.track_uses import QUANTITIES
 from radarsim.studies.sonar.tables import Index
 
-table = common.Tables()
+table = common.TableMakers()
 PHASES = np.array(["steady", "manoeuvre", "after"], dtype=object)
 EVENTS = np.array(["false alarm", "alarm", "all clear"], dtype=object)  # the first of a phase
 JOINT = "joint"
-NEAR = "fails: near zero"
+NEAR_ZERO_VERDICT = "fails: near zero"
 MAX_SIGMAS_NEAR_ZERO = 3.0  # nearer to zero the errors of speeds and distances, never negative, are not of first order
 
 
@@ -58,12 +59,12 @@ def _threshold_columns(
     freedom = np.where(g == len(group_names(result)) - 1, len(group_names(result)) - 1, 1)
     return {
         "case": np.full(d.size, result.name, dtype=object),
-        "filter": common.names([detector.name for detector in result.spec.detectors], d),
-        "component": common.names(group_names(result), g),
+        "filter": common.pick_names([detector.name for detector in result.spec.detectors], d),
+        "component": common.pick_names(group_names(result), g),
         **labels,
         "plots": np.array([detector.plots for detector in result.spec.detectors], dtype=np.int64)[d],
         "threshold_k": k,
-        "false_alarm_probability": exact.false_alarm(k, freedom),
+        "false_alarm_probability": detection_laws.false_alarm(k, freedom),
     }
 
 
@@ -108,7 +109,7 @@ def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
     for phase_number in range(3):
         scans = np.arange(K)[phase == phase_number]
         reached[..., scans] = np.cumsum(first[..., scans], axis=-1)
-        law[..., scans] = exact.probability_by_then(np.nan_to_num(p[..., scans]))
+        law[..., scans] = detection_laws.probability_by_then(np.nan_to_num(p[..., scans]))
     # If the law of any test of the phase is unknown, so is that of the first event.
     unknown = np.isnan(p) & (np.asarray(result.sums["tested"])[:, :, None] > 0)
     law[unknown.any(axis=-1)] = np.nan
@@ -178,14 +179,14 @@ def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
     ]
     d, g, t = np.array(indices, dtype=np.int64).T
     units = [f"{unit}/s2" for _, unit in axes.coordinates]
-    columns = _threshold_columns(result, d, g, t, unit=common.names([*units, ""], g))
+    columns = _threshold_columns(result, d, g, t, unit=common.pick_names([*units, ""], g))
     k, n, joint = columns["threshold_k"], columns["plots"], g == len(group_names(result)) - 1
     sigma = np.append(axes.sigma, np.nan)[g]
     per_sigma = np.where(joint, np.nan, sigma_acceleration(n.astype(float), axes.scan_period_s))
     reach = {
         f"acceleration_for_{percent}_percent": sigma
         * per_sigma
-        * [exact.shift_for(percent / 100, threshold) for threshold in k]
+        * [detection_laws.shift_for(percent / 100, threshold) for threshold in k]
         for percent in (50, 68, 90)
     }
     return {
@@ -211,7 +212,7 @@ def _modes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     f, c, k = np.nonzero(np.broadcast_to(responds[:, None, None], (len(kinds), sums.shape[2], sums.shape[1])))
     total, square, plots = np.moveaxis(sums[f, k, c], -1, 0)
     return {
-        **leading(result, f, k, component=common.names([name for name, _ in result.axes.coordinates], c)),
+        **label_columns(result, f, k, component=common.pick_names([name for name, _ in result.axes.coordinates], c)),
         "n": np.full(f.size, result.count, dtype=np.int64),
         "probability|": statistics.probability(total, square, result.count),
         "memory_plots": np.where(kinds[f] == "adaptive", plots / result.count, np.nan),
@@ -234,22 +235,24 @@ def _uses(result: CaseResult[ManoeuvreAxes]) -> Columns:
     n, first, square, fourth, spread = np.moveaxis(sums[f, a, u], -1, 0)
     rms = statistics.root_mean_square(square, fourth, n)
     distance = _distance(sums, uses.true, uses.closing_mps)[f, u, a]
-    compared = notes.ratio_columns(rms, np.sqrt(spread / n))
+    compared = consistency_tables.ratio_columns(rms, np.sqrt(spread / n))
     verdict = np.select(
         [distance < MAX_SIGMAS_NEAR_ZERO, compared["ratio_lo"] > 1.05, compared["ratio_hi"] < 0.95],
-        [NEAR, "error larger", "error smaller"],
+        [NEAR_ZERO_VERDICT, "error larger", "error smaller"],
         "holds within 5 %",
     )
     names, units = zip(*QUANTITIES, strict=True)
     return {
-        **leading(result, f, uses.scans[a], component=common.names(names, u), unit=common.names(units, u)),
+        **label_columns(
+            result, f, uses.scans[a], component=common.pick_names(names, u), unit=common.pick_names(units, u)
+        ),
         "n": n.astype(np.int64),
         "true_value": uses.true[a, u],
         "bias": first / n,
         **(compared | {"sigma": rms}),
         "distance_in_sigma": distance,
         "first_order": verdict.astype(object),
-        "note": np.full(f.size, notes.VARIES, dtype=object),
+        "note": np.full(f.size, interval_notes.BELIEVED_VARIES, dtype=object),
     }
 
 

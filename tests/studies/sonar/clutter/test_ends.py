@@ -8,17 +8,16 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
-from radarsim.report import rare
+from radarsim.report import rare_events
 from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter import tables, track
-from radarsim.studies.sonar.clutter.kernels import tracker as places
-from radarsim.studies.sonar.clutter.kernels.rare import probability_outside_gate
-from radarsim.studies.sonar.kernels.shared_gains import move_and_measure
-from radarsim.studies.sonar.kernels.steps import CHUNK
+from radarsim.studies.sonar.clutter import plots, tables, tracker_design
+from radarsim.studies.sonar.clutter.kernels import track_sums
+from radarsim.studies.sonar.clutter.kernels.outside_gate import probability_outside_gate
+from radarsim.studies.sonar.kernels.small_matrices import CHUNK
+from radarsim.studies.sonar.kernels.world import move_and_measure
 from tests.studies.sonar.clutter import naive_ends
 from tests.studies.sonar.clutter.test_rare import assert_weights_rounded, words_of
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
@@ -147,15 +146,15 @@ def test_weights_and_ends_are_the_twins(density, detection):
     keys = keys_of(filters, density, detection, scans)
     case = load(keys).cases[0]
     plan = STUDY.prepare(case)
-    given, ends, seen = design.tracking_conditions(case.spec), plan.ends, np.zeros(4)
+    given, ends, seen = tracker_design.tracking_conditions(case.spec), plan.ends, np.zeros(4)
     truth = plan.axes.world.truth[:, :2, 0]
     for realisation in range(40):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         errors = errors_of(plan, realisation, scans)
         u = np.array([uniform_of(plan.axes.detections.key, realisation, k) for k in range(scans)])
-        field = lambda k, i=realisation: track.false_plots(plan.axes.field, i, k).T  # noqa: E731
-        for f, choice in enumerate(design.tracker_specs(case.spec)):
-            gate = design.gate_threshold(choice.gate_probability)
+        field = lambda k, i=realisation: plots.false_plots(plan.axes.field, i, k).T  # noqa: E731
+        for f, choice in enumerate(tracker_design.tracker_specs(case.spec)):
+            gate = tracker_design.gate_threshold(choice.gate_probability)
             laws = naive_ends.Laws(choice, given, gate, scans, choice.misses)
             mixed = ends.shares[f][ends.shares[f] > 0]
             law = int(np.searchsorted(np.cumsum(mixed), uniform_of(ends.choice, realisation, 0)))
@@ -204,7 +203,7 @@ def test_realisations_drawn_as_they_are_have_the_tracks_of_plain_sampling():
     for i in range(40):
         sums = plan.layout.unpack(STUDY.simulate(plan, i, 1))
         for f in range(2):
-            ends = sums["counts"][f][:, [places.DROPPED, places.LOST]]
+            ends = sums["counts"][f][:, [track_sums.DROPPED_COUNT, track_sums.LOST_COUNT]]
             first = ends * (np.cumsum(ends.sum(axis=1)) == 1)[:, None] * (ends.sum(axis=1) > 0)[:, None]
             assert (sums["ended"][f, :, :2, 2] == first).all()
             assert (sums["ended"][f, :, :2, 0] == first).all()
@@ -259,24 +258,24 @@ def test_tables_tell_the_curve_and_how_tracks_end():
 
 def test_few_events_in_one_way_of_ending_are_told():
     """Of 1000 effective events none is what the note of the row is about: a part of them."""
-    drawn = rare.Drawn(4_000_000, 400_000, 4e6, 4e7)
+    drawn = rare_events.SamplingWeights(4_000_000, 400_000, 4e6, 4e7)
     ways = np.zeros((1, 4, 4))  # Σw, Σw², number, Σw⁴ of each way of ending
     ways[0, 0] = 1e3, 1e3, 1000, 1e3
     sure, unsure = ways.copy(), ways.copy()
     sure[0, 2] = ways[0, 0]
     unsure[0, 2] = 30.0, 90.0, 10, 810.0
     assert tables.ends_note(drawn, sure, True)[0] == ""
-    assert tables.ends_note(drawn, unsure, True)[0] == rare.IN_PART
+    assert tables.ends_note(drawn, unsure, True)[0] == rare_events.IN_PART
     assert tables.ends_note(drawn, unsure, False)[0] == ""
     kinds = tables.KINDS_BY_EVENT["target's track dropped"]
     assert tables.ends_note(drawn, ways, False, kinds)[0] == ""
     row = {"case": "c", "filter": "f", "k": 9, "t_s": 1.0, "event": "e", "sought": True, "n": 4000, "rate": 1e-3}
-    row |= {"n_eff": 1e3, "mean_weight": 1.0, "mean_weight_se": 0.1, "note": rare.IN_PART}
-    assert rare.warnings(pd.DataFrame([row])) == []
+    row |= {"n_eff": 1e3, "mean_weight": 1.0, "mean_weight_se": 0.1, "note": rare_events.IN_PART}
+    assert rare_events.mean_weight_warnings(pd.DataFrame([row])) == []
     # Of few realisations the error of the mean weight is not known.
     few = {"n": 100, "mean_weight": 0.3, "mean_weight_se": 0.01, "note": ""}
-    assert rare.warnings(pd.DataFrame([row | few])) == []
-    assert "the mean weight is 0.3" in rare.warnings(pd.DataFrame([row | few | {"n": 200}]))[0]
+    assert rare_events.mean_weight_warnings(pd.DataFrame([row | few])) == []
+    assert "the mean weight is 0.3" in rare_events.mean_weight_warnings(pd.DataFrame([row | few | {"n": 200}]))[0]
 
 
 @pytest.mark.parametrize(
@@ -304,8 +303,11 @@ def test_intervals_of_unmarked_rows_cover(of):
     for f in range(2):
         rate = ended[:, f, :, 0].sum(axis=1).mean() / 4000
         for one, of_seed in zip(sums, ended, strict=True):
-            drawn, counted = rare.Drawn(4000, *one["ended_drawn"][f]), rare.Counted(*of_seed[f].sum(axis=0)[:, None])
-            estimate = rare.rate(counted, drawn)
+            drawn, counted = (
+                rare_events.SamplingWeights(4000, *one["ended_drawn"][f]),
+                rare_events.EventWeights(*of_seed[f].sum(axis=0)[:, None]),
+            )
+            estimate = rare_events.event_rate(counted, drawn)
             unmarked.append(tables.ends_note(drawn, of_seed[f][None], of[1] > 0)[0] == "")
             covered.append(float(estimate.lo[0]) <= rate <= float(estimate.hi[0]))
     unmarked, covered = np.array(unmarked), np.array(covered)

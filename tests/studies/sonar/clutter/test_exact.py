@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar.clutter import filters
+from radarsim.studies.sonar.clutter import initiation, tracker_design
 from tests.tolerances import assert_rounded
 
 
@@ -34,7 +34,7 @@ def test_m_of_n_is_the_sum_over_all_patterns(m, n):
     chance = np.array([0.8, 0.7, 0.0, 1.0, 0.6, 0.9, 0.5, 0.8, 0.8, 0.3])
     wanted = enumerated(chance, m, n)
     assert_rounded(
-        filters.confirmation_probabilities(chance, m, n), wanted, operations=2**10 + 10
+        initiation.confirmation_probabilities(chance, m, n), wanted, operations=2**10 + 10
     )  # patterns, and a product of each
 
 
@@ -46,7 +46,7 @@ def test_pairs_of_false_plots_far_from_any_edge():
     sigma, rule = np.array([30.0, 0.0175]), SimpleNamespace(n=3, speed=10.0, gate_probability=0.99)
     near, far = 9000.0, 9000.001
     ring = SimpleNamespace(range_m=(near - 2e3, far + 2e3), bearing_rad=(-np.pi, np.pi))
-    found = filters.false_pair_probabilities(ring, filters.Conditions(5.0, sigma, 0.9, 1e-6), rule, 10)
+    found = initiation.false_pair_probabilities(ring, tracker_design.Conditions(5.0, sigma, 0.9, 1e-6), rule, 10)
     r = np.sqrt(np.linspace((near - 2e3) ** 2, (far + 2e3) ** 2, 20_001))  # evenly in area
     gate, none, wanted = -2 * np.log(0.01), 1.0, []
     for k in (1, 2):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar.clutter import filters, track
-from radarsim.studies.sonar.clutter.kernels.tracker import OPEN_GATE
+from radarsim.studies.sonar.clutter import multi_tracker, tracker_design
+from radarsim.studies.sonar.clutter.kernels.gate import OPEN_GATE
 from tests.studies.sonar.precision import LINE, TERMS
 from tests.tolerances import Z, assert_rounded
 
@@ -12,11 +12,11 @@ SIGMA, T = np.array([30.0, 0.0175]), 5.0
 
 
 def choice(association="nearest", gate=0.99, m=3, n=4, misses=3):
-    return filters.TrackerSpec(association, gate, m, n, misses, 10.0, 10.0, np.array([1e-4, 1e-12]))
+    return tracker_design.TrackerSpec(association, gate, m, n, misses, 10.0, 10.0, np.array([1e-4, 1e-12]))
 
 
 def charted(of, scans, density=0.0, detection=0.9):
-    return track.confirmed_tracks(of, filters.Conditions(T, SIGMA, detection, density), scans)
+    return multi_tracker.confirmed_tracks(of, tracker_design.Conditions(T, SIGMA, detection, density), scans)
 
 
 def course(r, b, scans, seed, missed=()):
@@ -75,11 +75,11 @@ def test_more_tracks_than_a_chunk_holds():
 
 
 def test_gate_thresholds_and_poisson_distribution():
-    assert_rounded(filters.gate_threshold(0.99), -2 * np.log(0.01), condition=100)  # of 1 − 0.99
-    assert filters.gate_threshold(1.0) == OPEN_GATE
+    assert_rounded(tracker_design.gate_threshold(0.99), -2 * np.log(0.01), condition=100)  # of 1 − 0.99
+    assert tracker_design.gate_threshold(1.0) == OPEN_GATE
     from scipy import stats
 
     for mean in (0.0, 0.01, 1.5, 40.0):
-        share = filters.poisson_cdf(mean)
+        share = tracker_design.poisson_cdf(mean)
         assert_rounded(share, stats.poisson.cdf(np.arange(share.size), mean), condition=1 + mean, operations=10)
         assert share[-1] == 1.0

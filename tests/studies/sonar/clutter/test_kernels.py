@@ -7,12 +7,11 @@ from functools import partial
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter import track
-from radarsim.studies.sonar.clutter.filters import tracker_specs
-from radarsim.studies.sonar.clutter.kernels import tracker as places
+from radarsim.studies.sonar.clutter import plots, tracker_design
+from radarsim.studies.sonar.clutter.kernels import false_plots, gate, gate_area, track_sums
+from radarsim.studies.sonar.clutter.tracker_design import tracker_specs
 from tests.studies.sonar.clutter import naive
 from tests.studies.sonar.clutter import test_study as given
 from tests.studies.sonar.precision import LINE, TERMS
@@ -50,14 +49,14 @@ def test_estimates_are_the_twins(density):
     wanted, t, compared = tracker_specs(case.spec), plan.axes.t_s, 0
     for realisation in (0, 1, 2, 3, 511, 70_000):
         sums = sums_of(plan, realisation)
-        z, true = track.target_plots(plan.axes.world, plan.axes.detections, realisation)
-        false = [track.false_plots(plan.axes.field, realisation, k).T for k in range(len(t))]
+        z, true = plots.target_plots(plan.axes.world, plan.axes.detections, realisation)
+        false = [plots.false_plots(plan.axes.field, realisation, k).T for k in range(len(t))]
         for f, choice in enumerate(wanted):
-            gate = design.gate_threshold(choice.gate_probability)
+            gate = tracker_design.gate_threshold(choice.gate_probability)
             of = (choice, SIGMA, 0.8, choice.gate_probability, gate, density / 1e6, T)
             for k, (state, x, P) in enumerate(naive.follow(t, z, false, true, *of)):
-                assert sums["counts"][f, k, places.KEPT] == (state == 2)
-                assert sums["counts"][f, k, places.TRYING] == (state == 1)
+                assert sums["counts"][f, k, track_sums.CONFIRMED_COUNT] == (state == 2)
+                assert sums["counts"][f, k, track_sums.TENTATIVE_COUNT] == (state == 1)
                 if state == 2:
                     error = x - plan.axes.world.truth[k, :, :2].ravel()
                     # Likelihoods of plots in the gate, and what a covariance has of these, are exponentials of γ/2.
@@ -70,8 +69,8 @@ def test_estimates_are_the_twins(density):
 
 def test_without_clutter_trackers_are_the_plain_filter():
     """With open gates and with closed ones that no plot misses: the oracle's filter, and the study's own kernel."""
-    for gate in (1.0, 1 - 1e-12):
-        filters = [tracker("known", gate), tracker("nearest", gate), tracker("pda", gate)]
+    for probability in (1.0, 1 - 1e-12):
+        filters = [tracker(kind, probability) for kind in ("known", "nearest", "pda")]
         _, plan = prepared(filters)
         case = load(config([{"name": "plain", "kind": "kalman", "manoeuvre_variance": 1e-3}], detection=0.5)).cases[0]
         plain = STUDY.prepare(case)
@@ -102,7 +101,7 @@ def test_the_field_is_poisson_and_even_in_area():
     """Numbers in a sector, over realisations, and places of their plots, against their laws."""
     _, plan = prepared([tracker("pda")], density=2.0)
     area = plan.axes.area_m2
-    found = [track.false_plots(plan.axes.field, i, 3) for i in range(2000)]
+    found = [plots.false_plots(plan.axes.field, i, 3) for i in range(2000)]
     number = np.array([one.shape[1] for one in found])
     mean = 2e-6 * area
     assert abs(number.mean() - mean) < mean_error(2000, np.sqrt(mean))
@@ -123,9 +122,9 @@ def test_a_full_circle_has_no_seam():
         one["target"], one["sensor"]["sector"] = target, {"range_m": [7e3, 11e3], "bearing_deg": [first, first + 360]}
         plan = STUDY.prepare(load(one).cases[0])
         found = sums_of(plan, 0, 512)["counts"][0]
-        assert found[2:, places.PLOTS].sum() == 512 * 28
-        counts.append(found[:, places.FALSE].sum() / found[:, places.EXPECTED].sum())
-        expected = found[:, places.EXPECTED].sum()
+        assert found[2:, track_sums.TARGET_PLOT_COUNT].sum() == 512 * 28
+        counts.append(found[:, track_sums.FALSE_IN_GATE_COUNT].sum() / found[:, track_sums.EXPECTED_FALSE_COUNT].sum())
+        expected = found[:, track_sums.EXPECTED_FALSE_COUNT].sum()
     assert np.abs(np.array(counts) - 1).max() < Z / np.sqrt(expected)
 
 
@@ -134,11 +133,11 @@ def gate_and_sector(seed):
     """A gate of any size and slant about a sector from 1 to 15 km, over its edges or not; every fifth is a circle."""
     rng = np.random.default_rng(seed)
     half, ring = (math.pi, True) if seed % 5 == 0 else (rng.uniform(0.2, 1.0), False)
-    cells = places.Cells(0.5e6, (0.5 * 15e3**2 - 0.5e6) / 20, 20, 0.3 - half, half / 5, 10, ring, 1e-6)
+    cells = false_plots.Cells(0.5e6, (0.5 * 15e3**2 - 0.5e6) / 20, 20, 0.3 - half, half / 5, 10, ring, 1e-6)
     sigma, rho = np.array([rng.uniform(30, 3000), rng.uniform(0.01, 0.9)]), rng.uniform(-0.95, 0.95)
     S = sigma[0] ** 2, rho * sigma[0] * sigma[1], sigma[1] ** 2
     place = rng.uniform(500, 16e3), 0.3 + rng.uniform(-1.2, 1.2) * half + 2 * math.pi * rng.integers(-1, 2)
-    return places.Gate(*place, S, True), cells, rng.uniform(1, 20)
+    return gate.Gate(*place, S, True), cells, rng.uniform(1, 20)
 
 
 @pytest.mark.parametrize("seed", range(25))
@@ -155,14 +154,14 @@ def test_the_area_of_a_gate_within_the_sector_is_that_of_its_points(seed):
     inside = (np.abs(bearing) <= half) & (ranges >= 1e3) & (ranges <= 15e3)
     scale = math.pi * root[0, 0] * root[1, 1]
     det = S[0] * S[2] - S[1] ** 2
-    found = places.gate_area.py_func(places.Gate(r, b, S, True), det, threshold, cells)
+    found = gate_area.gate_area.py_func(gate.Gate(r, b, S, True), det, threshold, cells)
     assert found == pytest.approx(scale * (ranges * inside).mean(), abs=8 / n * scale * (r + root[0, 0]))
 
 
 def test_a_gate_within_the_sector_has_its_own_area_and_an_open_one_the_sectors():
     _, cells, _ = gate_and_sector(1)
-    small = places.Gate(8e3, 0.3, (900.0, 0.0, 3e-4), True)
-    area = places.gate_area.py_func(small, 900.0 * 3e-4, 9.0, cells)
+    small = gate.Gate(8e3, 0.3, (900.0, 0.0, 3e-4), True)
+    area = gate_area.gate_area.py_func(small, 900.0 * 3e-4, 9.0, cells)
     assert_rounded(area, 8e3 * math.pi * 9 * math.sqrt(0.27), operations=8)
-    whole = places.gate_area.py_func(small, 0.27, places.OPEN_GATE, cells)
+    whole = gate_area.gate_area.py_func(small, 0.27, gate.OPEN_GATE, cells)
     assert_rounded(whole, 0.5 * (15e3**2 - 1e6) * cells.nb * cells.db, operations=8)

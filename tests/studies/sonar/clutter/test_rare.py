@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app.configs import load
-from radarsim.app.solve import RESIDUE, solve
+from radarsim.api.configs import load
+from radarsim.api.design.sampled_solve import RESIDUE
+from radarsim.api.design.solve import solve
 from radarsim.errors import ConfigError
 from radarsim.kernels import random
 from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar.clutter import filters as design
-from radarsim.studies.sonar.clutter import track
-from radarsim.studies.sonar.clutter.kernels import tracker as places
-from radarsim.studies.sonar.clutter.kernels.rare import FalseTrackLaws
+from radarsim.studies.sonar.clutter import plots, tracker_design
+from radarsim.studies.sonar.clutter.kernels import track_sums
+from radarsim.studies.sonar.clutter.kernels.rare_false_tracks import FalseTrackLaws
 from tests.studies.sonar.clutter.naive_false import FalseTrack
 from tests.studies.sonar.clutter.test_study import config, simulated, tracker
 from tests.studies.sonar.precision import LINE, TERMS
@@ -54,7 +54,7 @@ def share(plan, n, f=0):
 
 def brute(plan, n, f=0):
     """The share of n plain tracks that are confirmed, and its standard error."""
-    found = simulated(plan, n)["begun"][f, :, places.FALSE_FOUND].sum()
+    found = simulated(plan, n)["begun"][f, :, track_sums.FALSE_NEWLY_CONFIRMED].sum()
     return found / n, math.sqrt(max(found, 1)) / n
 
 
@@ -95,7 +95,7 @@ def test_weights_and_lives_are_the_twins(density, rare):
     filters = [tracker("near"), tracker("pda", "pda", 3, 5), tracker("wide", m=4, n=6, gate=0.9999)]
     case = case_of(filters, density, scans=12, rare=rare)
     plan = STUDY.prepare(case)
-    given, shares, seen = design.tracking_conditions(case.spec), plan.shift.shares, np.zeros(3)
+    given, shares, seen = tracker_design.tracking_conditions(case.spec), plan.shift.shares, np.zeros(3)
     for realisation in range(150):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
         u, v = uniforms(plan.seeds, realisation)
@@ -103,9 +103,9 @@ def test_weights_and_lives_are_the_twins(density, rare):
         first = np.array([math.sqrt(near**2 + (far**2 - near**2) * u), left + (right - left) * v])
         law = int(np.searchsorted(np.cumsum(shares), uniforms(plan.shift.choice, realisation)[0]))
         words = words_of(plan.shift.plots, realisation)
-        for f, choice in enumerate(design.tracker_specs(case.spec)):
-            gate = design.gate_threshold(choice.gate_probability)
-            field = lambda k, i=realisation: track.false_plots(plan.field_about_false, i, k).T  # noqa: E731
+        for f, choice in enumerate(tracker_design.tracker_specs(case.spec)):
+            gate = tracker_design.gate_threshold(choice.gate_probability)
+            field = lambda k, i=realisation: plots.false_plots(plan.field_about_false, i, k).T  # noqa: E731
             weight, held = FalseTrack(choice, given, gate, SECTOR, words, field).follow(first, 12, law, shares)
             assert_weights_rounded(sums["drawn"][f], [float(law == 0), weight, weight**2], 12)
             expected = np.zeros((12, 4))
@@ -160,7 +160,7 @@ def test_false_tracks_are_those_of_plain_sampling(density):
         other, its = brute(plain, 100_000, f)
         assert abs(p - other) < 4 * math.hypot(error, its)
         life = held[f, :, 0].sum() / held[f, 0, 0]
-        its_life = begun[f, :, places.FALSE_KEPT].sum() / begun[f, :, places.FALSE_FOUND].sum()
+        its_life = begun[f, :, track_sums.FALSE_CONFIRMED].sum() / begun[f, :, track_sums.FALSE_NEWLY_CONFIRMED].sum()
         assert life == pytest.approx(its_life, rel=4 * math.hypot(error / p, its / other))  # lives spread as their mean
 
 
@@ -227,8 +227,8 @@ def test_gates_full_of_false_plots_are_left_as_they_are():
     weighted, plain = plan_of(filters, 2.0), plan_of(filters, 2.0, sought=False)
     drawn, begun = simulated(weighted, 700), simulated(plain, 700)["begun"]
     assert (drawn["drawn"][:, 1:] == 700).all()
-    assert (drawn["held"][:, 0, 2] == begun[:, :, places.FALSE_FOUND].sum(axis=1)).all()
-    assert (drawn["held"][:, :, 2].sum(axis=1) == begun[:, :, places.FALSE_KEPT].sum(axis=1)).all()
+    assert (drawn["held"][:, 0, 2] == begun[:, :, track_sums.FALSE_NEWLY_CONFIRMED].sum(axis=1)).all()
+    assert (drawn["held"][:, :, 2].sum(axis=1) == begun[:, :, track_sums.FALSE_CONFIRMED].sum(axis=1)).all()
 
 
 def test_the_target_is_left_alone():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar.clutter.kernels import tracker as places
+from radarsim.studies.sonar.clutter.kernels import track_sums
 from tests.tolerances import Z, assert_rounded, mean_error
 
 N = 100_000
@@ -51,7 +51,15 @@ def assert_binomial(found, n, p):
 
 def gates_of(plan):
     counts = simulated(plan)["counts"][:, 2:]
-    return tuple(counts[..., place] for place in (places.PLOTS, places.INSIDE, places.FALSE, places.EXPECTED))
+    return tuple(
+        counts[..., place]
+        for place in (
+            track_sums.TARGET_PLOT_COUNT,
+            track_sums.PLOTS_IN_GATE_COUNT,
+            track_sums.FALSE_IN_GATE_COUNT,
+            track_sums.EXPECTED_FALSE_COUNT,
+        )
+    )
 
 
 def test_gates_hold_target_and_false_plots_as_they_should():
@@ -78,7 +86,7 @@ def test_initiation_follows_its_exact_law(m, n):
     )
     sums, exact = simulated(plan), plan.axes.exact_confirmed
     assert np.isfinite(exact).all()
-    assert_binomial(np.cumsum(sums["counts"][:, :, places.FOUND], axis=1), N, exact)
+    assert_binomial(np.cumsum(sums["counts"][:, :, track_sums.FIRST_CONFIRMED_COUNT], axis=1), N, exact)
     assert (sums["begun"] == 0).all()
     assert (sums["ratios"][:, 1, 0] == 0).all()
 
@@ -115,13 +123,13 @@ def test_every_track_of_the_target_is_accounted_for():
     plan = prepared([tracker("a"), tracker("b", "pda")], density=3.0, detection=0.8, scans=20)
     sums = simulated(plan, 20_000)
     counts = sums["counts"]
-    ends = counts[:, :, [places.LOST, places.DROPPED]].sum(axis=(1, 2))
+    ends = counts[:, :, [track_sums.LOST_COUNT, track_sums.DROPPED_COUNT]].sum(axis=(1, 2))
     assert (sums["ratios"][:, 0, 0] == ends).all()
-    assert (sums["ratios"][:, 0, 2] == counts[:, :, places.KEPT].sum(axis=1)).all()
-    assert (sums["estimates"][:, :, 0] == counts[:, :, places.KEPT]).all()
-    assert (counts[:, :, places.KEPT] + counts[:, :, places.TRYING] <= 20_000).all()
-    assert (counts[:, :, places.LOST].sum(axis=1) > 100).all()
-    assert (counts[:, :, places.FOUND].sum(axis=1) <= 20_000).all()
+    assert (sums["ratios"][:, 0, 2] == counts[:, :, track_sums.CONFIRMED_COUNT].sum(axis=1)).all()
+    assert (sums["estimates"][:, :, 0] == counts[:, :, track_sums.CONFIRMED_COUNT]).all()
+    assert (counts[:, :, track_sums.CONFIRMED_COUNT] + counts[:, :, track_sums.TENTATIVE_COUNT] <= 20_000).all()
+    assert (counts[:, :, track_sums.LOST_COUNT].sum(axis=1) > 100).all()
+    assert (counts[:, :, track_sums.FIRST_CONFIRMED_COUNT].sum(axis=1) <= 20_000).all()
 
 
 @pytest.mark.slow
@@ -134,7 +142,7 @@ def test_probabilistic_association_keeps_a_track_longer():
 
 def test_a_target_outside_the_sector_is_not_seen():
     plan = prepared([tracker("a", "known")], sector={"range_m": [7e3, 8990.0], "bearing_deg": [5, 40]})
-    kept = simulated(plan, 512)["counts"][0, :, places.KEPT]
+    kept = simulated(plan, 512)["counts"][0, :, track_sums.CONFIRMED_COUNT]
     assert plan.axes.detections.certain.tolist() == [0] + [1] * 9  # 9000 m at first, 4 m/s less
     assert kept.tolist() == [0, 0] + [512] * 8
 
@@ -144,7 +152,9 @@ def test_whole_turns_of_the_sector_change_nothing(first):
     sector = {"range_m": [7e3, 11e3], "bearing_deg": [first + 5, first + 40]}
     plan = prepared([tracker("a"), tracker("b", "pda")], density=2.0, sector=sector)
     counts = simulated(plan, 512)["counts"]
-    false, expected = (counts[..., place].sum(axis=1) for place in (places.FALSE, places.EXPECTED))
+    false, expected = (
+        counts[..., place].sum(axis=1) for place in (track_sums.FALSE_IN_GATE_COUNT, track_sums.EXPECTED_FALSE_COUNT)
+    )
     assert (np.abs(false / expected - 1) < Z / np.sqrt(expected)).all()
 
 
@@ -158,9 +168,9 @@ def test_an_open_gate_holds_the_whole_field(bearing_deg):
     assert all(np.isfinite(values).all() for values in found.values())
     counts = found["counts"].sum(axis=1)
     area = np.ptp(np.radians(bearing_deg)) * (11e3**2 - 7e3**2) / 2
-    expected, looked = counts[:, places.EXPECTED], counts[:, places.LOOKED]
+    expected, looked = counts[:, track_sums.EXPECTED_FALSE_COUNT], counts[:, track_sums.GATE_COUNT]
     assert_rounded(expected, looked * area * 0.3e-6, operations=looked.max() + 10)  # a sum of as many
-    assert (np.abs(counts[:, places.FALSE] / expected - 1) < Z / np.sqrt(expected)).all()
+    assert (np.abs(counts[:, track_sums.FALSE_IN_GATE_COUNT] / expected - 1) < Z / np.sqrt(expected)).all()
 
 
 def test_a_target_that_passes_close_by_the_sonar_leaves_numbers():

@@ -6,9 +6,8 @@ from scipy import stats
 
 import radarsim
 from radarsim.report import wording
-from radarsim.studies.sonar.clutter import figures, words
-from radarsim.studies.sonar.clutter import tables as report
-from radarsim.studies.sonar.clutter.kernels import tracker
+from radarsim.studies.sonar.clutter import answer, figures, intervals
+from radarsim.studies.sonar.clutter.kernels import track_sums
 from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, share_error
 
@@ -54,11 +53,11 @@ def test_a_tracker_that_confirms_nothing_keeps_no_track(result):
     table = result.tables["tracking"].copy()
     lost = table["filter"] == "PDA"
     table.loc[lost, ["confirmed", "ends_per_hour", "life_s", "time_to_confirm_s"]] = [0.0, np.nan, np.nan, np.nan]
-    first, others = answer_texts(words, result.cases, {"tracking": table})
+    first, others = answer_texts(answer, result.cases, {"tracking": table})
     assert ": nearest confirms " in first
     assert others == "The others there: PDA confirms no track."
     table.loc[:, ["confirmed", "ends_per_hour"]] = [0.0, np.nan]
-    assert "confirms no track" in answer_texts(words, result.cases, {"tracking": table})[0]
+    assert "confirms no track" in answer_texts(answer, result.cases, {"tracking": table})[0]
 
 
 def test_tables_say_what_the_sums_hold(result):
@@ -68,11 +67,11 @@ def test_tables_say_what_the_sums_hold(result):
     case = result.cases[2]
     counts = case.sums["counts"][1]
     rows = tracks[(tracks["case"] == case.name) & (tracks["filter"] == "PDA")]
-    assert (rows["kept"] == counts[:, tracker.KEPT] / 2000).all()
-    assert rows["lost"].sum() == counts[:, tracker.LOST].sum()
+    assert (rows["kept"] == counts[:, track_sums.CONFIRMED_COUNT] / 2000).all()
+    assert rows["lost"].sum() == counts[:, track_sums.LOST_COUNT].sum()
     row = tracking[(tracking["case"] == case.name) & (tracking["filter"] == "PDA")].iloc[0]
-    held = counts[:, tracker.KEPT].sum() * 5.0
-    ends = counts[:, [tracker.LOST, tracker.DROPPED]].sum()
+    held = counts[:, track_sums.CONFIRMED_COUNT].sum() * 5.0
+    ends = counts[:, [track_sums.LOST_COUNT, track_sums.DROPPED_COUNT]].sum()
     assert_rounded(row["life_s"], held / ends, operations=6)
     assert_rounded(row["ends_per_hour"], 3600 * ends / held, operations=6)
     assert row["life_lo"] < row["life_s"] < row["life_hi"]
@@ -137,7 +136,7 @@ def test_false_tracks_that_did_not_occur_are_drawn_as_the_upper_end_of_their_int
 
 def test_what_does_not_change_over_a_sweep_is_said_and_rare_ends_are_drawn():
     result = radarsim.run("sonar_clutter_ends", realisations=60)
-    figure = result._described["track_life"]
+    figure = result._figures_by_name["track_life"]
     assert figure.panels[0].y.label == "share of tracks ended by the last scan"
     assert "time to confirmation, s" not in {panel.y.label for panel in figure.panels}
     table = result.tables["tracking"]
@@ -160,25 +159,25 @@ def test_intervals_of_a_ratio_and_of_a_poisson_number_cover():
         held = rng.poisson(30, n) + 1.0
         ends = rng.poisson(0.02 * held)
         sums = [ends.sum(), (ends**2).sum(), held.sum(), (held**2).sum(), (ends * held).sum()]
-        of = report.ratio_of_sums(np.array(sums, dtype=float), n)
+        of = intervals.ratio_of_sums(np.array(sums, dtype=float), n)
         inside += of.lo <= 0.02 <= of.hi
     assert inside >= stats.binom.ppf(5e-5, 1000, 0.94)
     count = rng.poisson(7.0, 20_000)
-    of = report.poisson_rate(count, 1.0)
+    of = intervals.poisson_rate(count, 1.0)
     assert np.mean((of.lo <= 7.0) & (of.hi >= 7.0)) >= 0.95 - share_error(0.05, 20_000)
     # Wilson and Hilferty's largest error is that of two events, 0.2246 for 0.2422; of none the end is zero.
     assert of.lo == pytest.approx(np.where(count, stats.chi2.ppf(0.025, 2 * count) / 2, 0.0), abs=0.0176)
 
 
 def test_ratio_without_events_or_exposure():
-    none = report.ratio_of_sums(np.array([0.0, 0.0, 100.0, 1.0, 0.0]), 10)
+    none = intervals.ratio_of_sums(np.array([0.0, 0.0, 100.0, 1.0, 0.0]), 10)
     assert (none.value, none.lo) == (0.0, 0.0)
     assert none.hi == pytest.approx(3.689 / 100, rel=0.006)  # Wilson and Hilferty's 3.668
-    assert np.isnan(report.ratio_of_sums(np.zeros(5), 10).value)
+    assert np.isnan(intervals.ratio_of_sums(np.zeros(5), 10).value)
 
 
 def test_mean_time_has_the_interval_of_its_spread():
-    of = report.mean_event_time(np.array([0.0, 5.0, 10.0]), np.array([0.0, 300.0, 100.0]))
+    of = intervals.mean_event_time(np.array([0.0, 5.0, 10.0]), np.array([0.0, 300.0, 100.0]))
     assert of.value == 6.25
     assert of.hi - of.value == pytest.approx(1.966 * np.sqrt(4.6875 / 399), rel=5e-4 / 1.966)  # Student's printed value
-    assert np.isnan(report.mean_event_time(np.array([0.0]), np.array([0.0])).value)
+    assert np.isnan(intervals.mean_event_time(np.array([0.0]), np.array([0.0])).value)

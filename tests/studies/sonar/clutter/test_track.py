@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarsim.app import run
+from radarsim.api import load_experiments
 from radarsim.errors import ConfigError
-from radarsim.recorded import follow
-from tests.recorded import whole
+from radarsim.recordings import simulate_plots
+from tests.recordings import whole
 from tests.studies.sonar.precision import LINE, TERMS
 from tests.tolerances import Z, assert_rounded
 
@@ -17,7 +17,7 @@ ONE = ("sweep.sensor.false_plots_per_km2=[0.03]",)
 
 
 def loaded(name="sonar_clutter", overrides=ONE):
-    return run.load_all([name], overrides)[0]
+    return load_experiments.load_all([name], overrides)[0]
 
 
 def written(path, rows):
@@ -26,7 +26,7 @@ def written(path, rows):
 
 
 def test_the_example_is_realisation_3_of_the_shipped_config():
-    columns = follow.simulated(loaded(), 3)
+    columns = simulate_plots.simulate_realisation(loaded(), 3)
     kept = np.genfromtxt(EXAMPLE, delimiter=",", names=True)
     assert list(columns) == list(kept.dtype.names)
     for name, values in columns.items():
@@ -69,8 +69,8 @@ def test_one_plot_a_scan_is_the_plain_filter(tmp_path):
     sector = {"range_m": [1e3, 2e4], "bearing_rad": [-1, 1]}
     rules = {"kind": "kalman", "manoeuvre_variance": 1e-4, "name": "a"}
     tracker = {**rules, "association": "nearest", "gate_probability": 1.0}
-    (one,) = run.load_all([base | {"sensor": sensor, "filters": [rules]}])
-    (other,) = run.load_all([base | {"sensor": sensor | {"sector": sector}, "filters": [tracker]}])
+    (one,) = load_experiments.load_all([base | {"sensor": sensor, "filters": [rules]}])
+    (other,) = load_experiments.load_all([base | {"sensor": sensor | {"sector": sector}, "filters": [tracker]}])
     _, plain = whole.track(one, path)
     _, found = whole.track(other, path)
     assert found.estimate.shape == plain.estimate.shape

@@ -4,39 +4,46 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from radarsim.studies.sonar import exact as least_squares
-from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar import closed_forms, least_squares
+from radarsim.studies.sonar.manoeuvre import detection_laws, switched_window, track_uses
 from tests.studies.sonar.precision import PARABOLA, TERMS
 from tests.tolerances import assert_rounded, mean_error, rounding, sigma_error
 
 
 def test_the_papers_k_of_one():
     """0.683 is no alarm without a manoeuvre; to detect as often takes 1.456 σ_a, and one σ_a gives 0.523 (P3 eq. 3)."""
-    assert 1 - exact.false_alarm(1.0) == pytest.approx(0.683, abs=5e-4)
-    assert exact.detection(1.0, 1.0) == pytest.approx(0.523, abs=5e-4)
-    assert exact.shift_for(1 - exact.false_alarm(1.0), 1.0) == pytest.approx(1.456, abs=5e-4)
-    assert exact.shift_for(0.3, 1.0) == 0.0
+    assert 1 - detection_laws.false_alarm(1.0) == pytest.approx(0.683, abs=5e-4)
+    assert detection_laws.detection(1.0, 1.0) == pytest.approx(0.523, abs=5e-4)
+    assert detection_laws.shift_for(1 - detection_laws.false_alarm(1.0), 1.0) == pytest.approx(1.456, abs=5e-4)
+    assert detection_laws.shift_for(0.3, 1.0) == 0.0
 
 
 @pytest.mark.parametrize("coordinates", [1, 2, 3])
 def test_thresholds_undo_false_alarms(coordinates):
     p = np.array([0.5, 0.1, 1e-3, 1e-9])
-    k = exact.threshold(p, coordinates)
+    k = detection_laws.threshold(p, coordinates)
     # An error of k is multiplied by k/2 in an exponential, of its root as well; ten units to a special function.
-    assert_rounded(exact.false_alarm(k, coordinates), p, (1 + k) * p, operations=20)
-    assert_rounded(exact.detection(k, 0.0, coordinates), p, (1 + k) * p, operations=20)
+    assert_rounded(detection_laws.false_alarm(k, coordinates), p, (1 + k) * p, operations=20)
+    assert_rounded(detection_laws.detection(k, 0.0, coordinates), p, (1 + k) * p, operations=20)
 
 
 def test_detection_is_the_noncentral_law():
     k, shift = np.array([[0.5], [4.0], [20.0]]), np.array([0.3, 1.0, 5.0])
     law = stats.ncx2.sf(k, 1, shift**2)
-    assert_rounded(exact.detection(k, shift), law, (1 + k) * law, operations=100)  # as many terms of the series
+    assert_rounded(
+        detection_laws.detection(k, shift), law, (1 + k) * law, operations=100
+    )  # as many terms of the series
     # Two coordinates: condition on the second, x = √6 sin θ or beyond, where the first decides nothing.
     nodes, weights = np.polynomial.legendre.leggauss(60)
     sine, cosine = np.sin(np.pi / 2 * nodes), np.cos(np.pi / 2 * nodes)
-    inner = exact.detection(6.0 * cosine**2, 1.2) * stats.norm.pdf(np.sqrt(6.0) * sine - 0.7) * np.sqrt(6.0) * cosine
+    inner = (
+        detection_laws.detection(6.0 * cosine**2, 1.2)
+        * stats.norm.pdf(np.sqrt(6.0) * sine - 0.7)
+        * np.sqrt(6.0)
+        * cosine
+    )
     mixed = np.pi / 2 * weights @ inner + stats.norm.sf(np.sqrt(6.0) - 0.7) + stats.norm.cdf(-np.sqrt(6.0) - 0.7)
-    assert_rounded(exact.detection(6.0, np.hypot(1.2, 0.7), 2), mixed, operations=100)
+    assert_rounded(detection_laws.detection(6.0, np.hypot(1.2, 0.7), 2), mixed, operations=100)
 
 
 def test_acceleration_of_a_window_has_the_papers_variance():
@@ -44,22 +51,22 @@ def test_acceleration_of_a_window_has_the_papers_variance():
         t = np.arange(n) * 2.0
         weights, _ = least_squares.generalised_least_squares(t, np.eye(n), 3)
         course = 7 - t + 0.3 * t**2 / 2
-        mean, variance = exact.acceleration_law(weights[2:], course, 4.0 * np.eye(n), np.zeros((n, 1)))
+        mean, variance = detection_laws.acceleration_law(weights[2:], course, 4.0 * np.eye(n), np.zeros((n, 1)))
         size = np.abs(weights[2:]) @ np.abs(course)
         assert_rounded(mean, [0.3], size, condition=np.sqrt(PARABOLA), operations=n * TERMS)
-        sigma = 2.0 * least_squares.sigma_acceleration(n, 2.0)
+        sigma = 2.0 * closed_forms.sigma_acceleration(n, 2.0)
         assert_rounded(np.sqrt(variance), [sigma], condition=PARABOLA, operations=n * TERMS)
 
 
 def test_a_random_push_adds_to_the_variance():
     """Pushes are independent: each adds the square of what it moves."""
     weights, pushes = np.array([[1.0, -2.0, 1.0]]), np.array([[0.0, 0.0], [1.0, 0.0], [4.0, 3.0]])
-    _, variance = exact.acceleration_law(weights, np.zeros(3), np.eye(3), pushes)
+    _, variance = detection_laws.acceleration_law(weights, np.zeros(3), np.eye(3), pushes)
     assert variance == [6 + 2**2 + 3**2]
 
 
 def test_first_of_independent_tests():
-    assert exact.probability_by_then(np.array([0.5, 0.0, 0.5])).tolist() == [0.5, 0.5, 0.75]
+    assert detection_laws.probability_by_then(np.array([0.5, 0.0, 0.5])).tolist() == [0.5, 0.5, 0.75]
 
 
 # ---- the degree of a window switched by the detector -----------------------------------------------------------------
@@ -77,7 +84,7 @@ def course(acceleration):
 def test_by_plain_simulation(memory, plots, rate):
     truth, n = course(0.4), 20_000
     k = stats.chi2.isf(rate, 1)
-    of = exact.switched_window(truth, SIGMA, DT, memory, plots, k)
+    of = switched_window.switched_window(truth, SIGMA, DT, memory, plots, k)
     z = truth + SIGMA * np.random.default_rng(8).standard_normal((n, len(truth)))
     t, s = DT * np.arange(1 - memory, 1), DT * np.arange(1 - plots, 1)
     fits = [np.linalg.pinv(t[:, None] ** np.arange(d + 1))[0] for d in (1, 2)]
@@ -95,7 +102,7 @@ def test_by_plain_simulation(memory, plots, rate):
 def test_what_the_papers_own_six_plots_give():
     found = []
     for acceleration in (0.1, 0.8):  # the weakest and the strongest shipped manoeuvre
-        of = exact.switched_window(course(acceleration), SIGMA, DT, 6, 6, stats.chi2.isf(0.01, 1))
+        of = switched_window.switched_window(course(acceleration), SIGMA, DT, 6, 6, stats.chi2.isf(0.01, 1))
         rms = [np.sqrt(np.mean(one**2)) for one in of]
         found += [rms[0] / rms[2], rms[1] / rms[2]]
     assert found == pytest.approx([0.975, 1.188, 1.867, 1.101], abs=5e-4)  # three digits
@@ -110,17 +117,17 @@ P = np.array([[[100.0, 5.0, 1.0], [1e-4, 1e-6, 4e-8]], [[25.0, -1.0, 0.5], [4e-5
 def test_flat_states_move_as_their_rates_say():
     dt = 1e-4
     later = POLAR + np.stack([POLAR[..., 1] * dt, np.zeros((2, 2))], axis=-1)
-    now, then = (exact.cartesian_track(state, True) for state in (POLAR, later))
+    now, then = (track_uses.cartesian_track(state, True) for state in (POLAR, later))
     (r, vr), (_, vb) = np.abs(np.moveaxis(POLAR, 0, -1))
     # The difference's own error, dt/2 times the acceleration, and rounding of the range.
     allowed = dt / 2 * (2 * vr * vb + r * vb**2) + rounding(operations=4) * r / dt
     assert (np.abs((then - now)[:, :2] / dt - now[:, 2:]) <= allowed[:, None]).all()
-    assert exact.cartesian_track(np.array([[1.0, 2.0], [3.0, 4.0]]), False).tolist() == [1.0, 3.0, 2.0, 4.0]
+    assert track_uses.cartesian_track(np.array([[1.0, 2.0], [3.0, 4.0]]), False).tolist() == [1.0, 3.0, 2.0, 4.0]
 
 
 def test_closest_approach_is_the_least_distance():
-    track = exact.cartesian_track(POLAR, True)
-    found = exact.uses(track, OWN, 60.0)
+    track = track_uses.cartesian_track(POLAR, True)
+    found = track_uses.uses(track, OWN, 60.0)
     t = np.linspace(-3000, 3000, 600_001)
     for one, row in zip(track, found, strict=True):
         apart = one - OWN
@@ -135,14 +142,14 @@ def test_closest_approach_is_the_least_distance():
 
 
 def test_gradients_are_derivatives():
-    track = exact.cartesian_track(POLAR, True)
-    found = exact.gradients(track, OWN, 60.0)
+    track = track_uses.cartesian_track(POLAR, True)
+    found = track_uses.gradients(track, OWN, 60.0)
     distance, speed = np.hypot(*(track - OWN).T[:2]), np.minimum(np.hypot(*track.T[2:]), np.hypot(*(track - OWN).T[2:]))
     reach = np.abs(track[:, :2]).max(axis=1) + 60 * np.abs(track[:, 2:]).max(axis=1)
     size = np.stack([np.full(2, np.pi), 2 * speed, reach, reach, distance, distance / speed], axis=1)
     for i, step in enumerate((1e-2, 1e-2, 1e-5, 1e-5)):
         shift = step * np.eye(4)[i]
-        change = exact.uses(track + shift, OWN, 60.0) - exact.uses(track - shift, OWN, 60.0)
+        change = track_uses.uses(track + shift, OWN, 60.0) - track_uses.uses(track - shift, OWN, 60.0)
         # Rounding of what is differenced; the third derivative by the speed, of which all are ratios, to the third.
         allowed = rounding(operations=10) * size / step + (size / speed[:, None] ** 3 * step**2 if i > 1 else 0.0)
         assert (np.abs(found[..., i] - change / (2 * step)) <= allowed).all()
@@ -155,13 +162,13 @@ def test_spread_is_that_of_samples(polar):
     if polar:
         spread = spread * 1e-2  # small errors: the first order is all there is
     n, rng = 200_000, np.random.default_rng(5)
-    found = exact.variances(state, spread, polar, OWN, 60.0)
+    found = track_uses.variances(state, spread, polar, OWN, 60.0)
     for i in range(2):
         xx, xv, vv = np.moveaxis(spread[i], -1, 0)
         factor = np.linalg.cholesky(np.stack([np.stack([xx, xv], -1), np.stack([xv, vv], -1)], -2))
         drawn = state[i] + np.einsum("cij,ncj->nci", factor, rng.standard_normal((n, 2, 2)))
-        true = exact.uses(exact.cartesian_track(state[i], polar), OWN, 60.0)
-        e = exact.errors(exact.uses(exact.cartesian_track(drawn, polar), OWN, 60.0), true)
+        true = track_uses.uses(track_uses.cartesian_track(state[i], polar), OWN, 60.0)
+        e = track_uses.errors(track_uses.uses(track_uses.cartesian_track(drawn, polar), OWN, 60.0), true)
         assert e.std(axis=0) == pytest.approx(np.sqrt(found[i]), rel=sigma_error(n))
 
 
@@ -171,12 +178,12 @@ def test_the_first_order_fails_on_a_collision_course():
     n, rng = 200_000, np.random.default_rng(6)
     drawn = state + np.array([[10.0, 0.1], [1e-3, 1e-5]]) * rng.standard_normal((n, 2, 2))
     spread = np.array([[100.0, 0.0, 0.01], [1e-6, 0.0, 1e-10]])
-    cpa = exact.uses(exact.cartesian_track(drawn, True), np.zeros(4), 60.0)[:, 4]
-    sigma = np.sqrt(exact.variances(state, spread, True, np.zeros(4), 60.0)[4])
+    cpa = track_uses.uses(track_uses.cartesian_track(drawn, True), np.zeros(4), 60.0)[:, 4]
+    sigma = np.sqrt(track_uses.variances(state, spread, True, np.zeros(4), 60.0)[4])
     assert np.sqrt((cpa**2).mean()) == pytest.approx(sigma, rel=sigma_error(n))
     assert cpa.mean() == pytest.approx(sigma * np.sqrt(2 / np.pi), abs=mean_error(n, cpa.std()))
 
 
 def test_courses_differ_by_half_a_turn_at_most():
-    off = exact.errors(np.array([[3.1, 0, 0, 0, 0, 0]]), np.array([[-3.1, 0, 0, 0, 0, 0]]))
+    off = track_uses.errors(np.array([[3.1, 0, 0, 0, 0, 0]]), np.array([[-3.1, 0, 0, 0, 0, 0]]))
     assert_rounded(off[0, 0], 6.2 - 2 * np.pi, size=2 * np.pi, operations=4)

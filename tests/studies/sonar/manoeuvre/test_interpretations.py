@@ -2,7 +2,7 @@
 
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.papers.sonar.manoeuvre.interpretations import Interpretations
 from radarsim.papers.study_claims import claims_of
 from radarsim.studies import registry

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from radarsim.app.configs import load
+from radarsim.api.configs import load
 from radarsim.kernels.random import fill_normal_pairs, fill_uniform_pairs
 from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar.manoeuvre import detection_laws
 from tests.studies.sonar.manoeuvre import naive as naive
 from tests.studies.sonar.precision import assert_estimates_rounded, estimate_losses, losses
 from tests.tolerances import assert_rounded
@@ -131,7 +131,9 @@ def test_alarms_and_first_events_are_the_twins(probability):
         for d, spec in enumerate(DETECTORS):
             q = statistics(z, spec["plots"], spec.get("test_every", 1)).T
             assert (sums["tested"][d] == ~np.isnan(q)).all()
-            limits = [spec["threshold_k"]] * 3 if "threshold_k" in spec else exact.threshold(0.1, [[1], [1], [2]])
+            limits = (
+                [spec["threshold_k"]] * 3 if "threshold_k" in spec else detection_laws.threshold(0.1, [[1], [1], [2]])
+            )
             for g, i in np.ndindex(3, len(limits[0])):
                 alarm = q[g] > limits[g][i]
                 assert (sums["alarms"][d, g, i] == alarm).all()

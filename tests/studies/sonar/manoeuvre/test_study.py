@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from radarsim.app.configs import load
-from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar import exact as least_squares
-from radarsim.studies.sonar.manoeuvre import exact
-from radarsim.studies.sonar.manoeuvre import study as manoeuvres
+from radarsim.api.configs import load
+from radarsim.studies.sonar import STUDY, least_squares
+from radarsim.studies.sonar.conversion import PLACED
+from radarsim.studies.sonar.manoeuvre import alarm_laws, detection_laws
 from radarsim.studies.sonar.scene import build_scene
-from radarsim.studies.sonar.world import PLACED
 from tests.studies.sonar.manoeuvre.test_kernels import FILTERS, SCANS, SIGMA, TARGET, VESSEL, T, config, twin
 from tests.studies.sonar.precision import PARABOLA, TERMS, assert_estimates_rounded, estimate_losses
 from tests.tolerances import Z, assert_rounded, mean_error, share_error
@@ -93,7 +91,7 @@ def test_pushes_are_what_the_motion_makes_of_them():
     target = {"kind": "polynomial", "frame": "polar", "range_m": [6e3, -5], "bearing_deg": [10, 0.01]}
     (case,) = load(config(filters=PLAIN) | {"target": target | {"fluctuation_mps2": 0.2}}).cases
     scene = build_scene(case)
-    _, variance, believed = manoeuvres.shift_laws(scene, 0, np.ones((1, SCANS)), 6, 20)
+    _, variance, believed = alarm_laws.shift_laws(scene, 0, np.ones((1, SCANS)), 6, 20)
     weights, _ = least_squares.generalised_least_squares(scene.t[15:21], np.eye(6), 3)
     total = 100.0 * weights[2] @ weights[2]
     precision = {"condition": PARABOLA, "operations": 6 * TERMS}
@@ -119,11 +117,11 @@ def test_first_events_of_independent_tests_are_exact_and_alarms_come_in_runs():
             p = law[1, g, :2][:, scans]
             p = 1 - p if part == 2 else p
             detected = np.cumsum(sums["first"][1, g, :2][:, scans], axis=1)
-            assert within(detected, N, exact.probability_by_then(p), ALL).all()
+            assert within(detected, N, detection_laws.probability_by_then(p), ALL).all()
     # Overlapping windows on a steady leg: no oftener than if they were independent (Šidák), and by far.
     scans = np.arange(5, 13)
     detected = sums["first"][0, 0][:, scans].sum(axis=1) / N
-    independent = exact.probability_by_then(law[0, 0][:, scans])[:, -1]
+    independent = detection_laws.probability_by_then(law[0, 0][:, scans])[:, -1]
     assert (detected < independent).all()
     assert detected[0] < independent[0] - share_error(0.5, N)
 

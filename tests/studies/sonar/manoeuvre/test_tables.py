@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 import radarsim
-from radarsim.app import result as output
-from radarsim.app.configs import load
+from radarsim.api import result_content
+from radarsim.api.configs import load
 from radarsim.papers.sonar.manoeuvre import measures as measured
 from radarsim.papers.verdict_rule import REFUTED
-from radarsim.report import figures, panels
-from radarsim.report.drawing import Reference
+from radarsim.report import case_selection
+from radarsim.report.drawing import canvas
+from radarsim.report.drawing.model import Reference
 from radarsim.studies.sonar import STUDY
-from radarsim.studies.sonar.exact import sigma_acceleration
-from radarsim.studies.sonar.manoeuvre import exact
+from radarsim.studies.sonar.closed_forms import sigma_acceleration
+from radarsim.studies.sonar.manoeuvre import detection_laws
 from tests.answers import answer_texts
 from tests.studies.sonar.precision import PARABOLA, TERMS
 from tests.tolerances import assert_rounded, sigma_error
@@ -79,7 +80,7 @@ def test_thresholds_are_the_laws(tables):
     assert_rounded(row["sigma_acceleration"], sigma, condition=PARABOLA, operations=8 * TERMS)
     assert_rounded(row["threshold_acceleration"], np.sqrt(k) * row["sigma_acceleration"], operations=4)
     reach = row["acceleration_for_90_percent"] / row["sigma_acceleration"]
-    assert exact.detection(k, reach) == pytest.approx(0.9, abs=1e-12)  # the search's precision
+    assert detection_laws.detection(k, reach) == pytest.approx(0.9, abs=1e-12)  # the search's precision
     variance = k * 720 / (5.0**4 * 8 * 63 * 60)
     assert_rounded(row["threshold_to_plot_variance"], variance, condition=PARABOLA, operations=8 * TERMS)
 
@@ -110,10 +111,10 @@ def test_uses_tell_where_the_first_order_holds_and_where_not(tables):
 
 @pytest.mark.slow
 def test_figures_draw(result):
-    described = output.case_figures(result.cases, result.tables, result.experiment)
+    described = result_content.case_figures(result.cases, result.tables, result.experiment)
     assert set(described) >= OWN
     for name in OWN:
-        assert figures.render(described[name]).axes
+        assert canvas.render(described[name]).axes
         assert described[name].caption.endswith(".")
 
 
@@ -121,7 +122,7 @@ def test_a_case_without_detectors_has_its_own_figures_alone():
     changes = ["detectors=[]", "sweep.target.acceleration_mps2=[0.4]", "uses.at_s=[100]", "realisations=64"]
     made = load("sonar_manoeuvre", changes)
     result = radarsim.run(made)
-    described = output.case_figures(result.cases, result.tables, result.experiment)
+    described = result_content.case_figures(result.cases, result.tables, result.experiment)
     assert OWN & set(described) == {"modes", "uses"}
     assert "detections" not in result.tables
     assert STUDY.question(made).startswith("How well are course, speed")
@@ -131,7 +132,7 @@ def test_cases_in_several_frames_stand_side_by_side():
     result = radarsim.run(
         load("sonar_manoeuvre_turning", ["sweep.target.turns.0.rate_radps=[0.07]", "realisations=64"])
     )
-    described = output.case_figures(result.cases, result.tables, result.experiment)
+    described = result_content.case_figures(result.cases, result.tables, result.experiment)
     assert [panel.title for panel in described["modes"].panels[:2]] == ["4.01°/s, polar", "4.01°/s, cartesian unbiased"]
     for name in ("sigma_r", "sigma_x"):
         dotted = [mark.value for mark in described[name].panels[0].marks if isinstance(mark, Reference)]
@@ -148,7 +149,7 @@ def test_a_detector_that_never_has_its_plots():
     made = load("sonar_manoeuvre", [*changes, "sweep.target.acceleration_mps2=[0.8]"])
     result = radarsim.run(made)
     assert "detections" not in result.tables
-    assert set(output.case_figures(result.cases, result.tables, made)) & OWN == {"uses"}
+    assert set(result_content.case_figures(result.cases, result.tables, made)) & OWN == {"uses"}
     assert answer_texts(STUDY, result.cases, result.tables)
 
 
@@ -181,11 +182,14 @@ def test_words(result, tables):
 
 
 def test_of_many_cases_the_ends_are_shown():
-    assert panels.spread_out(list(range(10)), 3) == [0, 4, 9]
-    assert panels.spread_out([1, 2], 3) == [1, 2]
+    assert case_selection.pick_evenly(list(range(10)), 3) == [0, 4, 9]
+    assert case_selection.pick_evenly([1, 2], 3) == [1, 2]
 
 
 def test_an_answer_of_many_cases_tells_the_ends():
-    assert panels.reported([1, 2, 3]) == ([1, 2, 3], [])
-    assert panels.reported([1, 2, 3], 2) == ([1, 3], ["The case in between is in the report's tables."])
-    assert panels.reported([1, 2, 3, 4]) == ([1, 4], ["The 2 cases in between are in the report's tables."])
+    assert case_selection.select_reported([1, 2, 3]) == ([1, 2, 3], [])
+    assert case_selection.select_reported([1, 2, 3], 2) == ([1, 3], ["The case in between is in the report's tables."])
+    assert case_selection.select_reported([1, 2, 3, 4]) == (
+        [1, 4],
+        ["The 2 cases in between are in the report's tables."],
+    )

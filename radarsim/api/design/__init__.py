@@ -1,0 +1,1 @@
+"""Questions to a design: solve for a key, tune a filter, and the sensitivity to each key."""

@@ -1,0 +1,273 @@
+"""A quantity of a case at one scan: exact where it is known, else sampled.
+
+Exact values follow from the plan of a case, without a realisation. Sampled ones are read from the tables by column
+names that all studies share: any study with a table `locks` has the quantity lock."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.config.find_files import did_you_mean
+from radarsim.engine.results import Axes, CaseResult
+from radarsim.errors import ConfigError, argument
+from radarsim.language.translate import term, tr
+from radarsim.report.quantities import Quantity
+from radarsim.report.statistics import Estimate
+from radarsim.studies import registry
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+UNKNOWN_ESTIMATE = Estimate(np.nan, np.nan, np.nan)
+UNPAIRED_FACTOR = 4  # factor on the realisations where a change moves the scans, so that the noise is not common
+
+
+class QuantityName(NamedTuple):
+    """A quantity as a user names it: the names of the quantity, of the filter and of the component.
+
+    A quantity over scans is taken at time at_s, linear between two scans, or at scan at_k; by default at the last."""
+
+    name: str
+    filter: str | None = None
+    component: str | None = None
+    at_s: float | None = None
+    at_k: int | None = None
+
+
+@dataclass(frozen=True)
+class MeasuredQuantity:
+    """A quantity that a case measures; the other fields are those of `QuantityName`."""
+
+    of: Quantity
+    filter: str | None = None
+    component: str | None = None
+    at_s: float | None = None
+    at_k: int | None = None
+
+    @property
+    def words(self) -> str:
+        """`gain of r+Vr in r at 60 s`."""
+        component_words = f" in {self.of.place(self.component)}" if self.component else ""
+        time_words = f" at {self.at_s:g} s" if self.at_s is not None else ""
+        time_words = f" at k = {self.at_k}" if self.at_k is not None else time_words
+        return f"{self.of.words} of {self.filter}{component_words}{time_words}"
+
+    @property
+    def said(self) -> str:
+        """The quantity, filter and time as `words` gives them, in the current language."""
+        fields = {"kind": term(self.of.words), "filter": self.filter}
+        fields["component"] = self.of.place(self.component or "", tr)
+        subject = (
+            tr("{kind} of {filter} in {component}", **fields) if self.component else tr("{kind} of {filter}", **fields)
+        )
+        if self.at_k is not None:
+            return tr("{what} at k = {k}", what=subject, k=str(self.at_k))
+        return subject if self.at_s is None else tr("{what} at {t_s:g} s", what=subject, t_s=self.at_s)
+
+
+class Series(NamedTuple):
+    """A quantity over scans k (n,) at times t_s (n,): value and interval (n,). Without scans n = 1 and k is zero."""
+
+    k: np.ndarray
+    t_s: np.ndarray
+    values: Estimate
+
+
+def check_quantity(request: QuantityName, case: Case, user_filters: Sequence[str] = ()) -> MeasuredQuantity:
+    """Check a request before anything is prepared. Raises ConfigError for an unknown quantity or filter.
+
+    user_filters: names of the config's filters that are written in Python; the case does not hold them."""
+    name, filter_name, component, at_s, at_k = request
+    definition = registry.quantity(name, case)
+    if not definition.per:
+        if filter_name is not None and component is not None:
+            raise ConfigError(
+                f"{argument(definition.name, definition.option)} names the filter itself: "
+                f"leave {argument('filter')} out"
+            )
+        filter_name, component = component if filter_name is None else filter_name, None
+    if filter_name is not None:
+        filter_names = [member.name for member in case.spec.members]
+        if filter_name in user_filters:
+            raise ConfigError(
+                f"filter {filter_name!r} is written in Python: radarsim does not know its keys, "
+                f"only those of {', '.join(filter_names)}"
+            )
+        check_name(filter_name, filter_names)
+    return MeasuredQuantity(definition, filter_name, component, at_s, at_k)
+
+
+def check_name(name: str, names: Sequence[str], item: str = "filter") -> None:
+    """Raise ConfigError unless a filter, or another kind of item, has this name."""
+    if name not in names:
+        suggestion = did_you_mean(name, names) or f"; there are: {', '.join(names)}"
+        raise ConfigError(f"no {item} {name!r}{suggestion}")
+
+
+def resolve_scan(quantity: MeasuredQuantity, axes: Axes) -> MeasuredQuantity:
+    """Fill in the filter of a quantity if there is only one. Raises ConfigError for unknown names."""
+    filter_names, filter_name = list(axes.filters), quantity.filter
+    is_planned_gain = quantity.of.paired and is_planned(quantity.of)
+    if filter_name is None:
+        candidates = [name for i, name in enumerate(filter_names) if not is_planned_gain or i != axes.baseline]
+        if len(candidates) != 1:
+            raise ConfigError(f"{argument('filter')}: name one of {', '.join(filter_names)}")
+        filter_name = candidates[0]
+    check_name(filter_name, filter_names)
+    if is_planned_gain and filter_name == filter_names[axes.baseline]:
+        words = quantity.of.words
+        raise ConfigError(
+            f"filter {filter_name!r} is the baseline, against which {words}s are: its {words} is 0 % at any value"
+        )
+    if quantity.component is not None and is_planned(quantity.of):
+        check_name(quantity.component, [name for name, _ in axes.components], "component")
+    return replace(quantity, filter=filter_name)
+
+
+def unit(quantity: MeasuredQuantity, axes: Axes) -> str:
+    """The unit of a quantity."""
+    from radarsim.report import wording
+
+    return wording.unit(quantity.of.shown_unit(dict(axes.components).get(str(quantity.component), "")))
+
+
+def shorten_case(quantity: MeasuredQuantity, case: Case) -> Case:
+    """The case shortened to the scans that a quantity needs. Raises ConfigError where the whole case is invalid."""
+    return registry.study(case.study).shortened(case, quantity.at_s, quantity.at_k)
+
+
+def plan_labels(quantity: MeasuredQuantity, case: Case) -> Axes:
+    """The labels of a case's plan, with exact errors up to the scans that a quantity needs. Raises ConfigError."""
+    return registry.study(case.study).prepare(shorten_case(quantity, case)).axes
+
+
+PLANNED = {("curves", "sigma"): "exact_sigma", ("gains", "gain_percent"): "exact_gains"}  # by table and column
+
+
+def is_planned(definition: Quantity) -> bool:
+    """Whether a plan holds exact values of a quantity: σ and gain of the common tables."""
+    return (definition.table, definition.value) in PLANNED
+
+
+def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
+    """The exact value from the labels of a case's plan; NaN where it is known only by sampling."""
+    if not is_planned(quantity.of) or not registry.study(case.study).exact_errors:
+        return np.nan
+    f = axes.filters.index(str(quantity.filter))
+    c = [name for name, _ in axes.components].index(str(quantity.component))
+    available = axes.available[f, :, c]
+    if quantity.of.paired:
+        if f == axes.baseline:
+            return np.nan
+        available = available & axes.available[axes.baseline, :, c]
+    exact_values = np.asarray(getattr(axes, PLANNED[quantity.of.table, quantity.of.value]), dtype=float)
+    values = np.where(available, exact_values[f, :, c], np.nan)
+    k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
+    return float(estimate_at(quantity, Series(k, t_s, Estimate(values, values, values))).value)
+
+
+def sampled_value(quantity: MeasuredQuantity, result: CaseResult) -> tuple[Estimate, float]:
+    """The value with its 95 % interval from a case's tables; and the exact value if the table has one, else NaN."""
+    table = quantity_table(quantity.of, result)
+    table = table[table["filter"] == quantity.filter]
+    if not len(table):
+        return UNKNOWN_ESTIMATE, np.nan
+    measured = _series_by_component(quantity.of, table)
+    exact_series = _series_by_component(quantity.of, table, exact_only=True)
+    name = quantity.component or ""
+    check_name(name, list(measured), quantity.of.per)
+    return estimate_at(quantity, measured[name]), float(estimate_at(quantity, exact_series[name]).value)
+
+
+def _series_by_component(definition: Quantity, table: "pd.DataFrame", exact_only: bool = False) -> dict[str, Series]:
+    """The series of one filter, by component."""
+    return {component: series for (_, component), series in series_by_filter(definition, table, exact_only).items()}
+
+
+def quantity_table(definition: Quantity, result: CaseResult) -> "pd.DataFrame":
+    """The table of a case that holds a quantity. Raises ConfigError where the study has none."""
+    table = registry.study(result.study).table(definition.table, [result], definition.value)
+    if table is None:
+        raise ConfigError(f"{result.name}: no {definition.words}: study {result.study} makes no {definition.table}.csv")
+    return table
+
+
+def series_by_filter(
+    definition: Quantity, table: "pd.DataFrame", exact_only: bool = False
+) -> dict[tuple[str, str], Series]:
+    """A quantity, or its exact values, over the scans of its table, by filter and component (empty if it has none)."""
+    values, exact_values = definition.read(table)
+    estimate = Estimate(exact_values, exact_values, exact_values) if exact_only else values
+    row_count = len(table)
+    k = table["k"].to_numpy() if "k" in table else np.zeros(row_count, dtype=int)
+    t_s = table["t_s"].to_numpy(dtype=float) if "t_s" in table else np.zeros(row_count)
+    components = table[definition.per] if definition.per else np.full(row_count, "", dtype=object)
+    groups: Any = table.groupby([table["filter"], components], sort=False).indices.items()
+    return {
+        (name, str(component)): Series(
+            k[rows], t_s[rows], Estimate(*(definition.scale * column[rows] for column in estimate))
+        )
+        for (name, component), rows in groups
+    }
+
+
+def interval_note(quantity: MeasuredQuantity, result: CaseResult) -> str:
+    """The note that tables put on an interval without an exact value: why it is too narrow, or empty."""
+    from radarsim.report import interval_notes
+
+    study, table_name = registry.study(result.study), quantity.of.table
+    tables = {"curves": study.curves([result]), table_name: quantity_table(quantity.of, result)}
+    declared_quantities = registry.quantities(result.study, result.spec)
+    table = interval_notes.add_notes(tables, [result], exact=False, quantities=declared_quantities)[table_name]
+    if "note" not in table:
+        return ""
+    rows = table[table["filter"] == quantity.filter]
+    if quantity.component is not None:
+        rows = rows[rows[quantity.of.per].astype(str) == quantity.component]
+    if quantity.at_k is not None:
+        rows = rows[rows["k"] == quantity.at_k]
+    elif quantity.at_s is not None and "t_s" in rows:
+        t_s = rows["t_s"].to_numpy(dtype=float)
+        rows = rows[(t_s <= quantity.at_s) | (np.arange(len(t_s)) <= np.searchsorted(t_s, quantity.at_s))]
+    return str(rows["note"].iloc[-1]) if len(rows) else ""
+
+
+def scan_number(quantity: MeasuredQuantity, axes: Axes) -> int:
+    """The scan at which a quantity is read for its time, the later of two; 0 where the scan number is given."""
+    k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
+    if quantity.at_k is not None or not len(k):
+        return 0
+    last = len(k) - 1
+    return int(k[last if quantity.at_s is None else min(int(np.searchsorted(t_s, quantity.at_s * (1 - 1e-12))), last)])
+
+
+def estimate_at(quantity: MeasuredQuantity, series: Series) -> Estimate:
+    """The series at the requested time or scan: NaN where there is no estimate. Raises ConfigError for a time or scan
+    beyond the run."""
+    k, t_s, values = series
+    if not len(k):
+        return UNKNOWN_ESTIMATE
+    if not k.any() and (quantity.at_s, quantity.at_k) != (None, None):
+        option = argument("at_s", "--at") if quantity.at_k is None else argument("at_k", "--at-k")
+        raise ConfigError(f"{option}: the {quantity.of.words} has one value, not one a scan: leave it out")
+    if quantity.at_k is not None:
+        if quantity.at_k > k[-1] or quantity.at_k < 1:
+            option = argument("at_k", "--at-k")
+            raise ConfigError(f"{option}: must be from 1 to {k[-1]}, the last scan, got {quantity.at_k}")
+        matches = np.flatnonzero(k == quantity.at_k)
+        return Estimate(*(float(column[matches[0]]) for column in values)) if len(matches) else UNKNOWN_ESTIMATE
+    if quantity.at_s is None:
+        return Estimate(*(float(column[-1]) for column in values))
+    if not 0 <= quantity.at_s <= t_s[-1] * (1 + 1e-12):
+        option = argument("at_s", "--at")
+        raise ConfigError(f"{option}: must be from 0 to {t_s[-1]:g} s, the last scan's time, got {quantity.at_s:g}")
+    if quantity.at_s < t_s[0] - 1e-9 * t_s[-1]:
+        return UNKNOWN_ESTIMATE
+    matches_of_time = np.flatnonzero(np.isclose(t_s, quantity.at_s, rtol=1e-12, atol=0))
+    if len(matches_of_time):
+        return Estimate(*(float(column[matches_of_time[0]]) for column in values))
+    return Estimate(*(float(np.interp(quantity.at_s, t_s, column)) for column in values))

@@ -1,0 +1,227 @@
+"""`radarsim solve`: the value of a numeric key at which a quantity reaches a target.
+
+If the quantity is known exactly, the value is the root of the exact function. Otherwise the quantity is simulated, with
+the same noise at every value (`sampled_solve`)."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+from radarsim.api import arguments, configs
+from radarsim.api.configs import Config
+from radarsim.api.design import quantities, root_search
+from radarsim.api.design.quantities import QuantityName
+from radarsim.api.design.question import (
+    JUMP_NOTE,
+    ROUGH_VALUES,
+    WHOLE_NUMBER_NOTE,
+    Cases,
+    Curve,
+    Question,
+    boundary_note,
+    check_effect,
+    first_attaining,
+    key_range,
+    make_answer,
+    measure_seconds,
+    nearest_value,
+    predict_duration,
+    question_fields,
+    scan_options,
+    undefined_error,
+)
+from radarsim.api.design.sampled_solve import solve_by_sampling
+from radarsim.api.design.solve_answer import Answer
+from radarsim.api.load_experiments import combine_overrides
+from radarsim.config import numeric_keys
+from radarsim.errors import ConfigError, argument
+from radarsim.language.translate import tr
+from radarsim.report.statistics import Estimate
+from radarsim.studies import registry
+
+DERIVATIVE_STEP = 1e-4  # of a value: the step of a derivative
+JUMP = (
+    1e-4  # of a quantity: larger changes may be jumps of means over detection patterns, when other patterns are merged
+)
+STEP = 1e-3  # on the scale of the search, the step of a rough derivative
+ROUGH_VALUES_PER_PLACE = 2  # rough values for each place of the scan, including those around roots and turns
+TINY = 1e-300  # instead of zero
+CLOSING_VALUES = 12  # values, besides those of the scan, to close a bracket to rounding and take the slope
+TARGET_TOLERANCE = (
+    1e-10  # of the quantity: distance from the target at which a search ends; rough values jump by 1e-4 anyway
+)
+ROUGH_WIDTH = 1e-4  # relative width to which a rough root is closed
+DOUBTFUL_DISTANCE = (
+    0.01  # of the quantity: a rough search that comes this near to the target without a root is repeated exactly
+)
+
+
+def solve(
+    config: Config,
+    key: str,
+    *,
+    equals: float,
+    filter: str | None = None,
+    at_s: float | None = None,
+    at_k: int | None = None,
+    between: tuple[float, float] | None = None,
+    case: str | None = None,
+    overrides: configs.Overrides = (),
+    realisations: float | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    sampled: bool = False,
+    progress: Callable[[int, int, int], None] | None = None,
+    notify: Callable[[str], None] | None = None,
+    **quantity: str | None,
+) -> Answer:
+    """Find the value of a key at which a quantity equals `equals`, in its unit; gains and rates in per cent.
+
+    The quantity is given as an argument named after an option of `radarsim solve`: `gain="r"` or `sigma="Vr"` of a
+    component, for the `filter`; or a rate of a filter, `lock="sequence"`, `loss="nearest"`, … It is taken at time at_s,
+    s, or at scan at_k, counted from 1; default: the last scan. between: the range of the key to search. case: the case,
+    if the config has several. realisations: the number for each simulated value, if nothing exact is known; sampled:
+    simulate even if it is. notify is called with a line on what a search of some seconds will do.
+
+    `value` lies between `lo` and `hi` (95 %; equal where `exact`). If the target cannot be attained, value is None, and
+    limit, at limit_at, is the nearest attainable value. Raises ConfigError for a wrong config, key, filter or quantity.
+
+    >>> answer = solve("rls2", "radar.sigma_velocity_mps", gain="r", filter="r+Vr", at_s=60, equals=30)
+    >>> print(f"{answer.value:.4f} {answer.unit}", answer.exact)
+    13.7212 m/s True
+    """
+    requested = {name: value for name, value in quantity.items() if value is not None}
+    if len(requested) != 1:
+        given_names = ", ".join(requested) or "none"
+        examples = f"{argument('sigma=…', '--sigma')}, {argument('gain=…', '--gain')}"
+        raise ConfigError(f"name one quantity, as `radarsim solve --help` lists them: {examples}, …; got {given_names}")
+    texts = combine_overrides(
+        arguments.check_arguments(overrides, threads=threads, equals=equals, **scan_options(at_s, at_k)), None, seed
+    )
+    if not isinstance(key, str):
+        raise ConfigError(f"key: must be text, got {key!r}")
+    if between is not None and not arguments.is_pair(between):
+        raise ConfigError(f"between: must be two rising numbers, got {between!r}")
+    if not math.isfinite(equals):
+        raise ConfigError(f"{argument('equals')}: must be a finite number, got {equals:g}")
+    ((name, component),) = requested.items()
+    cases, count = Cases(config, texts, case), arguments.whole_number(realisations)
+    matching_keys = numeric_keys.find_numeric_keys(cases.base.spec, key)
+    measured = quantities.check_quantity(QuantityName(name, filter, component, at_s, at_k), cases.base, cases.outside)
+    axes = quantities.plan_labels(measured, cases.base)
+    measured = quantities.resolve_scan(measured, axes)
+    search_range = key_range(matching_keys, key, between)
+    curve = Curve(cases, key, measured, threads, progress, count or cases.base.realisations)
+    config_value = matching_keys[0].value if len({numeric_key.value for numeric_key in matching_keys}) == 1 else None
+    question = Question(
+        cases, key, measured, equals, search_range, config_value, quantities.unit(measured, axes), texts, count
+    )
+    work = _solve_exactly if not sampled and curve.exact(axes) else solve_by_sampling
+    return work(question, curve, notify or (lambda line: None))
+
+
+def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:
+    """The answer if the quantity is known exactly."""
+    attained_now = curve.exactly(None)
+    grid = question.over.grid()
+    curve.expected = len(grid) + CLOSING_VALUES
+    study = registry.study(question.cases.base.study)
+    base = quantities.shorten_case(question.quantity, question.cases.base)
+    curve.rough = study.costly(base) and not question.over.whole
+    probe_value = grid[len(grid) // 3]  # not the config's own value, which a study may have cached
+    approximation = study.exact_but_for(base)
+    rough_value_s = measure_seconds(partial(curve.roughly, probe_value))
+    # One exact value more than the search needs, if a value may take seconds; if each pattern of plots is followed, a
+    # value takes a twentieth of a second.
+    exact_value_s = measure_seconds(partial(curve.exactly, probe_value)) if approximation or not curve.rough else 0.0
+    fields = question_fields(question)
+    work = tr("computes the {quantity} at about {count} values of {key}", **fields, count=curve.expected)
+    seconds = CLOSING_VALUES * exact_value_s + len(grid) * (
+        ROUGH_VALUES_PER_PLACE * rough_value_s if curve.rough else exact_value_s
+    )
+    predict_duration(notify, work + (tr(", each {near}", near=tr(approximation)) if approximation else ""), seconds)
+    try:
+        search_result = roots(question, curve)
+    except root_search.UndefinedFunctionError:
+        raise undefined_error(question, curve) from None
+    realisations = ROUGH_VALUES if curve.rough else 0  # both kinds differ a little where the key has no effect
+    check_effect(question, [(x, estimate.value) for (x, n), estimate in curve.known.items() if n == realisations])
+    values = search_result.roots
+    if question.over.whole:
+        values = tuple(dict.fromkeys(first_attaining(question, x, curve.exactly) for x in values))
+    answer = partial(make_answer, question, attained_now, exact=True)
+    if not values:
+        limit = search_result.at_nearest + question.equals
+        return answer(
+            limit=limit, limit_at=search_result.nearest, notes=boundary_note(question, curve, search_result.nearest)
+        )
+    value = nearest_value(values, question)
+    approximation = study.exact_but_for(
+        quantities.shorten_case(question.quantity, question.cases.at(question.key, value))
+    )
+    attained = curve.exactly(value)
+    is_jump = not question.over.whole and abs(attained - question.equals) > JUMP * max(
+        abs(question.equals), abs(attained_now)
+    )
+    return answer(
+        solution=Estimate(value, value, value),
+        attained=attained,
+        slope=None if is_jump else slope(curve.exactly, value, question.over),
+        other_values=tuple(x for x in values if x != value),
+        notes=((JUMP_NOTE,) if is_jump else ())
+        + ((WHOLE_NUMBER_NOTE,) if question.over.whole and attained != question.equals else ())
+        + ((tr("σ is {what}", what=tr(approximation)),) if approximation else ()),
+    )
+
+
+def roots(question: Question, curve: Curve) -> root_search.Roots:
+    """The values at which the exact quantity reaches the target; searched roughly first if that is much cheaper.
+
+    Raises root_search.Undefined if the quantity has no value on the range."""
+
+    def difference(x: float) -> float:
+        return curve.exactly(x) - question.equals
+
+    if not curve.rough:
+        return root_search.find_roots(difference, question.over)
+    size = max(abs(question.equals), TINY)
+    rough_roots = root_search.find_roots(lambda x: curve.roughly(x) - question.equals, question.over, ROUGH_WIDTH)
+    refined = [
+        refine_rough_root(difference, curve, question.over, x, TARGET_TOLERANCE * size) for x in rough_roots.roots
+    ]
+    exact_roots = [x for x in refined if x is not None]
+    if len(exact_roots) < len(refined) or (not refined and abs(rough_roots.at_nearest) < DOUBTFUL_DISTANCE * size):
+        return root_search.find_roots(difference, question.over)
+    return root_search.Roots(
+        tuple(exact_roots),
+        rough_roots.nearest,
+        rough_roots.at_nearest if exact_roots else difference(rough_roots.nearest),
+    )
+
+
+def refine_rough_root(
+    difference: Callable[[float], float], curve: Curve, search_range: root_search.Range, x: float, near_enough: float
+) -> float | None:
+    """The root near a rough one: by secants, the first from the rough quantity; if they fail, bracketed."""
+    u = search_range.inner(x)
+    ends = search_range.outer(u - STEP), search_range.outer(u + STEP)
+    low, high = (curve.roughly(end) for end in ends)
+    rising = (high - low) / (search_range.inner(ends[1]) - search_range.inner(ends[0]))
+    root = root_search.refine_root(difference, search_range, x, rising, near_enough)
+    return root_search.find_root_near(difference, search_range, x, near_enough) if root is None else root
+
+
+def slope(function: Callable[[float], float], value: float, search_range: root_search.Range) -> float | None:
+    """The change of a function for one unit of the key, by a central difference within the range; one-sided at an end.
+    Error of the order of 1e-8 of itself; of whole numbers the change to the next."""
+    step = DERIVATIVE_STEP * (abs(value) or 1.0)
+    low, high = max(value - step, search_range.low), min(value + step, search_range.high)
+    if search_range.whole:
+        low, high = value, min(value + 1, search_range.high)
+    if math.isnan(function(low)):
+        low = value
+    if math.isnan(function(high)):
+        high = value
+    if low == high or math.isnan(function(low)) or math.isnan(function(high)):
+        return None
+    return (function(high) - function(low)) / (high - low)

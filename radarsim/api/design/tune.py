@@ -1,0 +1,607 @@
+"""`radarsim tune`: the values of a filter's keys with which a quantity is best over a family of cases.
+
+Where the quantity is exact, exact values are searched and compared. Elsewhere every value is simulated with the same
+noise, from a seed that only the search uses. The gain is measured on the realisations of the config's seed, which the
+search has not used, so that no number contains the optimism of a minimum. There both filters see the same plots: the
+gain is paired."""
+
+import itertools
+import math
+import os
+import re
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from radarsim.api import arguments, configs
+from radarsim.api.configs import Config, load
+from radarsim.api.design import quantities, question
+from radarsim.api.design.jackknife import jackknife_interval
+from radarsim.api.design.quantities import MeasuredQuantity
+from radarsim.api.design.question import Curve, measure_seconds
+from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, objective_words
+from radarsim.api.design.tuning_space import (
+    DIGITS,
+    MAX_WHOLE_COMBINATIONS,
+    MIN_PROBABILITY,
+    Path,
+    Place,
+    ProbabilityRange,
+    SearchedKey,
+    from_scale,
+    is_at_end,
+    parse_range,
+    parse_target,
+    rename_arguments_in_errors,
+    searched_keys,
+    set_at_path,
+    value_at_path,
+)
+from radarsim.api.load_experiments import combine_overrides
+from radarsim.config.experiment import Case, Experiment
+from radarsim.config.identity import all_keys
+from radarsim.config.labels import label
+from radarsim.config.overrides import override_origin
+from radarsim.config.yaml_text import one_line_yaml
+from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError, argument
+from radarsim.language.translate import plural, tr
+from radarsim.report.user_filters.answer import TUNED
+from radarsim.report.wording import format_number
+from radarsim.studies import registry
+
+TRAINING_SEED_OFFSET = 2**32  # more than the seed of the config: the seed of the noise that is searched with
+FLAT_CHANGE = 1e-3  # of the quantity: within it a key is as good as tuned
+STEP = 0.25  # on the scale of the search, of derivatives of sampled values
+# Of exact and of sampled values: how closely the scale is searched, the logarithm of what is minimised, values a key of
+# a simplex at most, and those expected of both.
+SCALE_TOLERANCE, COST_TOLERANCE, MAX_VALUES_PER_KEY = (
+    {True: 1e-7, False: 1e-2},
+    {True: 1e-12, False: 1e-6},
+    {True: 200, False: 50},
+)
+EXPECTED_VALUES_PER_KEY = {True: 100, False: 40}
+SIMPLEX_STEPS = 0.5, 0.1  # first steps, one simplex after the other
+PILOT_POINTS, PILOT_SHARE, MIN_PILOT_REALISATIONS = (
+    13,
+    8,
+    200,
+)  # of the scan of sampled values: values, and realisations of all
+NO_CHANGE = 1e-9  # of the quantity: largest change where a key has no effect
+
+
+class Variants:
+    """A case with one filter, and the baseline of its gains, with other values of the keys; like `Cases`."""
+
+    def __init__(self, case: Case, filter_name: str, searched: Sequence[SearchedKey], paired: bool):
+        self.case, self.chosen, self.searched, self.seed = case, filter_name, searched, case.seed
+        self.plain = {member.name: all_keys(member) for member in case.spec.members}
+        config_baseline = getattr(case.spec, "baseline", None)
+        self.baseline = (config_baseline or next(iter(self.plain))) if paired else None
+        self.kept = {filter_name, self.baseline}
+        try:
+            self.base = self.of(self.plain[filter_name])
+        except ConfigError:  # other keys name the filters that are left out
+            self.kept, self.baseline = set(self.plain), config_baseline
+            self.base = self.of(self.plain[filter_name])
+
+    def of(self, filter_keys: Mapping[str, Any], *tuned: Mapping[str, Any]) -> Case:
+        """The case with these keys of the filter, and with a tuned filter if it is given. Raises ConfigError."""
+        members = [
+            filter_keys if name == self.chosen else keys for name, keys in self.plain.items() if name in self.kept
+        ]
+        case = case_with_filters(self.case, [*members, *tuned], self.baseline)
+        return replace(case, seed=self.seed, noise_of=self.case.noise_of or self.case.spec)
+
+    def at(self, key: str, place: Place) -> Case:
+        """The case with other values. Raises ConfigError where the config refuses them."""
+        return self.of(self.filter(place))
+
+    def beside(self, place: Place) -> Case:
+        """The case with the filter as stated and as tuned, with the config's own seed."""
+        case = self.of(self.plain[self.chosen], self.filter(place) | {"name": self.chosen + TUNED})
+        return replace(case, seed=self.case.seed)
+
+    def filter(self, place: Place) -> dict[str, Any]:
+        """The filter's keys with other values."""
+        filter_keys = deepcopy(self.plain[self.chosen])
+        for path, value in from_scale(self.searched, place, filter_keys).items():
+            set_at_path(filter_keys, path, value)
+        return filter_keys
+
+
+def case_with_filters(case: Case, members: Sequence[Mapping[str, Any]], baseline: str | None) -> Case:
+    """A case with other filters. Raises ConfigError where the config refuses them."""
+    settings = {"study": case.study, "realisations": case.realisations, "seed": case.seed, "baseline": baseline}
+    keys = all_keys(case.spec) | settings | {type(case.spec).bare_keys: members}
+    (loaded,) = load({key: value for key, value in keys.items() if value is not None}).cases
+    return replace(case, spec=loaded.spec)
+
+
+class Objective:
+    """What is minimised, at a place of the search: over the family the root of the mean square of a size, the mean of
+    anything else; of a quantity that is better the larger, 100 % less its value."""
+
+    def __init__(self, variants: Sequence[Variants], curves: Sequence[Curve], exact: bool, count: int):
+        self.variants, self.curves, self.exact, self.count = variants, curves, exact, count
+        self.searched, self.plain = variants[0].searched, variants[0].plain[variants[0].chosen]
+        self.of = curves[0].quantity.of
+        self.rough = exact and any(curve.rough for curve in curves)
+
+    @property
+    def pilot(self) -> int:
+        """Realisations of a value of a scan."""
+        return min(self.count, max(MIN_PILOT_REALISATIONS, self.count // PILOT_SHARE))
+
+    def combined(self, values: Sequence[Any]) -> Any:
+        """The quantity of the family, from the values of its cases, numbers or arrays."""
+        is_size = self.of.kind == "size"
+        mean = sum(value**2 if is_size else value for value in values) / len(values)
+        return mean**0.5 if is_size else mean
+
+    def cost(self, values: Sequence[Any]) -> Any:
+        """What is minimised, from the values of the cases."""
+        combined = self.combined(values)
+        return 100.0 - combined if self.of.more_is_better else combined
+
+    def __call__(self, place: Place, count: int | None = None) -> float:
+        """The cost at a place, with all training realisations or fewer; infinite if there is no estimate."""
+        if self.rough:
+            values = [curve.roughly(place) for curve in self.curves]
+        elif self.exact:
+            values = [curve.exactly(place) for curve in self.curves]
+        else:
+            values = [curve.simulated(place, count or self.count).value for curve in self.curves]
+        cost = float(self.cost(values))
+        return math.inf if math.isnan(cost) else cost
+
+
+def find_minimum(objective: Objective) -> Place:
+    """The place with the smallest cost.
+
+    For each combination of whole numbers, the real numbers are scanned one after the other; simplexes (Nelder and Mead)
+    then start from the best place."""
+    from scipy.optimize import minimize
+
+    searched, start = objective.searched, tuple(key.stated for key in objective.searched)
+    real_indices = [i for i, key in enumerate(searched) if not key.over.whole]
+    pilot = None if objective.exact else objective.pilot
+    grids = [key.over.grid() if key.over.whole else [key.stated] for key in searched]
+    if math.prod(map(len, grids)) > MAX_WHOLE_COMBINATIONS:
+        raise ConfigError(f"{argument('free', '--free')}: too many whole numbers to try: give KEY=LOW:HIGH")
+
+    def scan_real_keys(best: Place) -> Place:
+        for i in real_indices:
+            candidates = [
+                (*best[:i], x, *best[i + 1 :]) for x in searched[i].over.grid(None if objective.exact else PILOT_POINTS)
+            ]
+            best = min((best, *candidates), key=lambda place: objective(place, pilot))
+        return best
+
+    possible = [place for place in itertools.product(*grids) if math.isfinite(objective(place, pilot))]
+    best = min(map(scan_real_keys, possible), key=lambda place: objective(place, pilot), default=start)
+    for step in SIMPLEX_STEPS if real_indices else ():
+        scale_place = np.array([searched[i].over.inner(best[i]) for i in real_indices])
+        options: Any = {
+            "initial_simplex": np.vstack([scale_place, scale_place + step * np.eye(len(scale_place))]),
+            "xatol": SCALE_TOLERANCE[objective.exact],
+        }
+        options |= {
+            "fatol": COST_TOLERANCE[objective.exact],
+            "maxfev": MAX_VALUES_PER_KEY[objective.exact] * len(scale_place),
+        }
+        logarithm: Any = lambda u, best=best: float(np.log(max(objective(move_keys(searched, best, u)), 1e-300)))  # noqa: E731
+        best = move_keys(searched, best, minimize(logarithm, scale_place, method="Nelder-Mead", options=options).x)
+    best = tuple(float(f"{x:.{DIGITS}g}") for x in best)
+    return min((start, best), key=objective)
+
+
+def move_keys(searched: Sequence[SearchedKey], best: Place, scale_place: np.ndarray) -> Place:
+    """A place with its real numbers moved to these positions (n,) on the scales of the search."""
+    coordinates = iter(scale_place)
+    return tuple(
+        x if key.over.whole else key.over.outer(float(next(coordinates))) for key, x in zip(searched, best, strict=True)
+    )
+
+
+def flat_interval(objective: Objective, best: Place, i: int) -> tuple[float, float]:
+    """The range of a key over which the exact quantity is within 0.1 % of its minimum."""
+    search_range, limit = objective.searched[i].over, (1 + FLAT_CHANGE) * objective(best)
+    ends = []
+    for end in (search_range.low, search_range.high):
+        inside, outside = search_range.inner(best[i]), search_range.inner(end)
+        if objective((*best[:i], end, *best[i + 1 :])) > limit:
+            for _ in range(24):
+                middle = (inside + outside) / 2
+                is_flat = objective((*best[:i], search_range.outer(middle), *best[i + 1 :])) <= limit
+                inside, outside = (middle, outside) if is_flat else (inside, middle)
+            outside = inside
+        ends.append(search_range.outer(outside))
+    return ends[0], ends[1]
+
+
+def has_no_effect(objective: Objective, best: Place, i: int) -> bool:
+    """Whether a key changes nothing over the whole searched range."""
+    search_range = objective.searched[i].over
+    ends = (objective((*best[:i], x, *best[i + 1 :])) for x in (search_range.low, search_range.high))
+    return all(math.isclose(value, objective(best), rel_tol=NO_CHANGE) for value in ends)
+
+
+def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[float, float]]:
+    """The 95 % intervals of the best values of real numbers, from how far they move without each of the batches.
+
+    Each move is a Newton step from the best place with the gradient of the remaining batches. Empty where the quantity
+    has no minimum on this scale, for instance where it is flat or jumps, or at an end of the range."""
+    searched = [
+        replace(key, over=replace(key.over, whole=True)) if is_at_end(key, x) else key
+        for key, x in zip(objective.searched, best, strict=True)
+    ]
+    scale_place = np.array([key.over.inner(x) for key, x in zip(searched, best, strict=True) if not key.over.whole])
+
+    def costs(u: np.ndarray) -> np.ndarray:
+        """With all realisations, then without each of the batches."""
+        cases = [variant.at("", move_keys(searched, best, u)) for variant in objective.variants]
+        pairs = zip(cases, objective.curves, strict=True)
+        return np.asarray(
+            objective.cost([cost_by_quantity(case, (curve.quantity,), objective.count)[:, 0] for case, curve in pairs])
+        )
+
+    size, steps = len(scale_place), STEP * np.eye(len(scale_place))
+    if not size:
+        return {}
+    try:
+        centre_costs = costs(scale_place)
+        upper_costs, lower_costs = ([costs(scale_place + sign * step) for step in steps] for sign in (1, -1))
+        diagonal_costs = {
+            (i, j): costs(scale_place + steps[i] + steps[j]) for i, j in itertools.combinations(range(size), 2)
+        }
+    except ConfigError:
+        return {}
+    slopes = (np.array(upper_costs) - np.array(lower_costs)) / (2 * STEP)
+    curvature = np.diag(
+        [(a[0] - 2 * centre_costs[0] + b[0]) / STEP**2 for a, b in zip(upper_costs, lower_costs, strict=True)]
+    )
+    for (i, j), diagonal in diagonal_costs.items():
+        curvature[i, j] = curvature[j, i] = (
+            diagonal[0] - upper_costs[i][0] - upper_costs[j][0] + centre_costs[0]
+        ) / STEP**2
+    if not np.isfinite(curvature).all() or np.linalg.eigvalsh(curvature)[0] <= 0:
+        return {}
+    newton = scale_place[:, None] - np.linalg.solve(curvature, slopes - slopes[:, :1])
+    values = [from_scale(searched, move_keys(searched, best, u), objective.plain) for u in newton.T]
+    intervals = {}
+    for path in values[0]:
+        matching_keys = [key for key in searched if key.path == path and key.of is None]
+        if matching_keys and matching_keys[0].over.whole:
+            continue
+        search_range = (
+            matching_keys[0].over
+            if matching_keys
+            else ProbabilityRange(MIN_PROBABILITY**2, 1 - MIN_PROBABILITY**2, False)
+        )
+        inner = np.array(
+            [
+                search_range.inner(min(max(place_values[path], search_range.low), search_range.high))
+                for place_values in values
+            ]
+        )
+        _, lo, hi = jackknife_interval(inner[1:], float(inner[0]))
+        intervals[path] = search_range.outer(lo), search_range.outer(hi)
+    return intervals
+
+
+def cost_by_quantity(case: Case, measured: Sequence[MeasuredQuantity], count: int) -> np.ndarray:
+    """Q quantities of a case (1 + n, Q): from all realisations, then without each of n batches."""
+
+    def values(result: CaseResult) -> list[float]:
+        return [float(quantities.sampled_value(quantity, result)[0].value) for quantity in measured]
+
+    total_values, leave_one_out_values, _ = question.leave_one_out(case, values, count)
+    return np.array([total_values, *leave_one_out_values])
+
+
+def _predict(notify: Callable[[str], None], objective: Objective, place_s: float) -> None:
+    """Tell the user what the search will do and how long it takes, if that is long; place_s: seconds of one place."""
+    grids = [
+        len(key.over.grid(None if objective.exact or key.over.whole else PILOT_POINTS)) for key in objective.searched
+    ]
+    is_whole = [key.over.whole for key in objective.searched]
+    scans = math.prod(itertools.compress(grids, is_whole)) * max(
+        1, sum(grids) - sum(itertools.compress(grids, is_whole))
+    )
+    full_places = EXPECTED_VALUES_PER_KEY[objective.exact] * is_whole.count(False)
+    pilot, count = (1, 1) if objective.exact else (objective.pilot, objective.count)
+    for curve in objective.curves:
+        curve.expected = scans * pilot + full_places * count
+    keys = plural("{count} key", "{count} keys", len(grids))
+    work = tr("searches {keys}, about {count} places", keys=keys, count=scans + full_places)
+    question.predict_duration(notify, work, place_s * (scans * pilot / count + full_places))
+
+
+def tuning_gains(objective: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[TunedQuantity]:
+    """The gain of each case, and the last of all; pairs (1 + n, 2) of each case: stated and tuned."""
+    gained, sign = [], -1 if objective.of.more_is_better else 1
+    pairs_with_total = [*pairs, np.stack([objective.combined([pair[:, i] for pair in pairs]) for i in (0, 1)], axis=1)]
+    for name, pair in zip((*names, ""), pairs_with_total, strict=True):
+        stated, tuned = pair.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            gains = sign * (stated - tuned) * (100 / stated if objective.of.kind == "size" else 1)
+        ends: Sequence[float] = (
+            jackknife_interval(gains[1:], float(gains[0])) if len(gains) > 1 else [float(gains[0])] * 3
+        )
+        gained.append(TunedQuantity(name, float(stated[0]), float(tuned[0]), *ends))
+    return gained
+
+
+def family_cases(
+    config: Config, settings: Sequence[str], member_settings: Sequence[str], case_names: Sequence[str]
+) -> tuple[list[Case], list[str]]:
+    """The cases over which a filter is tuned, and the names of filters of Python, which they are without.
+
+    members: settings of each. Raises ConfigError."""
+    user_filters: list[str] = []
+    cases, set_keys = [], {setting.partition("=")[0].strip() for setting in settings}
+    for member_setting in member_settings:
+        key = member_setting.partition("=")[0].strip()
+        if key in set_keys:
+            raise ConfigError(f"{argument('over', '--over')}: {key} is given by {override_origin(key)} too")
+        with rename_arguments_in_errors({str(override_origin(key)): argument("over", "--over")}):
+            experiment = load(config, [*settings, *([member_setting] if member_setting else [])])
+        user_filters += [user_filter.name for case in experiment.cases for user_filter in case.outside]
+        cases += [
+            replace(case, name=f"{case.name} {member_setting}".strip(), against=(), outside=())
+            for case in experiment.cases
+        ]
+    for name in case_names:
+        quantities.check_name(name, [case.name for case in cases], "case")
+    return [case for case in cases if not case_names or case.name in case_names], user_filters
+
+
+def tune(
+    config: Config,
+    wanted: str,
+    *,
+    filter: str | None = None,
+    over: Mapping[str, Sequence[Any]] | Sequence[str] = (),
+    free: Mapping[str, Sequence[float] | None] | Sequence[str] = (),
+    case: str | Sequence[str] = (),
+    overrides: configs.Overrides = (),
+    realisations: float | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+    sampled: bool = False,
+    progress: Callable[[int, int, int], None] | None = None,
+    notify: Callable[[str], None] | None = None,
+) -> TuningResult:
+    """Find the values of a filter's keys with which a quantity is best, and measure what they gain.
+
+    wanted is a quantity of `radarsim solve` with its component, and a time or scan, `"sigma r at 60 s"`, `"gain r at k
+    6"`; default: the last scan. free: the keys, by name, `KEY=LOW:HIGH`, or a mapping to the range to search or None;
+    default: all of the filter that are real numbers other than zero. Elements of a matrix of probabilities keep columns
+    that sum to one; zeros stay. over: the family of targets, stems of scenarios or texts `KEY=VALUE`, or values by key;
+    case: some of the config's cases; default: all. Over a family the root of the mean of σ² is least, or the mean rate
+    is best.
+
+    If σ is not known exactly, or is to be `sampled`, the search uses `realisations` with noise of its own seed, by
+    default as many as the config's, and the gain is measured on as many of the config's seed, stated and tuned filter
+    on the same plots. notify is called with a line on what a search of some seconds will do.
+
+    `keys` have the stated and the tuned value, `all` and `cases` the gain with its 95 % interval, in per cent of σ, of
+    rates in points. Raises ConfigError for a wrong config, key, filter or quantity.
+
+    >>> found = tune("rls2", "sigma r at 60 s", filter="r+Vr", over=["turn", "jerk_pulse"])
+    >>> print(f"{found.keys[0].tuned:.3f} {found.keys[0].unit}", f"{found.all.gain:.1f} %", found.exact)
+    4.187 (m/s³)² 36.3 % True
+    """
+    settings = combine_overrides(arguments.check_arguments(overrides, threads=threads), None, seed)
+    if isinstance(over, Mapping):
+        over = [
+            text for key, values in over.items() for value in values for text in arguments.check_arguments({key: value})
+        ]
+    arguments.check_texts((*over, *free))
+    ranges = dict(range_list := [*map(parse_range, free.items() if isinstance(free, Mapping) else free)])
+    if len(ranges) < len(range_list):
+        raise ConfigError(f"{argument('free', '--free')}: a key is given twice")
+    members = [*dict.fromkeys(text if "=" in text else f"target={text}" for text in over)] or [""]
+    cases, user_filters = family_cases(config, settings, members, [case] if isinstance(case, str) else case)
+    option_names = dict.fromkeys((argument("at_k", "--at-k"), argument("at_s", "--at")), argument("wanted", "--for"))
+    with rename_arguments_in_errors(option_names):
+        quantity = quantities.check_quantity(parse_target(wanted, filter), cases[0], user_filters)
+    filter_name = quantities.resolve_scan(quantity, quantities.plan_labels(quantity, cases[0])).filter
+    assert filter_name is not None  # resolved
+    searched, count = _common_keys(cases, filter_name, ranges), arguments.whole_number(realisations)
+    count = question.BATCHES * max(2, (count or cases[0].realisations) // question.BATCHES)
+    variants = [Variants(family_case, filter_name, searched, quantity.of.paired) for family_case in cases]
+    curves = []
+    for variant in variants:
+        quantity = quantities.check_quantity(parse_target(wanted, filter), variant.base)
+        curves.append(Curve(variant, "", replace(quantity, filter=filter_name), threads, progress, count))
+    with rename_arguments_in_errors(option_names):
+        has_exact_values = [curve.exact(quantities.plan_labels(curve.quantity, curve.cases.base)) for curve in curves]
+    exact = all(has_exact_values) and not sampled
+    for variant, curve in zip(variants, curves, strict=True):
+        variant.seed = variant.seed if exact else (variant.seed + TRAINING_SEED_OFFSET) % 2**64
+        curve.cases.base = variant.base = replace(variant.base, seed=variant.seed)
+        curve.rough = exact and registry.study(curve.cases.base.study).costly(curve.cases.base)
+    objective = Objective(variants, curves, exact, count)
+    _predict(notify or (lambda line: None), objective, _seconds_of_start(objective))
+    best = find_minimum(objective)
+    pairs, ranges_by_path = _judge_exactly(objective, best) if exact else _judge_by_sampling(objective, best)
+    given_settings = [setting for setting in (*settings, members[0]) if setting]
+    return _tuning_result(config, cases, objective, best, ranges_by_path, pairs, given_settings)
+
+
+def _common_keys(
+    cases: Sequence[Case], filter_name: str, ranges: Mapping[str, tuple[float, float] | None]
+) -> tuple[SearchedKey, ...]:
+    """The keys of the filter that are searched. Raises ConfigError if they differ between the cases."""
+    for case in cases:
+        quantities.check_name(filter_name, [member.name for member in case.spec.members])
+    keys_by_case = [searched_keys(case, filter_name, ranges) for case in cases]
+    if differing_paths := {key.path for keys in keys_by_case for key in {*keys} ^ {*keys_by_case[0]}}:
+        text = ", ".join(".".join(map(str, path)) for path in differing_paths)
+        raise ConfigError(f"{text}: differs between the cases: choose with {argument('case', '--case')}")
+    return keys_by_case[0]
+
+
+def _seconds_of_start(objective: Objective) -> float:
+    """The seconds that the quantity at the stated keys takes. Raises ConfigError if there is no estimate."""
+    start = tuple(key.stated for key in objective.searched)
+    seconds = measure_seconds(lambda: objective(start, 1))  # compiles
+    if not objective.exact:
+        seconds = measure_seconds(lambda: objective(start))
+    if not math.isfinite(objective(start)):
+        raise ConfigError(f"{objective.curves[0].quantity.words}: there is no estimate there")
+    return seconds
+
+
+def _judge_exactly(objective: Objective, best: Place) -> tuple[list[np.ndarray], dict[Path, tuple[float, float]]]:
+    """The exact quantity of each case with the stated and the tuned keys (1, 2); and the range of each key that is as
+    good."""
+    objective.rough = False
+    pairs = [np.array([[curve.exactly(None), curve.exactly(best)]]) for curve in objective.curves]
+    objective.rough = any(curve.rough for curve in objective.curves)
+    ranges = {key.path: flat_interval(objective, best, i) for i, key in enumerate(objective.searched) if key.of is None}
+    return pairs, ranges
+
+
+def _judge_by_sampling(objective: Objective, best: Place) -> tuple[list[np.ndarray], dict[Path, tuple[float, float]]]:
+    """The quantity of each case with the stated and the tuned keys, of all realisations and without each of the batches
+    (1 + n, 2); and the 95 % interval of each key."""
+    pairs = []
+    for variant, curve in zip(objective.variants, objective.curves, strict=True):
+        names = variant.chosen, variant.chosen + TUNED
+        quantity_pair = [replace(curve.quantity, filter=name) for name in names]
+        pairs.append(cost_by_quantity(variant.beside(best), quantity_pair, objective.count))
+    return pairs, spread_of_tuning(objective, best)
+
+
+def _tuning_result(
+    config: Config,
+    cases: Sequence[Case],
+    objective: Objective,
+    best: Place,
+    ranges: Mapping[Path, tuple[float, float]],
+    pairs: Sequence[np.ndarray],
+    settings: Sequence[str],
+) -> TuningResult:
+    """The result: tuned keys, gains and notes, with the command of the run that shows the gain."""
+    case, quantity, stated_keys = cases[0], objective.curves[0].quantity, objective.plain
+    filter_name = str(quantity.filter)
+    (i,) = [i for i, member in enumerate(case.spec.members) if member.name == filter_name]
+    prefix, tuned_keys = f"{type(case.spec).bare_keys}.{i}.", deepcopy(dict(stated_keys))
+    tuned_values, keys = from_scale(objective.searched, best, stated_keys), []
+    for path, value in tuned_values.items():
+        set_at_path(tuned_keys, path, value)
+        key = prefix + _dotted(path)
+        keys.append(
+            TunedKey(
+                key,
+                label(case.spec, key).unit,
+                value_at_path(stated_keys, path),
+                value,
+                *ranges.get(path, (None, None)),
+            )
+        )
+    axes = quantities.plan_labels(quantity, objective.curves[0].cases.base)
+    gains = tuning_gains(objective, [family_case.name for family_case in cases], pairs)
+    inert = tuple(
+        prefix + _dotted(searched_key.path)
+        for i, searched_key in enumerate(objective.searched)
+        if searched_key.of is None and has_no_effect(objective, best, i)
+    )
+    return TuningResult(
+        stem=case.stem,
+        filter=filter_name,
+        quantity=quantity,
+        unit=quantities.unit(quantity, axes),
+        minimised=objective_words(objective, len(cases)),
+        exact=objective.exact,
+        keys=tuple(keys),
+        cases=tuple(gains[:-1]),
+        all=gains[-1],
+        training=0 if objective.exact else objective.count,
+        judged=0 if objective.exact else objective.count,
+        settings={tuned_key.key: tuned_key.tuned for tuned_key in keys},
+        command=_run_command(config, settings, prefix, tuned_values, tuned_keys),
+        notes=tuple(_tuning_notes(objective, best, inert[: len(keys) - 1], tuned_values, ranges)),
+        inert=inert,
+    )
+
+
+def _run_command(
+    config: Config, settings: Sequence[str], prefix: str, paths: Iterable[Path], tuned_keys: Mapping[str, Any]
+) -> str:
+    """The command of a run with the tuned keys."""
+    setting_texts = list(settings)
+    for path in paths:
+        # An item of a list is set with the whole list, which other items of it may have changed as well.
+        text = re.sub(r"(\.\d+)+$", "", _dotted(path))
+        setting_texts.append(f"{prefix}{text}={one_line_yaml(value_at_path(tuned_keys, path[: text.count('.') + 1]))}")
+    config_name = os.fspath(config) if isinstance(config, str | os.PathLike) else "CONFIG.yaml"
+    set_options = [word for setting in dict.fromkeys(setting_texts) for word in ("--set", setting)]
+    return shlex.join(["radarsim", "run", config_name, *set_options])
+
+
+def _tuning_notes(
+    objective: Objective,
+    best: Place,
+    inert: Sequence[str],
+    tuned_paths: Iterable[Path],
+    ranges: Mapping[Path, tuple[float, float]],
+) -> list[str]:
+    """Notes on keys that end at the end of their range or have no effect, and on missing intervals."""
+    keys_and_values = list(zip(objective.searched, best, strict=True))
+    notes = [
+        tr(
+            "{key} ends at {value}, the end of the searched range; --free KEY=LOW:HIGH searches elsewhere",
+            key=_dotted(key.path),
+            value=format_number(x),
+        )
+        for key, x in keys_and_values
+        if is_at_end(key, x)
+    ]
+    quantity_words = objective.curves[0].quantity.said
+    notes += [tr("{key} has no effect on {quantity}", key=key, quantity=quantity_words) for key in inert]
+    fixed_paths = {key.path for key, x in keys_and_values if key.over.whole or is_at_end(key, x)}
+    if not objective.exact and any(path not in ranges and path not in fixed_paths for path in tuned_paths):
+        notes.append(tr("no intervals of the values: the quantity is flat there, or too noisy to tell its curvature"))
+    return notes
+
+
+def _dotted(path: Path) -> str:
+    """A path as a dotted key."""
+    return ".".join(map(str, path))
+
+
+def tune_baseline(
+    experiment: Experiment, target: str | None, **tune_options: Any
+) -> tuple[Experiment, list[str], tuple[str, float] | None]:
+    """The experiment with each of its filters as tuned over all its cases too, why some are not, and the component and
+    time, s, that they are tuned for, None if it has no component; raises ConfigError where none is.
+
+    target: the quantity, by default σ of the first component at the last scan; tune_options: as `tune` takes it."""
+    case, results, left_out = experiment.cases[0], list[TuningResult](), []
+    axes = registry.study(case.study).prepare(case).axes
+    target = target or f"sigma {axes.components[0][0]}"
+    for member in case.spec.members:
+        try:
+            results.append(tune(experiment, target, filter=member.name, **tune_options))
+        except ConfigError as error:
+            left_out.append(tr("{filter} is not tuned: {why}", filter=member.name, why=error.lines[0]))
+    if not results:
+        raise ConfigError(*left_out)
+    tuned_cases = []
+    for family_case in experiment.cases:
+        spec = family_case.spec
+        members = [*map(all_keys, spec.members), *(result.member(family_case) for result in results)]
+        tuned_cases.append(case_with_filters(family_case, members, getattr(spec, "baseline", None)))
+    quantity = results[0].quantity
+    at_s = axes.t_s[-1] if quantity.at_s is None else quantity.at_s
+    at_s = at_s if quantity.at_k is None else axes.t_s[list(axes.k).index(quantity.at_k)]
+    judged_at = (quantity.component, float(at_s)) if quantity.component else None
+    return replace(experiment, cases=tuple(tuned_cases)), left_out, judged_at

@@ -1,0 +1,1 @@
+"""Care for an installation and its results: doctor, self-test, cleaning, new studies, reproduction."""

@@ -1,0 +1,82 @@
+"""The precision that a run is to reach: its quantity, and the table that holds it."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from radarsim.api.case_work import CaseWork
+from radarsim.config.experiment import Case, Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError
+from radarsim.report.quantities import GAIN, Quantity
+from radarsim.studies import registry
+from radarsim.studies.registry import study
+
+if TYPE_CHECKING:
+    from radarsim.report.precision import Table
+
+
+class PrecisionTarget(NamedTuple):
+    """A precision in per cent, its quantity, the table that holds it, and that of curves if errors are heavy-tailed."""
+
+    percent: float
+    of: Quantity
+    table: "Table"
+    curves: "Table | None"
+
+
+def heavy_tailed_table(work: CaseWork, quantity: Quantity) -> "Table | None":
+    """The table of a case's curves where rare large errors may decide a quantity; None where they do not."""
+    if not quantity.squares or (work.plan.gaussian and not work.case.outside):
+        return None
+    return _with_user_filters(work.case, "curves", study(work.case.study).curves)
+
+
+def _with_user_filters(case: Case, name: str, table: "Table") -> "Table":
+    """A table of a study, with the rows of user filters where a case has any."""
+    if not case.outside:
+        return table
+    from radarsim.report.user_filters import tables
+
+    return tables.table_with_user_filters(name, table)
+
+
+def quantity_table(case: Case, quantity: Quantity) -> "Table":
+    """The table of a case's study that holds a quantity, from results; empty where it makes none."""
+    from radarsim.report import tables
+
+    case_study = study(case.study)
+    if quantity == GAIN:
+        from radarsim.api.result_content import gains_table
+
+        return _with_user_filters(case, quantity.table, gains_table(case_study))
+
+    def table(results: Sequence[CaseResult]) -> Any:
+        rows = case_study.table(quantity.table, results, quantity.value)
+        return tables.frame({}) if rows is None else rows
+
+    return _with_user_filters(case, quantity.table, table)
+
+
+def unknown_quantity(case: Case, quantity: Quantity) -> str:
+    """The line for a case that has no row of a quantity."""
+    return f"{case.name}: of: must be what the case has, got {quantity.name}: no {quantity.words}"
+
+
+def check_precision(experiments: Sequence[Experiment], percent: float, quantity_name: str = "sigma") -> None:
+    """Raise ConfigError for an invalid precision, an unmeasured quantity, or too few realisations for a look."""
+    from radarsim.report.precision import FIRST_LOOK
+
+    for case in (case for experiment in experiments for case in experiment.cases):
+        registry.quantity(quantity_name, case)
+    if not 0 < percent <= 100:
+        raise ConfigError(f"precision: must be > 0 and ≤ 100 %, got {percent:g}")
+    faults = [
+        f"{experiment.path or experiment.stem}: realisations: must be at least {FIRST_LOOK} for a precision "
+        f"({FIRST_LOOK}, {2 * FIRST_LOOK}, {4 * FIRST_LOOK}, … and the last are "
+        f"looked at), got {case.realisations} in {case.name}"
+        for experiment in experiments
+        for case in experiment.cases
+        if case.realisations < FIRST_LOOK
+    ]
+    if faults:
+        raise ConfigError(*faults)

@@ -1,0 +1,66 @@
+"""The command that repeats a result."""
+
+import os
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from radarsim.config import find_files
+from radarsim.config.experiment import Experiment
+
+RESULTS = "results"  # the command's default directory
+SHORT_OPTIONS = {"realisations": "-n", "seed": "--seed"}
+
+Precision = tuple[float, str]  # in per cent, and for which kind of quantity
+
+
+def repeat_command(
+    experiment: Experiment, done_counts: Mapping[str, int], overrides: Sequence[str], precision: Precision | None
+) -> str:
+    """The command that reproduces the tables, or a sentence that says why there is none.
+
+    experiment: as config and overrides give it; done_counts: the realisations of each case in the tables; precision:
+    the one that ended the cases, if any."""
+    if experiment.path is None:
+        return "none: the config was given in Python, and is printed below"
+    requested_counts = {case.name: case.realisations for case in experiment.cases}
+    counts = {done_counts.get(name, 0) for name in requested_counts}
+    if all(done_counts.get(name) == count for name, count in requested_counts.items()):
+        return command(experiment, overrides, RESULTS)
+    if len(counts) == 1:
+        other_overrides = [text for text in overrides if text.partition("=")[0].strip() != "realisations"]
+        return command(experiment, [*other_overrides, f"realisations={counts.pop()}"], RESULTS)
+    if precision is not None:
+        return command(experiment, overrides, RESULTS, precision)
+    return "none: the run was stopped, its cases at different numbers of realisations, which are listed below"
+
+
+def command(
+    experiment: Experiment,
+    overrides: Sequence[str],
+    out: str | os.PathLike,
+    precision: Precision | None = None,
+    verb: str = "run",
+) -> str:
+    """The command that runs an experiment or reads its result; a shipped config by its stem."""
+    # In a checkout the shipped folder is a link to configs/.
+    folders = {(folder / "configs").resolve() for folder in (find_files.SHIPPED, *find_files.further_folders())}
+    shipped = not experiment.path or Path(experiment.path).resolve().parent in folders
+    words = ["radarsim", verb, experiment.stem if shipped else quote_path(experiment.path or "")]
+    for override in overrides:
+        key, _, value = override.partition("=")
+        words += [SHORT_OPTIONS[key], value] if key in SHORT_OPTIONS else ["--set", override]
+    if precision is not None:
+        percent, quantity_name = precision
+        words += ["--precision", f"{percent:.17g}", *(["--of", quantity_name] if quantity_name != "sigma" else [])]
+    return shlex.join(words) + out_option(out)
+
+
+def out_option(out: str | os.PathLike) -> str:
+    """The option for the results directory at the end of a command."""
+    return f" {shlex.join(['--out', quote_path(os.fspath(out))])}" if str(out) != RESULTS else ""
+
+
+def quote_path(path: str) -> str:
+    """A path as printable text; bytes that are not UTF-8 escaped."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")

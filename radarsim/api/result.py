@@ -1,0 +1,197 @@
+"""The result of a finished experiment: tables, figures, answer, run record and report, in memory and in files."""
+
+import os
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from radarsim.api import arguments, configs
+from radarsim.api.display import Displayable, ShortTuple
+from radarsim.api.result_content import case_figures, case_tables, make_answer, question_text, with_first_baseline
+from radarsim.api.write_result import WrittenFiles, write_files
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.errors import DisagreementError, MeasureError
+from radarsim.extensions import extension_tables, extensions
+from radarsim.language.translate import plural, tr
+from radarsim.report import exact_check, provenance
+from radarsim.report.row_notes import with_note_texts
+from radarsim.studies.registry import quantities, study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from radarsim.api.result_content import Answer
+    from radarsim.report.drawing.model import Figure
+
+
+MAX_NOTEBOOK_ROWS = 40
+
+
+class Result(Displayable):
+    """A finished experiment: cases, tables (pandas) and figures (Matplotlib). It writes nothing unless `write` is
+    called.
+
+    written: the files of the last call of `write`; None before the first."""
+
+    def __init__(self, experiment: Experiment, cases: Sequence[CaseResult], facts: Mapping[str, Any]):
+        self.experiment, self.facts = experiment, dict(facts)
+        self.cases: tuple[CaseResult, ...] = ShortTuple(cases)
+        self.written: WrittenFiles | None = None
+
+    def _answer_lines(self) -> Sequence[str]:
+        """The experiment, then the answer."""
+        cases = plural("{count} case", "{count} cases", len(self.cases))
+        counts = {"cases": cases, "realisations": provenance.realisations_text([case.count for case in self.cases])}
+        return (tr("{config}: {cases}, {realisations}", config=self._label, **counts), *self.answer)
+
+    @property
+    def _label(self) -> str:
+        return self.experiment.stem
+
+    @property
+    def _html(self) -> Sequence[str]:
+        """Question, answer, realisations; below the figure σ and gain at the last scan; text escaped."""
+        from html import escape
+
+        curve_columns = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
+        columns = [*curve_columns, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
+        rows = self.last_scan[columns].dropna(axis=1, how="all")
+        table = rows.to_html(
+            index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MAX_NOTEBOOK_ROWS
+        )
+        answer = "".join(f"<p>{escape(line)}</p>" for line in self.answer)
+        count = escape(provenance.realisations_text([case.count for case in self.cases]))
+        return f"<h4>{escape(self.question)}</h4>{answer}<p>{count}; {tr('95 % intervals')}.</p>", table
+
+    @property
+    def question(self) -> str:
+        """The experiment's question, in one sentence."""
+        return question_text(self.experiment)
+
+    @cached_property
+    def answer(self) -> tuple[str, ...]:
+        """Sentences with numbers and 95 % intervals.
+
+        >>> import radarsim
+        >>> radarsim.run("rls2", realisations=2000).answer[0].split(":")[0]
+        'Range'
+        """
+        return self._answer.texts
+
+    @cached_property
+    def _answer(self) -> "Answer":
+        return make_answer(self.cases, self._tables)
+
+    @property
+    def tables(self) -> dict:
+        """Every table by the stem of its file: `curves`, `gains`, the study's own, and those of extensions.
+
+        They are copies, like `curves` and `gains`: `write` always writes the numbers of the run.
+
+        >>> import radarsim
+        >>> sorted(radarsim.run("rls2", realisations=2000).tables)
+        ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
+        """
+        return {name: with_note_texts(table) for name, table in self._tables.items()}
+
+    @cached_property
+    def _tables(self) -> dict:
+
+        return case_tables(self.cases, configs.shipped_stem(self.experiment))
+
+    @property
+    def curves(self) -> "pd.DataFrame":
+        """sigma(k), bias and spread of every case, filter and component: a DataFrame with the columns of curves.csv.
+
+        >>> import radarsim
+        >>> curves = radarsim.run("rls2", realisations=2000).curves
+        >>> first = curves[(curves["filter"] == "r") & (curves["component"] == "r")].iloc[0]
+        >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
+        True
+        """
+        return with_note_texts(self._tables["curves"])
+
+    @property
+    def gains(self) -> "pd.DataFrame":
+        """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
+        return with_note_texts(self._tables["gains"])
+
+    @property
+    def last_scan(self) -> "pd.DataFrame":
+        """The rows of curves at the last scan of each case, filter and component, joined with those of gains.
+
+        `note` warns where σ's interval is unreliable, `gain_note` where the gain's is; each column exists only if
+        needed."""
+        keys = ["case", "filter", "component"]
+        last = self.curves.groupby(keys, sort=False).tail(1)
+        gains = with_first_baseline({"gains": self.gains}, self.cases)["gains"]
+        gains = gains.groupby(keys, sort=False).tail(1).rename(columns={"note": "gain_note"})
+        return last.merge(gains, on=[*keys, "k", "t_s"], how="left")
+
+    @cached_property
+    def _figures_by_name(self) -> "dict[str, Figure]":
+        return case_figures(self.cases, self._tables, self.experiment)
+
+    def write(
+        self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True, width_mm: float | None = None
+    ) -> "WrittenFiles":
+        """Write tables, figures, run.json and report.html into out/<stem>/, and update out/index.html.
+
+        figures may name the formats of their files: svg, png, pdf; width_mm overrides their width. Returns the files
+        written. Raises DisagreementError, after writing, if there are `faults`."""
+        from radarsim.report import index_page
+
+        arguments.check_arguments(out=out, figures=figures, width_mm=width_mm)
+        folder = Path(out) / self.experiment.stem
+        for extension in extensions():
+            self._tables.update(extension.updated_tables(self._tables, self.experiment.study, Path(out)))
+        formats = arguments.figure_formats(figures)
+        self.facts["warnings"] = [*self.facts["warnings"], *provenance.replacement_warnings(folder, self.experiment)]
+        facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
+        facts["warnings"] = [*self.faults, *facts["warnings"]]
+        write = partial(write_files, draw=bool(formats), formats=formats, width_mm=width_mm)
+        self.written = write(self.experiment, self.cases, folder, facts, tables_by_name=self._tables)
+        index_page.write_index(Path(out))
+        self.check()
+        return self.written
+
+    @cached_property
+    def faults(self) -> tuple[str, ...]:
+        """A line for each difference between exact and measured values that chance does not explain."""
+        case_study, tables = study(self.experiment.study), self._tables
+        approximate_cases = [case.name for case in self.experiment.cases if case_study.exact_but_for(case)]
+        exempt_tables = (*extension_tables(), *(() if case_study.exact_errors else ("curves", "gains")))
+        return (
+            *exact_check.disagreements(
+                tables, approximate_cases, exempt_tables, quantities(case_study.name, self.cases[0].spec)
+            ),
+            *(line for extension in extensions() for line in extension.disagreements(tables)),
+        )
+
+    def check(self) -> None:
+        """Raises DisagreementError if there are `faults`, or MeasureError for errors of a study's author."""
+        if self.faults:
+            error = DisagreementError(*self.faults)
+            error.result = self
+            raise error
+        if errors := [line for extension in extensions() for line in extension.author_errors(self._tables)]:
+            unmeasured = MeasureError(*errors)
+            unmeasured.result = self
+            raise unmeasured
+
+    @property
+    def unmet(self) -> list[str]:
+        """The targets of precision or time that the run did not reach, a text for each."""
+        return list(self.facts.get("unmet", ()))
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings on the numbers: faults, damaged or mixed blocks, too few realisations."""
+        return [*self.faults, *self.facts["warnings"], *self._answer_warnings]
+
+    @cached_property
+    def _answer_warnings(self) -> Sequence[str]:
+        return self.written.answer_warnings if self.written is not None else self._answer.warnings

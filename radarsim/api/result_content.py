@@ -1,0 +1,240 @@
+"""Tables, answers and figures of a result, from the results of its cases."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern
+from radarsim.engine.results import CaseResult
+from radarsim.extensions import extension_figures, extensions
+from radarsim.language.current import ENGLISH, current_language
+from radarsim.language.translate import tr, translate_names
+from radarsim.report import answer_warnings, coinciding_lines, interval_notes, panel_layout, sentences
+from radarsim.report import captions as report_captions
+from radarsim.report import tables as common
+from radarsim.report.drawing.model import Figure, reworded
+from radarsim.report.math_text import plain_text
+from radarsim.report.row_notes import has_note
+from radarsim.report.sentences import Sentence
+from radarsim.report.user_filters import answer as user_filters_answer
+from radarsim.report.user_filters import figures, tables
+from radarsim.report.wording import estimate
+from radarsim.studies.floors import table
+from radarsim.studies.interface import Study
+from radarsim.studies.registry import quantities, study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
+    """All tables of an experiment by the stem of their file: curves, gains, the study's own, those of extensions.
+
+    A study whose errors are not of all realisations at common scans makes its own curves and gains. stem: that of the
+    shipped config, whose claims are all in their table, even those that can no longer be judged."""
+    case_study = study(results[0].study)
+    tables_by_name, user_rows = measured_tables(results), tables.measured_rows(results)
+    for extension in extensions():
+        tables_by_name |= extension.tables(results, tables_by_name, user_rows, stem)
+    tables_by_name = interval_notes.add_notes(
+        tables_by_name, results, case_study.exact_errors, quantities(results[0].study, results[0].spec)
+    )
+    tables_by_name = tables.with_user_filters(tables_by_name, results, user_rows)
+    tables_by_name["curves"] = table.with_floors(tables_by_name["curves"], case_study.floors(results))
+    return tables_by_name
+
+
+def measured_tables(results: Sequence[CaseResult]) -> dict:
+    """The measured tables: curves, gains, and the study's own."""
+    study_tables = study(results[0].study).tables(results)
+    shared = {"curves": common.curves, "gains": common.gains}
+    tables_by_name = {
+        name: study_tables[name] if name in study_tables else table(results) for name, table in shared.items()
+    } | study_tables
+    if any(result.against for result in results):
+        tables_by_name["gains"] = _against_all(results, lambda result: measured_tables([result])["gains"])
+    return tables_by_name
+
+
+def gains_table(case_study: Study) -> "Callable[[Sequence[CaseResult]], pd.DataFrame]":
+    """The function that makes only the gains table of a study's results, against all their baselines."""
+
+    def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
+        if any(result.against for result in results):
+            return _against_all(results, lambda result: case_study.gains([result]))
+        return case_study.gains(results)
+
+    return gains
+
+
+def _against_all(results: Sequence[CaseResult], gains: "Callable[[CaseResult], pd.DataFrame]") -> "pd.DataFrame":
+    """The gains of each case against its first baseline, then against the others."""
+    baseline_results = [replace(against, against=()) for result in results for against in (result, *result.against)]
+    return common.stack_tables([gains(result) for result in baseline_results])
+
+
+def with_first_baseline(
+    tables_by_name: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
+) -> Mapping[str, "pd.DataFrame"]:
+    """The tables with gains against the first baseline of each case only."""
+    if not any(result.against or result.outside for result in results):
+        return tables_by_name
+    return {**tables_by_name, "gains": common.gains_against_baselines(tables_by_name["gains"], results)}
+
+
+MAX_BASELINE_SENTENCES = 6  # on baselines after the first
+
+
+class Answer(NamedTuple):
+    """The answer of an experiment: its sentences, and warnings on the intervals that they rest on."""
+
+    texts: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
+    """The answer of an experiment: on user filters, of its study, and gains against further baselines."""
+    study_tables = with_first_baseline(tables.without_user_filters(tables_by_name, results), results)
+    further_baselines = [gain for result in results for gain in result.against]
+    answer = [
+        *user_filters_answer.answer(results, tables_by_name),
+        *(
+            sentences.as_sentence(sentence, study_tables)
+            for sentence in study(results[0].study).answer(results, study_tables)
+        ),
+        *(
+            sentence
+            for baseline in further_baselines[:MAX_BASELINE_SENTENCES]
+            for sentence in _gains_against(baseline, tables_by_name)
+        ),
+    ]
+    names = config_names(results)
+    texts = [translate_names(str(sentence), names) for sentence in answer]
+    if further_baselines:
+        texts.append(tr("Further gains are in gains.csv."))
+    warnings = [
+        translate_names(line, names) for line in answer_warnings.answer_warnings(results, tables_by_name, answer)
+    ]
+    return Answer(tuple(texts), tuple(warnings))
+
+
+def question_text(experiment: Experiment) -> str:
+    """The question of an experiment, in one sentence."""
+    question = user_filters_answer.question(experiment) or study(experiment.study).question(experiment)
+    return translate_names(question, config_names(experiment.cases))
+
+
+def config_names(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
+    """Names in configs that sentences translate; none in English, which uses them as they stand."""
+    if current_language() == ENGLISH:
+        return frozenset()
+    words: set[str] = set()
+    for case in cases:
+        words |= {case.name, case.name.partition(" ")[0]}
+        words.update(re.findall(r"'([^']+)'", f"{case.spec.model_dump()}{case.swept}"))
+    return frozenset(name for word in words for name in (word, word.replace("_", " ")) if name)
+
+
+def _gains_against(result: CaseResult, tables_by_name: Mapping[str, "pd.DataFrame"]) -> list[Sentence]:
+    """The gain of each filter in the first component against the baseline of a result, at the last scan of both."""
+    gains = common.gains_against_baselines(tables_by_name["gains"], [result])
+    last = gains[gains["component"].eq(gains["component"].iloc[0])] if len(gains) else gains
+    last = last.groupby("filter", sort=False).tail(1)
+    if not len(last):
+        return []
+    keys = ("gain_percent", "gain_lo", "gain_hi")
+    texts = [f"{row['filter']} {estimate((row[key] for key in keys), '%', '.3g')}" for row in last.to_dict("records")]
+    text = tr(
+        "{case}, gain in {component} against {base} at {t} s: {filters}.",
+        case=result.name,
+        base=result.baseline,
+        component=last["component"].iloc[0],
+        t=f"{last['t_s'].max():g}",
+        filters="; ".join(texts),
+    )
+    return [Sentence(text, sentences.intervals("gains", "gain", last))]
+
+
+def case_figures(
+    results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"], experiment: Experiment
+) -> dict[str, Figure]:
+    """All figures of an experiment, described, by the stem of their file: the study's own, and of sweeps.
+
+    The config may select fewer: `Experiment.drawn`."""
+    case_study = study(results[0].study)
+    figure_tables = _with_bands(tables_by_name)
+    figures_by_name = _study_figures(results, tables.without_user_filters(figure_tables, results), experiment)
+    user_figures = figures.figures(results, figure_tables, experiment, figures_by_name, case_study.shown())
+    figures_by_name = user_figures | {  # those of user filters first: the answer is about them
+        name: figure for name, figure in figures_by_name.items() if name not in user_figures
+    }
+    for extension in extensions():
+        figures_by_name |= extension.figures(tables_by_name)
+    if not case_study.draws_sweeps:
+        from radarsim.report import sweep_figures
+
+        curves = common.group_by(figure_tables["curves"], "case", "filter", "component")
+        figures_by_name |= sweep_figures.sweep_figures(figures.with_user_filters_in_cases(results), curves)
+    if any(has_note(tables_by_name[name]).any() for name in ("curves", "gains")):
+        figures_by_name = {name: panel_layout.with_remark_on_bands(figure) for name, figure in figures_by_name.items()}
+    translate = partial(translate_names, names=config_names(results))
+    return {
+        name: coinciding_lines.join_coinciding_lines(
+            reworded(report_captions.with_meaning_of_crosses(figure), translate)
+        )
+        for name, figure in figures_by_name.items()
+    }
+
+
+def _study_figures(
+    results: Sequence[CaseResult], study_tables: Mapping[str, "pd.DataFrame"], experiment: Experiment
+) -> dict[str, Figure]:
+    """The figures of a study; those of gains against each further baseline get its number: `gain_r_2`."""
+    case_study = study(results[0].study)
+    figures_by_name = dict(case_study.figures(results, with_first_baseline(study_tables, results), experiment))
+    for n in range(max(len(result.against) for result in results)):
+        baseline_results = [result.against[n] for result in results if len(result.against) > n]
+        gains = common.gains_against_baselines(study_tables["gains"], baseline_results)
+        baseline_figures = case_study.figures(baseline_results, {**study_tables, "gains": gains}, experiment)
+        figures_by_name |= {
+            f"{name}_{n + 2}": figure for name, figure in baseline_figures.items() if name.startswith("gain_")
+        }
+    return figures_by_name
+
+
+def _with_bands(tables_by_name: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
+    """The tables for figures: without the interval of σ or gain where a note marks it."""
+    thinned_tables = {}
+    for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
+        table = tables_by_name[name]
+        if (is_marked := has_note(table)).any():
+            thinned_tables[name] = table.assign(**{end: table[end].mask(is_marked) for end in ends})
+    return {**tables_by_name, **thinned_tables}
+
+
+def undeclared_figures(case_study: Study, described: Iterable[str]) -> list[str]:
+    """A line on figures that the study's keys do not name, if any; one drawn several times has a suffix: `gain_r_2`."""
+    declared = case_study.keys().figure_names
+    if declared is None:
+        return []
+    allowed = (*declared, *extension_figures(), *COMMON_FIGURES)
+    undeclared = [
+        name
+        for name in described
+        if not any(matches_pattern(name, pattern) or name.startswith(f"{pattern}_") for pattern in allowed)
+    ]
+    if not undeclared:
+        return []
+    names = ", ".join(undeclared)
+    return [f"study {case_study.name}: draws {names}, which its `figure_names` lacks: {', '.join(declared)}"]
+
+
+def captions(figures_by_name: Mapping[str, Figure]) -> str:
+    """The captions of figures as Markdown: their content, then how they are drawn."""
+    parts = []
+    for name, figure in figures_by_name.items():
+        caption = f"**{plain_text(figure.title)}.** {plain_text(figure.caption)}\n"
+        parts.append("\n\n".join(filter(None, (f"## {name}", figure.headline, caption))))
+    return "\n".join([f"# {tr('Captions')}\n", *parts])

@@ -1,0 +1,162 @@
+"""One experiment from config to written results, for the command and Python."""
+
+import os
+import time
+from collections.abc import Sequence
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+from radarsim.api import arguments
+from radarsim.api.configs import Config, Overrides, load
+from radarsim.api.executor import open_executor
+from radarsim.api.load_experiments import combine_overrides, user_code_lines
+from radarsim.api.precision_target import check_precision
+from radarsim.api.progress import Progress
+from radarsim.api.repeat_command import repeat_command
+from radarsim.api.run_facts import run_facts
+from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, simulate
+from radarsim.api.stored_runs import make_result
+from radarsim.api.writing_time import writing_seconds
+from radarsim.config.experiment import Experiment
+from radarsim.engine import stopping
+from radarsim.engine.executors import Executor
+from radarsim.engine.machine import available_cores
+from radarsim.engine.stopping import Signals, Stop
+from radarsim.errors import ConfigError, TargetUnmet
+from radarsim.extensions import StopRule, stop_rule
+from radarsim.threads import limited
+
+if TYPE_CHECKING:
+    from radarsim.api.result import Result
+
+
+MIN_MEASURED_LIMIT_S = 20.0  # a shorter time limit would mostly go on measuring the time of tables and figures
+
+
+def run(
+    config: Config,
+    *,
+    realisations: float | None = None,
+    seed: int | None = None,
+    overrides: Overrides = (),
+    precision: float | None = None,
+    of: str = "sigma",
+    decide: bool = False,
+    time_limit: float | Stop | None = None,
+    threads: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    executor: Executor | None = None,
+    out: str | os.PathLike[str] | None = None,
+    figures: bool | str | Sequence[str] = True,
+    width_mm: float | None = None,
+    progress: Progress | None = None,
+    stop: Signals | None = None,
+) -> "Result":
+    """Run an experiment and return its result; writes nothing unless `out` names a directory.
+
+    config is a path, the name of a shipped config, a dict as YAML would give it, or an Experiment loaded with these
+    overrides. overrides change keys of it: `{"radar": {"sigma_range_m": 300}}`, the same with dotted keys,
+    `{"radar.sigma_range_m": 300}`, or texts, `["radar.sigma_range_m=300"]`.
+
+    With a precision, in per cent, a case ends at the first of 2000, 4000, 8000 …, N realisations at which the 95 %
+    half-width of every σ is below it; `of` names another quantity of the study (gain, lock, …). If errors are not known
+    to be Gaussian, σ and gains are not judged before 64,000, or before 512,000 after large errors. decide: all cases
+    end at the first of these numbers at which every claim of the config is decided. time_limit is in seconds, including
+    tables and figures, or a condition that is already running. `result.unmet` names the targets that were not reached.
+    workers: number of processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already
+    open. width_mm: width of the figures, instead of their own. progress is called with the realisations that are done,
+    are to be done, and were stored, where cases are weighed by their time.
+
+    Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
+    TargetUnmet if the time did not suffice for a single block, and Interrupted on a signal; finished blocks are then
+    stored. Raises DisagreementError, after writing everything, if measured and exact values differ by more than chance
+    explains: one of them is wrong. Its `result` is the result that would have been returned.
+
+    >>> result = run("rls2", realisations=2000)
+    >>> len(result.curves) > 50
+    True
+    """
+    checked_arguments: dict[str, Any] = {
+        "threads": threads,
+        "workers": workers,
+        "precision": precision,
+        "time_limit": time_limit,
+    }
+    checked_arguments |= {"executor": executor, "out": out, "figures": figures, "width_mm": width_mm}
+    overrides = combine_overrides(arguments.check_arguments(overrides, **checked_arguments), realisations, seed)
+    experiment = load(config, overrides)
+    if precision is not None:
+        check_precision([experiment], precision, of)
+    rule = required_stop_rule() if decide else None
+    if rule is not None:
+        rule.check(experiment)
+    limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
+    started, writing_s = time.perf_counter(), None
+    filter_warnings = _filter_warnings(experiment)
+    if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= MIN_MEASURED_LIMIT_S:
+        limit = limit.reserving(writing_s := writing_seconds(experiment, figures, width_mm))
+    with open_executor(workers, scheduler) if executor is None else nullcontext(executor) as pool:
+        threads = pool.workers if pool else available_cores() if threads is None else int(threads)
+        options = RunOptions(out, threads, stopping.AnyStop(stop, limit), pool)
+        if rule is not None:
+            simulated = rule.simulate(experiment, options, progress)
+        else:
+            simulated = simulate(experiment, options, progress=progress, precision=precision, quantity_name=of)
+        if stop is not None:
+            stop.raise_if_received()
+    if not simulated.cases:
+        raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was finished by then")
+    with limited(threads):
+        facts = run_facts(simulated, threads, time.perf_counter() - started)
+    if writing_s is not None:
+        facts["seconds_kept_for_writing"] = writing_s
+    if rule is not None:
+        undecided = rule.unmet(experiment, simulated)
+        facts |= {"unmet": [*facts["unmet"], *undecided], "stop": "; ".join((*facts["unmet"], *undecided)) or "done"}
+    reached_precision = None if simulated.stopped or precision is None else (precision, of)
+    repeat = repeat_command(experiment, simulated.done, overrides, reached_precision)
+    result = make_result(experiment, simulated, facts, repeat)
+    run_warnings = (line for case in experiment.cases for member in case.outside for line in member.warnings())
+    result.facts["warnings"] += dict.fromkeys((*filter_warnings, *run_warnings))
+    if out is None:
+        result.check()
+    else:
+        result.write(out, figures, width_mm)
+    return result
+
+
+def _filter_warnings(experiment: Experiment) -> list[str]:
+    """Warnings on the user filters that the config names, from checks before the run."""
+    if not user_code_lines([experiment]):
+        return []
+    from radarsim.api.filter_checks import check_user_filter
+
+    user_filters = [(case, member) for case in experiment.cases for member in case.outside if member.written]
+    return list(dict.fromkeys(line for case, member in user_filters for line in check_user_filter(case, member)))
+
+
+def required_stop_rule() -> StopRule:
+    """The rule of `decide`. Raises ConfigError where no extension has one."""
+    if (rule := stop_rule()) is None:
+        raise ConfigError("decide: no installed part of radarsim has a rule that ends a run")
+    return rule
+
+
+def run_share(
+    experiment: Experiment,
+    share: tuple[int, int],
+    *,
+    out: str | os.PathLike[str],
+    threads: int | None = None,
+    executor: Executor | None = None,
+    time_limit: Stop | None = None,
+    progress: Progress | None = None,
+    stop: Signals | None = None,
+) -> Shares:
+    """Compute a share of every case, such as (2, 3) for the second of three, into the store under out. See `run`."""
+    options = RunOptions(out, threads, stopping.AnyStop(stop, time_limit), executor)
+    shares = compute_shares(experiment, share, options, progress=progress)
+    if stop is not None:
+        stop.raise_if_received()
+    return shares

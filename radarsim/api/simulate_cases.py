@@ -1,0 +1,207 @@
+"""The cases of an experiment simulated one after the other, to a number of realisations or to a precision."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from radarsim.api.case_results import case_result
+from radarsim.api.case_work import CaseWork
+from radarsim.api.precision_target import PrecisionTarget, heavy_tailed_table, quantity_table, unknown_quantity
+from radarsim.api.progress import Progress, WeightedProgress
+from radarsim.config.experiment import Case, Experiment
+from radarsim.engine.collect import collect, compute_share
+from radarsim.engine.dispatch import CollectedSums, ShareResult
+from radarsim.engine.executors import Executor
+from radarsim.engine.results import CaseResult
+from radarsim.engine.stopping import Stop
+from radarsim.errors import ConfigError
+from radarsim.report.quantities import SIGMA
+from radarsim.studies import registry
+
+if TYPE_CHECKING:
+    from radarsim.report.precision import WidestInterval
+
+
+@dataclass
+class SimulatedCases:
+    """For each case with a finished realisation, in the experiment's order, its work and sums.
+
+    stopped: why not all is done; precision: the target, if any; cells: the widest interval by case name."""
+
+    cases: list[tuple[Case, CaseWork, CollectedSums]] = field(default_factory=list)
+    precision: float | None = None
+    cells: "dict[str, WidestInterval]" = field(default_factory=dict)
+    stopped: str | None = None
+
+    @property
+    def done(self) -> dict[str, int]:
+        """Finished realisations, by case name."""
+        return {case.name: collected.count for case, _, collected in self.cases}
+
+    @property
+    def unmet(self) -> list[str]:
+        """The targets of time and precision that were not reached, a text for each, with the widest interval of all."""
+        reasons = [] if self.stopped is None else [self.stopped]
+        if self.precision is None:
+            return reasons
+        wide = [cell for cell in self.cells.values() if cell.percent >= self.precision]
+        cases = f" in {len(wide)} of {len(self.cells)} cases" if len(self.cells) > 1 else ""
+        if wide:
+            worst = max(wide, key=lambda cell: cell.percent)
+            reasons.append(
+                f"precision of {self.precision:g} {worst.of.half_width_unit} not reached{cases}; worst: {worst}"
+            )
+        return reasons
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Result of computing share `number` of `of`, by case name; cases of one identity appear once."""
+
+    config: str
+    number: int
+    of: int
+    cases: dict[str, ShareResult]
+
+    @property
+    def unmet(self) -> list[str]:
+        """Why the share is incomplete."""
+        return list(dict.fromkeys(share.stopped for share in self.cases.values() if share.stopped))
+
+    @property
+    def warnings(self) -> list[str]:
+        """Damaged and mixed blocks."""
+        return list(dict.fromkeys(warning for share in self.cases.values() for warning in share.warnings))
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How an experiment is computed: no option changes a number.
+
+    out is the results directory, None for none; executor replaces the threads; stop is called between tasks."""
+
+    out: str | os.PathLike[str] | None = None
+    threads: int | None = None
+    stop: Stop | None = None
+    executor: Executor | None = None
+
+
+def simulate(
+    experiment: Experiment,
+    options: RunOptions,
+    *,
+    progress: Progress | None = None,
+    precision: float | None = None,
+    quantity_name: str = "sigma",
+) -> SimulatedCases:
+    """Collect every case in turn, cases of one identity once; progress(done, total, from_store) is over all of them, in
+    realisations of mean length.
+
+    precision is in per cent: a case ends at the first look at which every quantity of this name is known to that
+    precision, and large errors would have occurred (see report.precision). Raises ConfigError where a case has none.
+    """
+    collected_by_key: dict[tuple[str, int], tuple[CollectedSums, WidestInterval | None]] = {}
+    simulation, works = SimulatedCases(precision=precision), works_by_identity(experiment)
+    weighted_progress = WeightedProgress(progress, {key: (work, key[1]) for key, work in works})
+    with ExitStack() as stack:
+        if precision is not None and options.out is None:
+            options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
+        for case, (key, work) in zip(experiment.cases, works, strict=True):
+            if key not in collected_by_key:
+                collector = _collector(work, options, weighted_progress.of(key), collect)
+                target = None
+                if precision is not None:
+                    quantity = registry.quantity(quantity_name, case)
+                    target = PrecisionTarget(
+                        precision, quantity, quantity_table(case, quantity), heavy_tailed_table(work, quantity)
+                    )
+                collected_by_key[key] = _collect_case(case, work, target, collector)
+            collected, cell = collected_by_key[key]
+            if collected.count:
+                simulation.cases.append((case, work, collected))
+            if cell is not None:
+                simulation.cells[case.name] = replace(cell, case=case.name)
+            if collected.stopped:
+                simulation.stopped = collected.stopped
+                break
+    return simulation
+
+
+def works_by_identity(experiment: Experiment) -> list[tuple[tuple[str, int], CaseWork]]:
+    """For each case its identity and number of realisations, and the work of the first case that has both."""
+    works_by_key: dict[tuple[str, int], CaseWork] = {}
+    works = [CaseWork(case) for case in experiment.cases]
+    keys = [(work.identity, work.case.realisations) for work in works]
+    return [(key, works_by_key.setdefault(key, work)) for key, work in zip(keys, works, strict=True)]
+
+
+def _collector(
+    work: CaseWork, options: RunOptions, progress: Progress, collect_function: Callable[..., Any]
+) -> Callable[..., Any]:
+    """The engine's `collect` or `compute_share` for a case, as a function of the number of realisations."""
+    engine_options = {"threads": options.threads, "stop": options.stop, "executor": options.executor}
+    return partial(collect_function, work, store=options.out, progress=progress, **engine_options)
+
+
+def _collect_case(
+    case: Case, work: CaseWork, target: PrecisionTarget | None, collector: Callable[[int], CollectedSums]
+) -> "tuple[CollectedSums, WidestInterval | None]":
+    """The sums of a case, and the cell of its widest interval where a precision is set."""
+    if target is None:
+        return collector(case.realisations), None
+    from radarsim.report.precision import FIRST_LOOK, MIN_REALISATIONS, look_counts, minimum_realisations, widest_cell
+
+    looks: list[CollectedSums] = []
+    best, cell = None, None
+    for n in look_counts(case.realisations, MIN_REALISATIONS if target.curves else FIRST_LOOK):
+        looks.append(collector(n))
+        # A run that is stopped before a look may hold fewer realisations without a gap than at the previous look.
+        if best is None or looks[-1].count > best.count:
+            best = looks[-1]
+            cell = widest_cell(case_result(case, work, best), target.table, target.of) if best.count else None
+            if cell is None and best.count and target.of != SIGMA:
+                raise ConfigError(unknown_quantity(case, target.of))
+        if looks[-1].stopped or cell is None:
+            break
+        if cell.percent < target.percent and n >= minimum_realisations(case_result(case, work, best), target.curves):
+            break
+    assert best is not None  # there is a look at every number of realisations that check_precision accepts
+    computed = sum(look.computed for look in looks)
+    total = replace(
+        best,
+        asked=case.realisations,
+        computed=computed,
+        from_store=max(0, best.count - computed),
+        kernel_seconds=sum(look.kernel_seconds for look in looks),
+        seconds=sum(look.seconds for look in looks),
+        stopped=looks[-1].stopped,
+        warnings=tuple(dict.fromkeys(warning for look in looks for warning in look.warnings)),
+    )
+    return total, cell
+
+
+def compute_shares(
+    experiment: Experiment, share: tuple[int, int], options: RunOptions, *, progress: Progress | None = None
+) -> Shares:
+    """Compute a share of every case, such as (2, 3) for the second of three, into the store under options.out.
+
+    Ends early on `options.stop`."""
+    assert options.out is not None  # a share is only what it stores
+    works = dict(works_by_identity(experiment))
+    weighted_progress = WeightedProgress(progress, {key: (work, -(-key[1] // share[1])) for key, work in works.items()})
+    shares: dict[str, ShareResult] = {}
+    for key, work in works.items():
+        share_result = _collector(work, options, weighted_progress.of(key), compute_share)(key[1], share)
+        shares[work.case.name] = share_result
+        if share_result.stopped:
+            break
+    return Shares(experiment.stem, *share, shares)
+
+
+def collected_results(simulated: SimulatedCases) -> list[CaseResult]:
+    """The result of each simulated case."""
+    return [case_result(case, work, collected) for case, work, collected in simulated.cases]

@@ -1,0 +1,317 @@
+"""Results, forecasts, stored blocks and inventories on the terminal."""
+
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from radarsim.cli.console import case_count_text, print_field, print_line, print_table, print_warnings
+from radarsim.extensions import extensions
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import join_names, plural, shorten_names, term, tr
+from radarsim.report.wording import format_if_known, significant_digits
+from radarsim.report.wording import unit as unit_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from radarsim.api.compare import Comparison
+    from radarsim.api.cost import CaseCost, CostEstimate, RequiredRealisations
+    from radarsim.api.inventory import Inventory
+    from radarsim.api.maintenance.clean import RemovedBlocks
+    from radarsim.api.maintenance.doctor import Inspection
+    from radarsim.api.result import Result
+    from radarsim.api.simulate_cases import Shares
+    from radarsim.config.experiment import Experiment
+
+
+MAX_STARTED_CASES = 4  # cases whose stored part is listed
+MAX_ROWS = 36  # of the last scan's table; for a larger experiment the answer and the files suffice
+NARROW_INTERVAL_MARKS = {  # behind intervals that are too narrow
+    " *": term("heavy tails: the interval is too narrow"),
+    " †": term("the interval is too narrow: the column note of curves.csv or gains.csv says why"),
+}
+DROPPED_TEXT = term("dropped {files} in {folders} of {path}: {size:.2f} MB")
+
+
+def print_result(result: "Result") -> None:
+    """The answer of a run, σ at the last scan, the verdicts, and where the files are."""
+
+    written = result.written
+    assert written is not None  # the commands write what they print
+    for line in written.answer:
+        print_line(line)
+    print_last_scan(result)
+    for label, text in (line for extension in extensions() for line in extension.result_lines(result)):
+        print_field(label, text)
+    figure_files = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
+    other_tables = sum(name.endswith(".csv") for name in written.files) - 1
+    print_field(
+        "tables", tr("{file} and {count} more there", file=str(written.folder / "curves.csv"), count=other_tables)
+    )
+    if figure_files:
+        kinds = join_names(sorted({path.suffix[1:].upper() for path in figure_files}, reverse=True))
+        values = {
+            "folder": str(written.folder / "figures"),
+            "count": len({path.stem for path in figure_files}),
+            "kinds": kinds,
+        }
+        print_field("figures", tr("{folder} ({count}, each as {kinds})", **values))
+    print_field("report", str(written.folder / "report.html"))
+    if written.removed:
+        removed_names = shorten_names(written.removed, 3)
+        print_field("removed", tr("left by an earlier run, not written by this one: {names}", names=removed_names))
+    print_warnings(result.warnings)
+
+
+def print_last_scan(result: "Result") -> None:
+    """σ with interval, exact σ and gain of each case, filter and component at the last scan, unless there are too many.
+    A case is named by its swept values."""
+    from radarsim.report import case_selection
+
+    if 0 < len(result.last_scan) <= MAX_ROWS:
+        names = dict(
+            zip((case.name for case in result.cases), case_selection.distinct_case_names(result.cases), strict=True)
+        )
+        print_last_scan_rows(result.experiment.stem, result.last_scan, names)
+
+
+def print_last_scan_rows(stem: str, last_scan: "pd.DataFrame", names: Mapping[str, str]) -> None:
+    """The table of rows of `Result.last_scan`, by names for the cases; common values are in its title."""
+    scan_rows: Iterable[Any] = last_scan.itertuples()  # named by column, which pandas' stubs do not know
+    rows = [
+        (
+            *(names[row.case], row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
+            f"{significant_digits(row.sigma)} {tr(unit_of(row.unit))}",
+            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}"
+            + narrow_interval_mark(row, "note"),
+            format_if_known(row.exact_sigma),
+            format_if_known(row.gain_percent, ".2f", " %"),
+            format_if_known(row.gain_lo, ".2f", " … ")
+            + format_if_known(row.gain_hi, ".2f")
+            + narrow_interval_mark(row, "gain_note"),
+        )
+        for row in scan_rows
+    ]
+    columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
+    print_varying_columns(stem, ("case", "at"), columns, rows, columns[3:], ("exact", "95 %"))
+    for mark, reason in NARROW_INTERVAL_MARKS.items():
+        if any(mark in cell for row in rows for cell in row[-4:]):
+            print_field("", f"{mark.strip()} {tr(reason)}")
+
+
+def print_varying_columns(
+    title: str,
+    common_columns: Sequence[str],
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    right: Sequence[str],
+    spare: Sequence[str],
+) -> None:
+    """Print a table without empty columns; columns of `common_columns` that have one value move to the title."""
+    values = [{row[i] for row in rows} for i in range(len(columns))]
+    title_values = {
+        i: rows[0][i]
+        for i, distinct_values in enumerate(values)
+        if distinct_values == {""} or (len(distinct_values) == 1 and columns[i] in common_columns)
+    }
+    column_indices = [i for i in range(len(columns)) if i not in title_values]
+    title = ", ".join(filter(None, dict.fromkeys((title, *title_values.values()))))
+    cells = [[row[i] for i in column_indices] for row in rows]
+    print_table(title, [columns[i] for i in column_indices], cells, right=right, spare=spare)
+
+
+def print_comparison(compared: "Comparison") -> None:
+    """Differences of stored results at the last common time, and the files."""
+    from radarsim.report.comparison import sentences
+
+    compared_rows = [row for row in compared.last if row["quantity"] in dict(compared.told)]
+    against = {row["against_label"] for row in compared.last}
+    for quantity, words in compared.told if len(compared_rows) <= MAX_ROWS else ():
+        rows = [
+            (
+                f"{row['label']}, {row['filter']}",
+                *(
+                    row["component"] or str(row["model"]),
+                    "" if row["t_s"] != row["t_s"] else f"{row['t_s']:g} {tr('s')}",
+                ),
+                *(
+                    f"{sentences.value_text(row[key])} {tr(unit_of(row['unit']))}".rstrip()
+                    for key in ("value", "against")
+                ),
+                *sentences.change_texts(row),
+            )
+            for row in compared_rows
+            if row["quantity"] == quantity
+        ]
+        baseline_heading = tr("{quantity} of {symbol}", quantity=tr(words), symbol=next(iter(against)))
+        against_heading = baseline_heading if len(against) == 1 else tr("{quantity} against", quantity=tr(words))
+        columns = ("", "of", "at", words, against_heading, "change", "exact")
+        print_varying_columns("", ("at",), columns, rows, (*columns[2:5], "exact"), ("exact", "at"))
+    for line in compared.sentences if len(compared_rows) > MAX_ROWS else ():
+        print_line(line)
+    for line in compared.notes:
+        print_field("note", line)
+    folder = compared.folder
+    assert folder is not None  # the command writes what it prints
+    print_field("table", str(folder / "comparison.csv"))
+    if figure_stems := {Path(n).stem for n in compared.files if n.startswith("figures/") and not n.endswith(".md")}:
+        print_field("figures", f"{folder / 'figures'} ({len(figure_stems)})")
+    print_field("page", str(folder / "compare.html"))
+    print_warnings(compared.warnings)
+
+
+def narrow_interval_mark(row: Any, column: str) -> str:
+    """A mark on an interval, for a row of `last_scan`, by the column that says why it is too narrow."""
+    from radarsim.report import interval_notes
+
+    note = getattr(row, column, "")
+    if not isinstance(note, str) or not note:  # not a text: of a gain that a row does not have
+        return ""
+    heavy_tails_mark, other_mark = NARROW_INTERVAL_MARKS
+    return heavy_tails_mark if note == str(interval_notes.HEAVY_TAILS) else other_mark
+
+
+def print_cost(experiment: "Experiment", outlook: "CostEstimate") -> None:
+    """The cost of a run."""
+    print_line(tr("{config}: valid", config=str(experiment.path or experiment.stem)))
+    rows = [
+        (case.name, case.filters, str(case.scans), numeral(f"{case.realisations:,}"), _seconds_text(case))
+        for case in outlook.cases
+    ]
+    columns = ("case", "filters", "scans", "realisations", "one thread")
+    print_table("", columns, rows, right=columns[2:], spare=("scans",))
+    from radarsim.api.stored_runs import missing_realisations
+
+    started_cases = [
+        (case.name, stock) for case in outlook.cases if (stock := case.stock) and stock.stored and stock.missing
+    ]
+    for name, stock in started_cases[:MAX_STARTED_CASES]:
+        values = {"stored": stock.stored, "asked": stock.asked, "missing": missing_realisations(stock)}
+        print_field(name, tr("{stored:,} of {asked:,} stored; missing: {missing}", **values))
+    if len(started_cases) > MAX_STARTED_CASES:
+        print_line(tr("and {cases} more stored in part", cases=case_count_text(len(started_cases) - MAX_STARTED_CASES)))
+    if outlook.precision is not None:
+        print_required_realisations(experiment, outlook)
+    if outlook.share is not None:
+        number, share_count = outlook.share
+        print_field("share", tr("{number} of {of}", number=number, of=share_count))
+    print_field("total", outlook.total)
+    print_warnings(outlook.warnings)
+
+
+def _seconds_text(case: "CaseCost") -> str:
+    """Seconds of one thread for a case."""
+    if case.timed or not case.seconds:
+        return tr("{t_s:.3g} s", t_s=case.seconds)
+    return tr("under {t_s:.2g} s", t_s=case.seconds)
+
+
+def print_required_realisations(experiment: "Experiment", outlook: "CostEstimate") -> None:
+    """How many realisations a precision takes, and whether the run may do so many."""
+    configured = {case.name: case.realisations for case in experiment.cases}
+    needs = {case.name: need for case in outlook.cases if (need := case.need) is not None}
+    rows = [
+        (
+            case.name,
+            numeral(f"{need.realisations:,}") if need.realisations is not None else _unreached_text(need),
+            tr("{t_s:.3g} s", t_s=float(case.seconds)),
+            need.known_by,
+            need.last,
+        )
+        for case in outlook.cases
+        if (need := case.need) is not None
+    ]
+    precision_heading = tr("for ± {percent:g} {unit}", percent=outlook.precision, unit=tr(outlook.of.half_width_unit))
+    columns = ("case", precision_heading, "one thread", "known from", "last to get there")
+    print_table("", columns, rows, right=columns[1:3], spare=columns[4:])
+    unreached_cases = [
+        name for name, need in needs.items() if need.realisations is None or need.realisations > configured[name]
+    ]
+    if unreached_cases:
+        largest_need = max((need.realisations or math.inf) for need in needs.values())
+        remedy = tr("; -n {most} would do", most=str(largest_need)) if math.isfinite(largest_need) else ""
+        cases = case_count_text(len(unreached_cases))
+        values = {"cases": cases, "names": ", ".join(unreached_cases[:3]), "cure": remedy}
+        print_line(tr("precision not within reach of {cases}: {names}{cure}", **values))
+
+
+def _unreached_text(need: "RequiredRealisations") -> str:
+    """Why a pilot predicts no number of realisations."""
+    return tr("out of reach") if need.below is None else tr("none observed: below {rate:.2g}", rate=need.below)
+
+
+def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
+    """The result of a share of an experiment, and the next step."""
+    done = sum(case_share.done for case_share in share.cases.values())
+    stored = sum(case_share.from_store for case_share in share.cases.values())
+    values = {"number": share.number, "of": share.of, "config": share.config, "done": done, "held": stored}
+    print_field(
+        "share", tr("{number} of {of} of {config}: {done:,} realisations, {held:,} were stored before", **values)
+    )
+    folder = str(Path(out) / ".blocks")
+    print_field("blocks", tr("{folder}; copy all shares into one, and `radarsim run` finds them", folder=folder))
+    print_warnings(share.warnings)
+
+
+def print_inspection(inspection: "Inspection") -> None:
+    """Findings about a result; faults are reported as errors."""
+    outputs = plural("{count} output", "{count} outputs", inspection.outputs)
+    pieces = plural("{count} stored piece", "{count} stored pieces", inspection.pieces)
+    print_line(
+        tr("{folder}: {outputs} and {pieces} checked", folder=str(inspection.folder), outputs=outputs, pieces=pieces)
+    )
+    if inspection.recomputed:
+        pieces = plural("{count} piece", "{count} pieces", len(inspection.recomputed))
+        count = plural("{count:,} realisation", "{count:,} realisations", inspection.realisations)
+        print_line(tr("computed again: {pieces}, {realisations}", pieces=pieces, realisations=count))
+    for note in inspection.notes:
+        print_line(tr("note: {words}", words=note))
+    print_line(
+        tr("all intact")
+        if not inspection.faults
+        else plural("{count} fault found", "{count} faults found", len(inspection.faults))
+    )
+
+
+def print_removed_blocks(cleaned: "RemovedBlocks", dry_run: bool) -> None:
+    """The amount dropped, or to be dropped."""
+    amount = {
+        "files": plural("{count} file", "{count} files", cleaned.files),
+        "folders": plural("{count} folder", "{count} folders", cleaned.identities),
+        "path": str(cleaned.path),
+        "size": cleaned.size / 1e6,
+    }
+    would = tr("would drop {files} in {folders} of {path}: {size:.2f} MB", **amount)
+    print_line(would if dry_run else tr(DROPPED_TEXT, **amount))
+    if cleaned.not_judged:
+        words = tr(
+            "blocks of {cases} are left: filters of your own code run only where you name the config: "
+            "`radarsim clean CONFIG --other-sources`",
+            cases=shorten_names(cleaned.not_judged),
+        )
+        print_line(tr("note: {words}", words=words))
+
+
+def print_names(inventory: "Inventory") -> None:
+    """The numbers of configs, scenarios, studies and filters, and their names, those of configs by paper."""
+    (_, _, configs), (_, _, scenarios), (_, _, studies), (_, _, filters) = inventory
+    print_line(plural("{count} config (radarsim run NAME)", "{count} configs (radarsim run NAME)", len(configs)))
+    for paper in dict.fromkeys(paper for _, paper, _ in configs):
+        print_line(f"{paper}  {', '.join(name for name, config_paper, _ in configs if config_paper == paper)}")
+    count_texts = (
+        plural("{count} scenario (target: NAME)", "{count} scenarios (target: NAME)", len(scenarios)),
+        plural("{count} study (study: NAME)", "{count} studies (study: NAME)", len(studies)),
+        plural("{count} filter", "{count} filters", len(filters)),
+    )
+    print_line(", ".join(count_texts))
+    print_line(tr("A line each: `radarsim list configs`, scenarios, studies, filters, P2, any word"))
+
+
+def print_inventory(inventory: "Inventory") -> None:
+    """Filters, studies, scenarios and configs, with a line on each: the most useful last."""
+    for n, (title, columns, rows) in enumerate(reversed(inventory)):
+        if n:
+            print_line("")
+        print_table(tr(title), columns, [(*row[:-1], tr(row[-1])) for row in rows])

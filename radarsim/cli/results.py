@@ -1,0 +1,172 @@
+"""The commands judge, report and compare."""
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from radarsim.cli import command_group, options
+from radarsim.cli.run import compute_each, refuse_quantity_without_precision
+
+if TYPE_CHECKING:
+    from radarsim.api.result import Result
+    from radarsim.config.experiment import Experiment
+
+
+@command_group.main.command()
+@options.config_argument
+@click.argument("estimates", metavar="ESTIMATES")
+@click.option("--name", default="mine", show_default=True, metavar="NAME", help="What the filter is called.")
+@click.option(
+    "--against",
+    type=click.Choice(["tuned"]),
+    help="Also judge it against the config's filters as `radarsim tune` tunes them.",
+)
+@click.option(
+    "--for", "tuned_quantity", metavar="TEXT", help="What they are tuned for; default: σ of the first component."
+)
+@options.realisations_option
+@options.seed_option
+@options.set_option
+@options.precision_option
+@options.quantity_option
+@options.threads_option
+@options.out_option
+@options.drawing_options
+@click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
+@options.json_option
+def judge(
+    config: str,
+    estimates: str,
+    name: str,
+    against: str | None,
+    tuned_quantity: str | None,
+    realisations: int | None,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    precision: float | None,
+    of: str,
+    threads: int | None,
+    out: str,
+    drawing: options.Drawing,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Judge a filter of your own: is it better than the config's?
+
+    ESTIMATES holds what your filter made of the plots that `radarsim simulate CONFIG --realisations 0:N` wrote. The
+    config's filters are run on the same plots; gains of your filter against every one of them are paired, with 95 %
+    intervals. Results are in DIR/CONFIG_NAME. From Python, `radarsim.judge` also takes a function or an object.
+
+    \b
+    .npz            estimates (n, K, d): realisations 0 … n - 1, the scans, the leading d
+                    components of the state; if you have them covariances (n, K, d, d),
+                    components (names, if not the leading ones), realisation (n,), as in the file
+                    of the plots, and seed; both are checked
+    .csv, .parquet  a row for each realisation and scan: realisation, k or t_s, and a column
+                    for each component, such as r and Vr (or r_m and Vr_mps)
+
+    Where the filter has no estimate yet a value is NaN, or a cell empty. NaN after an estimate, and errors over a
+    hundred times the largest of the config's filters, are failures: their share is in the first sentence of the report.
+
+    \b
+    Example
+      radarsim simulate rls2 --realisations 0:10000 -o plots.npz
+      radarsim judge rls2 estimates.npz --name mine
+      radarsim judge rls2 estimates.npz --against tuned --for "sigma r at 60 s"
+    """
+    refuse_quantity_without_precision(of, precision)
+    from radarsim.engine import stopping
+
+    with stopping.Signals() as stop:
+        from radarsim.api import judge as api_judge
+        from radarsim.api import load_experiments, precision_target
+
+        (loaded,) = load_experiments.load_all([config], load_experiments.combine_overrides(overrides, None, seed))
+        tuned: dict[str, Any] = {"against": against, "wanted": tuned_quantity}
+        option_words = [
+            word
+            for option, value in (("--against", against), ("--for", tuned_quantity))
+            if value
+            for word in (option, value)
+        ]
+        experiment, warnings = api_judge.add_user_filter(loaded, estimates, name, realisations=realisations, **tuned)
+        if precision is not None:
+            precision_target.check_precision([experiment], precision, of)
+        repeat_command = api_judge.command(
+            loaded, estimates, name, load_experiments.combine_overrides(overrides, realisations, seed), option_words
+        )
+        compute_arguments: dict[str, Any] = {"precision": precision, "of": of, "threads": threads, "stop": stop}
+        compute_arguments |= {"command": repeat_command, **drawing.arguments}
+        compute = partial(api_judge.run_judged_experiment, warnings=warnings, out=out, **compute_arguments)
+        compute_each([experiment], compute, out, quiet, as_json)
+
+
+@command_group.main.command()
+@options.configs_argument
+@options.realisations_option
+@options.seed_option
+@options.set_option
+@options.out_option
+@options.drawing_options
+@options.json_option
+def report(
+    configs: tuple[str, ...],
+    realisations: int | None,
+    seed: int | None,
+    overrides: tuple[str, ...],
+    out: str,
+    drawing: options.Drawing,
+    as_json: bool,
+) -> None:
+    """Write tables, figures and report of stored runs.
+
+    Computes nothing.
+
+    \b
+    Examples
+      radarsim report rls2
+      radarsim report rls2 --json --no-figures
+    """
+    from radarsim.api import load_experiments, stored_runs
+
+    overrides = load_experiments.combine_overrides(overrides, realisations, seed)
+
+    def write_stored_result(experiment: "Experiment", progress: object) -> "Result":
+        result = stored_runs.stored_result(experiment, out=out, overrides=overrides)
+        result.write(out, **drawing.arguments)
+        return result
+
+    compute_each(load_experiments.load_all(configs, overrides), write_stored_result, out, False, as_json)
+
+
+@command_group.main.command()
+@click.argument("sources", nargs=-1, required=True, metavar="A B…", shell_complete=options.complete_config)
+@options.out_option
+@options.drawing_options
+@options.json_option
+def compare(sources: tuple[str, ...], out: str, drawing: options.Drawing, as_json: bool) -> None:
+    """Compare stored runs: differences with intervals.
+
+    Each of A, B, … is a config with a stored result in DIR, or the folder of a result: two radars, two configs, or two
+    versions of one. Nothing is computed. All are compared with the first. If two runs use the same measurements (study,
+    seed, target, sensor) and the same baseline filter, the difference is paired. Writes DIR/compare/comparison.csv,
+    compare.html and figures.
+
+    \b
+    Examples
+      radarsim compare rls2 rls4
+      radarsim compare rls2.yaml mine.yaml --json
+      radarsim compare results/rls2 results-before/rls2
+    """
+    from radarsim.api import compare as api_compare
+    from radarsim.api import json_output
+    from radarsim.cli import print_results
+
+    if len(sources) < 2:
+        raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
+    compared = api_compare.compare(*sources, out=out, **drawing.arguments)
+    if as_json:
+        click.echo(json_output.text(json_output.comparison(compared)))
+    else:
+        print_results.print_comparison(compared)

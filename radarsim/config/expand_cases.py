@@ -1,0 +1,431 @@
+"""From a config to its checked cases: includes, overrides and sweeps."""
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path as FilePath
+
+from radarsim.config.common_keys import COMMON_KEYS, CommonKeys, Studies
+from radarsim.config.document import Document
+from radarsim.config.error_list import ABSENT, ErrorList, KeyPath, Origin, one_line
+from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern, swept_value_text
+from radarsim.config.find_files import available_stems, config_file, did_you_mean, is_stem, normalised_name
+from radarsim.config.inline_files import ReadDocument, inline_scenarios, resolve_data_files
+from radarsim.config.place_settings import (
+    NoSuchKey,
+    Setting,
+    key_paths,
+    leaf_paths,
+    overlay_keys,
+    place_setting,
+    with_twins,
+)
+from radarsim.config.study_keys import StudyKeys
+from radarsim.config.user_filter_keys import is_code, names_code, separate_code_filters
+from radarsim.config.validate import validate
+from radarsim.extensions import extension_figures
+from radarsim.private_files import foreign_owner
+
+MAPPING_KEYS = ("sweep", "figures")  # common keys that are mappings: the text after their dot is a single key
+MAX_CASES = 10_000
+MAX_INCLUDE_DEPTH = 5
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A case under construction: its document with the keys applied so far."""
+
+    document: Document
+    stem: str
+    study: str
+    swept: tuple[tuple[str, object], ...]
+    realisations: int | None
+    seed: int | None
+
+
+OverlaidKeys = tuple[Document, ...]  # keys laid over an included config, those of the nearest config first
+
+
+def changes_included(document: Document) -> bool:
+    """Whether a config changes what it includes: keys of a study stand beside `include`."""
+    return "include" in document.data and not set(COMMON_KEYS).issuperset(document.data)
+
+
+def _rename_drafts(drafts: list[Draft], stem: str) -> list[Draft]:
+    """Rename the drafts of a config that changes what it includes, and is included itself, after that config."""
+    has_several = len({draft.stem for draft in drafts}) > 1
+    return [replace(draft, stem=f"{stem}:{draft.stem}" if has_several else stem) for draft in drafts]
+
+
+def no_such_config(name: str, studies: Studies, list_names: bool = False) -> str:
+    """The message that no config has this name: why its package cannot be used, or the nearest name.
+
+    list_names: whether to list all names where none is near."""
+    if reasons := studies.reasons_for_missing_config(name):
+        return f"no such config: {'; '.join(reasons)}"
+    available = available_stems("configs")
+    name_list = f"; there are: {', '.join(available)}" if list_names else ""
+    return f"no such config{did_you_mean(name, available) or name_list}"
+
+
+class Expander:
+    """Expands configs into cases, reading each config once.
+
+    read: `read(file, faults)` returns the document of a file, or adds an error and returns None.
+
+    path: that of the config, if the user gave one. Code of a config that was found by name, directly or by an include,
+    runs only if it belongs to this user, to root, or to the owner of the config at the path."""
+
+    def __init__(
+        self,
+        read: ReadDocument,
+        settings: Iterable[Setting],
+        faults: ErrorList,
+        studies: Studies,
+        path: FilePath | None = None,
+    ):
+        cached: ReadDocument = cache(read)
+        self.path = path
+        self.read, self.faults, self.studies = cached, faults, studies
+        settings = list(settings)
+        self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
+        self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
+        self.expanded: dict[tuple[FilePath, ...], list[Draft]] = {}
+
+    def experiment(self, document: Document) -> Experiment | None:
+        """The experiment that a config describes; None if errors were added."""
+        overlays: OverlaidKeys = ()
+        for setting in self.common:
+            top_key, *inner_key = setting.key.split(".", 1)
+            if inner_key and top_key not in MAPPING_KEYS:
+                self.faults.add(setting.origin, (), f"{top_key} has no keys of its own")
+            elif top_key == "study" and document.data.get("study", setting.value) != setting.value:
+                overlays = (document.with_data((), {}).graft(("study",), setting.value, setting.origin),)
+            else:
+                document = document.graft((top_key, *inner_key), setting.value, setting.origin)
+        common, drafts = self._expand(document, (), overlays)
+        cases = [case for draft in drafts if (case := self._checked_case(draft))]
+        self._refuse_equal_names(cases, document)
+        self._refuse_mixture(drafts, document)
+        self._check_figure_names(common, drafts, document)
+        self._check_figures(common, cases, document)
+        if self.faults:
+            return None
+        stem = normalised_name(document.file.stem) if document.file else "config"
+        return Experiment(
+            stem=stem,
+            study=cases[0].study,
+            path=str(document.file) if document.file else None,
+            cases=tuple(cases),
+            realisations=common.realisations or max(case.realisations for case in cases),
+            seed=cases[0].seed if common.seed is None else common.seed,
+            figures=common.cases_of_figures(),
+            changes_included=changes_included(document),
+        )
+
+    def _expand(
+        self, document: Document, chain: tuple[FilePath, ...], overlays: OverlaidKeys
+    ) -> tuple[CommonKeys, list[Draft]]:
+        """The common keys of a config, and its drafts under the overlays, of which the nearest comes first."""
+        owner = foreign_owner(document.file, self.path) if document.file and names_code(document.data) else None
+        if owner is not None:
+            message = f"names code and belongs to another user ({owner}): to run it, give its path in place of a name"
+            self.faults.add(Origin(str(document.file)), (), message)
+            return CommonKeys(), []
+        common = self._common_keys(document.with_keys(COMMON_KEYS))
+        if "include" in document.data:
+            study_drafts = self._included_drafts(document, common, chain, overlays)
+        else:
+            study_drafts = self._own_draft(document, common, overlays)
+        drafts = self._sweep_drafts(document, common, study_drafts, overlays)
+        values = {key: getattr(common, key) for key in ("realisations", "seed") if getattr(common, key) is not None}
+        return common, [replace(draft, **values) for draft in drafts]
+
+    def _common_keys(self, document: Document) -> CommonKeys:
+        """The common keys; without those that have errors, so that the rest of the config is checked as well."""
+        common = validate(CommonKeys, document, self.faults)
+        if not common:
+            good = {
+                key: v
+                for key, v in document.data.items()
+                if validate(CommonKeys, document.with_keys((key,)), ErrorList())
+            }
+            common = CommonKeys.model_validate(good)
+        if common.realisations is None and "realisations" in document.data:
+            return common.model_copy(update={"realisations": 1})  # its fault is noted; it must not be called missing
+        return common
+
+    def _own_draft(self, document: Document, common: CommonKeys, overlays: OverlaidKeys) -> list[Draft]:
+        """The one draft of a config with a study of its own."""
+        if common.study is None or not self.studies.is_study(common.study):
+            if "study" not in document.data:
+                message = f"required key is missing: one of {', '.join(self.studies.study_names())}"
+                self.faults.add(document.origin(()), ("study",), message)
+            elif common.study is not None:
+                self._add_unknown_study(document, common.study)
+            return []
+        study_keys, study = document.without_keys(COMMON_KEYS), common.study
+        for overlay in overlays:
+            study_keys, study = self._carry_to_study(study_keys, study, overlay)
+            study_keys = overlay_keys(
+                study_keys, self.studies.keys(study), overlay.without_keys(COMMON_KEYS), self.read, self.faults
+            )
+        for setting in self.settings:
+            study_keys = self._with_setting(study_keys, study, setting)
+        study_keys = inline_scenarios(study_keys, self.studies.keys(study), self.read, self.faults)
+        stem = normalised_name(document.file.stem) if document.file else "config"
+        return [Draft(study_keys, stem, study, (), common.realisations, common.seed)]
+
+    def _add_unknown_study(self, document: Document, name: str) -> None:
+        """Add the error that no study has this name."""
+        names = self.studies.study_names()
+        message = f"must be one of {', '.join(names)}{did_you_mean(name, names)}"
+        self.faults.add(document.origin(("study",)), ("study",), message, name)
+
+    def _carry_to_study(self, document: Document, study: str, overlay: Document) -> tuple[Document, str]:
+        """Convert a config to the study beside `include`, if one is given there. Returns document and study."""
+        wanted_study = overlay.data.get("study", study)
+        if wanted_study == study or not isinstance(wanted_study, str):  # what is no text is a fault already noted
+            return document, study
+        if not self.studies.is_study(wanted_study):
+            self._add_unknown_study(overlay, wanted_study)
+            return document, study
+        data = self.studies.keys(wanted_study).carried(study, document.data)
+        if data is None:
+            accepting = [
+                name for name in self.studies.usable_studies() if self.studies.keys(name).carried(study, {}) is not None
+            ]
+            alternative = f", or one that takes over its keys: {', '.join(accepting)}" if accepting else ""
+            message = f"must be that of the config, {study}{alternative}"
+            self.faults.add(overlay.origin(("study",)), ("study",), message, wanted_study)
+            return document, study
+        sorted_lists = {key: sorted(items, key=is_code) for key, items in data.items() if isinstance(items, list)}
+        return document.with_data((), data | sorted_lists), wanted_study
+
+    def _included_drafts(
+        self, document: Document, common: CommonKeys, chain: tuple[FilePath, ...], overlays: OverlaidKeys
+    ) -> list[Draft]:
+        """The drafts of all included configs, with the keys beside `include` laid over each."""
+        if changes_included(document) or common.study is not None:
+            overlays = (document.without_keys(set(COMMON_KEYS) - {"study"}), *overlays)
+        chain = (*chain, document.file.resolve()) if document.file else chain
+        drafts: list[Draft] = []
+        for i, name in enumerate(common.include or ()):
+            origin = document.origin(("include", i))
+            drafts += self._include_config(name, origin, ("include", i), document.file, chain, overlays)
+            if len(drafts) > MAX_CASES:
+                self.faults.add(origin, ("include",), f"more than {MAX_CASES} cases")
+                return []
+        return drafts
+
+    def _include_config(
+        self,
+        name: str,
+        origin: Origin,
+        path: KeyPath,
+        including_file: FilePath | None,
+        chain: tuple[FilePath, ...],
+        overlays: OverlaidKeys,
+    ) -> list[Draft]:
+        """The drafts of one included config."""
+        file = config_file(name, including_file) if is_stem(name) else None
+        if not is_stem(name):
+            self.faults.add(origin, path, "must be the stem of a config, without folder or suffix", name)
+        elif file is None:
+            self.faults.add(origin, path, no_such_config(name, self.studies), name)
+        elif file.resolve() in chain:
+            self.faults.add(origin, path, "a config cannot include itself", name)
+        elif len(chain) > MAX_INCLUDE_DEPTH:
+            self.faults.add(origin, path, f"includes nested more than {MAX_INCLUDE_DEPTH} deep", name)
+        elif (cache_key := (file.resolve(), *(FilePath(overlay.source) for overlay in overlays))) in self.expanded:
+            return self.expanded[cache_key]
+        elif included := self.read(file, self.faults):
+            _, drafts = self._expand(included, chain, overlays)
+            if changes_included(included):
+                drafts = _rename_drafts(drafts, normalised_name(file.stem))
+            return self.expanded.setdefault(cache_key, drafts)
+        return []
+
+    def _sweep_drafts(
+        self, document: Document, common: CommonKeys, drafts: list[Draft], overlays: OverlaidKeys
+    ) -> list[Draft]:
+        """One draft for each combination of swept values; the last key changes fastest."""
+        if not common.sweep or not drafts:
+            return drafts
+        if math.prod(len(values) for values in common.sweep.values()) * len(drafts) > MAX_CASES:
+            self.faults.add(document.origin(("sweep",)), ("sweep",), f"more than {MAX_CASES} cases")
+            return []
+        axes = []
+        for n, key in enumerate(common.sweep):
+            if not self._can_sweep(document, list(common.sweep)[:n], key, drafts, overlays):
+                continue
+            values = document.data["sweep"][key]
+            axes.append([Setting(key, v, document.origin(("sweep", key, i))) for i, v in enumerate(values)])
+        return [self._with_settings(draft, settings) for draft in drafts for settings in itertools.product(*axes)]
+
+    def _can_sweep(
+        self, document: Document, earlier_keys: list[str], key: str, drafts: list[Draft], overlays: OverlaidKeys
+    ) -> bool:
+        """Whether only this sweep sets a key: no other sweep, no override, and no key that is laid over the config.
+
+        earlier_keys: those that the same sweep names before this one."""
+        origin = document.key_origin(("sweep", key))
+        if key.split(".")[0] in COMMON_KEYS:
+            self.faults.add(origin, ("sweep", key), "cannot be swept")
+            return False
+        try:
+            swept_paths = {
+                path
+                for draft in drafts
+                for path in with_twins(self._paths_in(draft, key, missing_ok=False), self.studies.keys(draft.study))
+            }
+        except NoSuchKey as error:
+            self.faults.add(origin, ("sweep", key), str(error))
+            return False
+        return not (
+            self._is_swept_elsewhere(key, origin, swept_paths, earlier_keys, drafts)
+            or self._is_overridden(key, swept_paths, drafts)
+            or self._is_overlaid(document, swept_paths, overlays)
+        )
+
+    def _paths_in(self, draft: Draft, key: str, missing_ok: bool = True) -> list[KeyPath]:
+        """The places of a key in a draft."""
+        return key_paths(draft.document, self.studies.keys(draft.study), key, missing_ok)
+
+    def _is_swept_elsewhere(
+        self, key: str, origin: Origin, swept_paths: set[KeyPath], earlier_keys: list[str], drafts: list[Draft]
+    ) -> bool:
+        """Whether another sweep sets some of these places; adds an error where one does."""
+        for draft in drafts:
+            for other_key in (*(swept_key for swept_key, _ in draft.swept), *earlier_keys):
+                other_paths = self._paths_in(draft, other_key)
+                if any(paths_overlap(path, swept_path) for path in other_paths for swept_path in swept_paths):
+                    self.faults.add(origin, ("sweep", key), f"sweeps what {other_key} sweeps as well")
+                    return True
+        return False
+
+    def _is_overridden(self, key: str, swept_paths: set[KeyPath], drafts: list[Draft]) -> bool:
+        """Whether an override sets some of these places; adds an error where one does."""
+        for setting in self.settings:
+            if any(_is_below(path, swept_paths) for draft in drafts for path in self._paths_in(draft, setting.key)):
+                self.faults.add(setting.origin, (), f"the config sweeps it: set sweep.{key}=[...] instead")
+                return True
+        return False
+
+    def _is_overlaid(self, document: Document, swept_paths: set[KeyPath], overlays: OverlaidKeys) -> bool:
+        """Whether a key beside `include` sets some of these places; adds an error where one does."""
+        for overlay in overlays:
+            for path in leaf_paths(overlay.data):
+                if _is_below(path, swept_paths):
+                    message = f"{document.source}, which is included, sweeps it; sweep it here instead, and not there"
+                    self.faults.add(overlay.key_origin(path), path, message)
+                    return True
+        return False
+
+    def _with_settings(self, draft: Draft, settings: tuple[Setting, ...]) -> Draft:
+        """A draft with the values of one combination of a sweep."""
+        document = draft.document
+        for setting in settings:
+            document = self._with_setting(document, draft.study, setting)
+        swept = (*draft.swept, *((setting.key, setting.value) for setting in settings))
+        return replace(draft, document=document, swept=swept)
+
+    def _with_setting(self, document: Document, study: str, setting: Setting) -> Document:
+        """A document with a setting; adds an error if its key has no place."""
+        try:
+            return place_setting(document, self.studies.keys(study), setting, self.read, self.faults)
+        except NoSuchKey as error:
+            self.faults.add(setting.origin, (), str(error))
+            return document
+
+    def _checked_case(self, draft: Draft) -> Case | None:
+        """The checked case of a draft; None if errors were added."""
+        model = self.studies.keys(draft.study)
+        document = inline_scenarios(draft.document, model, self.read, self.faults)
+        document = resolve_data_files(document, model, self.faults)
+        document, outside = separate_code_filters(document, model, self.studies.filter_from_code, self.faults)
+        document, against = self._split_baselines(document, model)
+        spec = validate(model, document, self.faults, also=COMMON_KEYS)
+        if draft.realisations is None:
+            self.faults.add(document.origin(()), ("realisations",), "required key is missing")
+        if spec is None or draft.realisations is None:
+            return None
+        name = " ".join([draft.stem, *(f"{key}={swept_value_text(value)}" for key, value in draft.swept)])
+        seed = 1 if draft.seed is None else draft.seed
+        return Case(
+            name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed, against=against, outside=outside
+        )
+
+    def _split_baselines(self, document: Document, model: type[StudyKeys]) -> tuple[Document, tuple[str, ...]]:
+        """The document with the first of several baselines, and the others, each checked as the only one."""
+        path: KeyPath = ("baseline",)
+        names = document.get(path)
+        if "baseline" not in model.model_fields or names is ABSENT or isinstance(names, str | None):
+            return document, ()
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names) or not names:
+            name_list = names if isinstance(names, list) else []
+            wrong_path = next(((*path, i) for i, name in enumerate(name_list) if not isinstance(name, str)), path)
+            message = "must be the name of a filter or a list of such names"
+            self.faults.add(document.origin(wrong_path), wrong_path, message, document.get(wrong_path))
+            return document.without_keys(("baseline",)), ()
+        documents = [document.graft(path, name, document.origin((*path, i))) for i, name in enumerate(names)]
+        for i, name in enumerate(names[1:], 1):
+            if name in names[:i]:
+                self.faults.add(document.origin((*path, i)), (*path, i), "stands there already", name)
+            elif not self.faults:
+                validate(model, documents[i], self.faults, also=COMMON_KEYS)
+        return documents[0], tuple(names[1:])
+
+    def _refuse_equal_names(self, cases: list[Case], document: Document) -> None:
+        """Add an error for each case whose name another case has."""
+        names: set[str] = set()
+        key = ("include",) if "include" in document.data else ("sweep",)
+        for case in cases:
+            if case.name in names:
+                self.faults.add(document.origin(key), key, f"makes the case {one_line(case.name)!r} twice")
+            names.add(case.name)
+
+    def _refuse_mixture(self, drafts: list[Draft], document: Document) -> None:
+        """Add an error if the cases belong to several studies."""
+        studies = {draft.study for draft in drafts}
+        if len(studies) > 1:
+            message = f"one study per run; these belong to {', '.join(sorted(studies))}"
+            self.faults.add(document.origin(("include",)), ("include",), message)
+
+    def _check_figure_names(self, common: CommonKeys, drafts: list[Draft], document: Document) -> None:
+        """Add an error for each figure that the study cannot draw, if its schema lists its figures."""
+        names_by_study = [self.studies.keys(study).figure_names for study in {draft.study for draft in drafts}]
+        if len(names_by_study) != 1 or names_by_study[0] is None:
+            return
+        figure_names = (*names_by_study[0], *extension_figures(), *COMMON_FIGURES)
+        for n, figure in enumerate(common.figures):
+            if not any(matches_pattern(figure, name) or matches_pattern(name, figure) for name in figure_names):
+                has_mapping = isinstance(common.figures, dict)
+                path = ("figures", figure if has_mapping else n)
+                hint = did_you_mean(figure, names_by_study[0]) or f"; there are: {', '.join(figure_names)}"
+                origin = document.key_origin(path) if has_mapping else document.origin(path)
+                self.faults.add(origin, path, f"no such figure{hint}", *([] if has_mapping else [figure]))
+
+    def _check_figures(self, common: CommonKeys, cases: list[Case], document: Document) -> None:
+        """Add an error for each pattern that matches no case, since its figure would be empty."""
+        if self.faults:
+            return
+        for figure, patterns in common.cases_of_figures().items():
+            for i, pattern in enumerate(patterns):
+                if not any(matches_pattern(case.name, pattern) for case in cases):
+                    path = ("figures", figure, i)
+                    hint = did_you_mean(pattern, [case.name for case in cases])
+                    self.faults.add(document.origin(path), path, f"no case has this name{hint}", pattern)
+
+
+def _is_below(path: KeyPath, places: Iterable[KeyPath]) -> bool:
+    """Whether a path leads to one of these places or to a part of one."""
+    return any(path[: len(place)] == place for place in places)
+
+
+def paths_overlap(path: KeyPath, other_path: KeyPath) -> bool:
+    """Whether two paths lead to the same value, or one to a part of the other's."""
+    common_length = min(len(path), len(other_path))
+    return path[:common_length] == other_path[:common_length]

@@ -1,0 +1,107 @@
+"""A block of realisations of a study that is written as the step of one: truth and plots, then each filter over them.
+
+The steps come as programs (`radarsim.kernels.tracing`), so a kernel holds the study's own formulas and no call. All
+arrays are flat; rows are eights of realisations. Of `groups` eights and K scans: known (K · width,) numbers known at a
+scan, its first is the time since the scan before, s; numbers (n,) numbers of a case, or of a filter; plots (groups · K
+· PLOT) rows: of a scan 1 where there is a plot, else 0, the numbers of the plot, the truth; errors (groups · K · C)
+rows: errors of the components, zero beyond the block's last realisation.
+
+Layout of the noise: the normals 2 j and 2 j + 1 of scan k are those of pair `pairs` · k + j of the stream of plots;
+whether there is one, the uniform number k of the stream of detections."""
+
+import numpy as np
+
+from radarsim.kernels.compiler import kernel
+from radarsim.kernels.lane_programs import emit_program
+from radarsim.kernels.lanes import WIDTH, add_totals, address, full, get, put, row, total, where_greater
+from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_pairs
+from radarsim.kernels.tracing import Program
+
+STRIP = 16  # scans whose noise is drawn at once
+# Arrays of a program of the world, and of one of a filter.
+STATE, KNOWN, NUMBERS, FIRST_NORMALS, SECOND_NORMALS, PLOT = range(6)
+COUNTED, ERRORS, TESTED = 3, 4, 6
+
+
+def truth_kernel(first: Program, following: Program, pairs: int, rows: int):
+    """The kernel that draws truth and plots, from the programs of the first scan and of those that follow."""
+    begin, move = emit_program(first), emit_program(following)
+
+    @kernel
+    def draw(keys, start, groups, scan_numbers, width, numbers, detection, state, a, b, u, plots):
+        scans = scan_numbers.size // width
+        for g in range(groups):
+            for k in range(scans):
+                if k % STRIP == 0:
+                    fill_normal_strip(keys[0], start + g * WIDTH, U(k * pairs), a, b)
+                if detection < 1.0 and k & 1 == 0:
+                    fill_uniform_pairs(keys[1], start + g * WIDTH, U(k >> 1), u[:WIDTH], u[WIDTH:])
+                plot_row = row(address(plots), (g * scans + k) * rows)
+                present = full(1.0)
+                if detection < 1.0 and k > 0:
+                    uniform = get(address(u), k & 1)
+                    present = where_greater(full(detection), uniform, present, full(0.0))
+                put(plot_row, 0, present)
+                noise = (k % STRIP) * pairs
+                scan_row = row(address(scan_numbers), k * width // WIDTH)
+                addresses = (
+                    address(state),
+                    scan_row,
+                    address(numbers),
+                    row(address(a), noise),
+                    row(address(b), noise),
+                    plot_row,
+                )
+                if k == 0:
+                    begin(addresses)
+                else:
+                    move(addresses)
+
+    return draw
+
+
+def filter_kernel(first: Program, following: Program, rows: int, components: int, tested: bool):
+    """The kernel that runs a filter over plots of `rows` rows a scan, and adds up its errors.
+
+    error (K, C, 4) takes the sums of e … e⁴, paired (K, C) those of e² times the baseline's e²; where tested, believed
+    (K, C) takes those of the variances that the filter believes, nees (K, 2) those of e' P⁻¹ e and its square."""
+    begin, step = emit_program(first), emit_program(following)
+
+    @kernel
+    def follow(groups, count, scan_numbers, width, numbers, plots, state, errors, base, error, paired, believed, nees):
+        scans = scan_numbers.size // width
+        sums, products, variances, squares = address(error), address(paired), address(believed), address(nees)
+        is_counted, extra = np.empty(WIDTH), np.zeros((components + 1) * WIDTH)
+        for g in range(groups):
+            for lane in range(WIDTH):
+                is_counted[lane] = 1.0 if g * WIDTH + lane < count else 0.0
+            for k in range(scans):
+                n = g * scans + k
+                error_row, baseline_row = row(address(errors), n * components), row(address(base), n * components)
+                scan_row, plot_row = row(address(scan_numbers), k * width // WIDTH), row(address(plots), n * rows)
+                addresses = (
+                    address(state),
+                    scan_row,
+                    address(numbers),
+                    address(is_counted),
+                    error_row,
+                    plot_row,
+                    address(extra),
+                )
+                if k == 0:
+                    begin(addresses)
+                else:
+                    step(addresses)
+                for c in range(components):
+                    e, b = get(error_row, c), get(baseline_row, c)
+                    square = e * e
+                    add_totals(sums, (k * components + c) * 4, e, square, e * square, square * square)
+                    products[k * components + c] += total(square * (b * b))
+                if tested:
+                    for c in range(components):
+                        variances[k * components + c] += total(get(address(extra), c))
+                    q = get(address(extra), components)
+                    squares[2 * k] += total(q)
+                    squares[2 * k + 1] += total(q * q)
+
+    return follow

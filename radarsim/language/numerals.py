@@ -1,0 +1,35 @@
+"""Numbers and powers of ten in the notation of the language in use.
+
+The catalogue says under the context "number" how its language writes the point and the separator of thousands."""
+
+import re
+
+from radarsim.language.current import ENGLISH, current_language, translations
+
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+POWER = re.compile(r"(?P<mantissa>\d[\d.,]*)e(?P<exponent>[+-]\d+)")  # of a number in Python's form
+NUMBER = "number"  # context of the point and of the separator of thousands
+
+
+def numeral(text: str) -> str:
+    """An English number (1,234.5) in the current language's notation, with a true minus and raised powers of ten.
+
+    >>> [numeral(one) for one in ("-0.5", "6.678e+09", "1e-05")]
+    ['−0.5', '6.678·10⁹', '10⁻⁵']
+    """
+    if "e" in text:
+        text = POWER.sub(_format_power, text)
+    if current_language() == ENGLISH:
+        return text.replace("-", "−")
+    catalogue_of_language = translations(current_language())
+    return text.translate({ord(mark): catalogue_of_language.pgettext(NUMBER, mark) for mark in ".,"} | {ord("-"): "−"})
+
+
+def power_of_ten(exponent: int) -> str:
+    """10⁻³ of −3."""
+    return f"10{str(exponent).translate(SUPERSCRIPT)}"
+
+
+def _format_power(match: re.Match[str]) -> str:
+    power = power_of_ten(int(match["exponent"]))
+    return power if match["mantissa"] == "1" else f"{match['mantissa']}·{power}"

@@ -1,0 +1,1 @@
+"""Motion of targets: transition matrices and process noise, reference frames, model and recorded courses."""

@@ -1,1 +1,0 @@
-"""Recorded plots: reading them, filters over them, checks of the stated accuracies."""

@@ -1,1 +1,0 @@
-"""Recordings of radars, transponders and ships, converted to our columns: `radarsim import`."""

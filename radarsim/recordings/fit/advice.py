@@ -1,0 +1,182 @@
+"""Advise on a config from recorded plots: the best filter, and errors in its numbers.
+
+The likelihood finds errors in the config's numbers. Each explanation (a σ, the manoeuvre variance, a bias of the
+velocity, outliers, errors correlated from plot to plot) is fitted alone. The one that raises the likelihood most is
+reported, if it raises it by more than chance does in one recording of twenty, over all explanations; the search then
+continues with it included. For a recording with correct numbers nothing is reported.
+
+The advice is about the filter that takes most columns of a plot. A filter that takes fewer says nothing about the
+others, and may predict the ranges best just because the velocities are bad."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.recordings.fit.folded_doppler import Folding, detect_case_folding
+from radarsim.recordings.fit.likelihood_slice import (
+    CountedLikelihood,
+    LikelihoodSlice,
+    Progress,
+    climb,
+    log_likelihood,
+    maximise,
+    no_progress,
+)
+from radarsim.recordings.fit.newton_steps import polish_maximum
+from radarsim.recordings.fit.profile_search import HALF_CHI2_95
+from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
+from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
+from radarsim.recordings.tracking_result import TrackingResult
+from radarsim.studies.recording_interface import Likelihood, TurnError
+
+FALSE_FINDING_LEVEL = 0.05  # of a false finding
+MAX_FINDINGS = 3
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One explanation: the key (or one of EXPLANATIONS), its value (a share; a bias in σ; a correlation), and the
+    increase of the log-likelihood over the findings before.
+
+    from_zero: whether the plots distinguish a key's value from zero. turning: the cost of a smaller manoeuvre variance.
+    """
+
+    name: str
+    value: float
+    gain: float
+    from_zero: bool = True
+    turning: TurnError | None = None
+
+
+@dataclass(frozen=True)
+class FilterComparison:
+    """By how much the best filter predicts the plots better than each other: differences of the log-likelihood of the
+    numbers that all of them take. fullest: the best predictor among those that take most columns of a plot."""
+
+    best: str
+    log_ratios: dict[str, float]
+    most_columns: str
+
+
+@dataclass(frozen=True)
+class UsedRows:
+    """The rows used for advice: their number, in how many stretches, spread over all tracks and the whole time."""
+
+    rows: int
+    stretches: int
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Advice from the likelihood of a config's filters over recorded plots: the best filter; the errors in the numbers
+    of the one that takes most columns; the rows used. folding: where the velocities are folded, and nothing else is
+    examined."""
+
+    comparison: FilterComparison
+    findings: list[Finding]
+    used_rows: UsedRows
+    folding: Folding | None = None
+
+
+def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice | None:
+    """Advise on a config from a sample of the rows of all tracks; None if its study has no likelihood of plots.
+
+    progress is called with the number of likelihoods computed."""
+    case, interface = followed.case, recording_interface(followed.case)
+    results = list(followed.tracks.values()) or [followed]
+    stretches = [
+        stretch for result in results for stretch in result.sample.stretches() if len(stretch["t_s"]) >= MIN_TRACK_ROWS
+    ]
+    if not stretches or unknown_inherited_keys(case, "likelihood"):
+        return None
+    sample = sample_rows(stretches, interface.rows_asked)
+    candidates = [interface.likelihood(case, member.name, sample) for member in case.spec.members]
+    likelihoods = {likelihood.filter: likelihood for likelihood in candidates if likelihood}
+    if not likelihoods:
+        return None
+    comparison = compare_filters(list(likelihoods.values()))
+    used_rows = UsedRows(sum(len(stretch["t_s"]) for stretch in sample), len(sample))
+    if (folding := detect_case_folding(case, stretches)) is not None:
+        return Advice(comparison, [], used_rows, folding)
+    likelihood = likelihoods[comparison.most_columns]
+    findings = [_with_turn_error(case, likelihood, finding) for finding in find_errors(likelihood, progress)]
+    return Advice(comparison, findings, used_rows)
+
+
+def _with_turn_error(case: Case, likelihood: Likelihood, finding: Finding) -> Finding:
+    """Add to a finding the largest error in a turn, if it lowers a key."""
+    stated = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
+    if finding.value >= stated.get(finding.name, -np.inf):
+        return finding
+    turning = recording_interface(case).in_a_turn(case, likelihood.filter, {finding.name: finding.value})
+    return replace(finding, turning=turning)
+
+
+def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> list[Finding]:
+    """Errors in the configured numbers, the one with most weight first; empty if nothing is wrong."""
+    from scipy.stats import chi2
+
+    counted, names = CountedLikelihood(likelihood, progress), [*likelihood.keys, *likelihood.explains]
+    needed = 0.5 * float(chi2.ppf(1 - FALSE_FINDING_LEVEL / len(names), 1))
+    chosen_names: list[str] = []
+    start: dict[str, float] = {}
+    value_so_far, results = log_likelihood(counted, {}), []
+    while len(chosen_names) < min(MAX_FINDINGS, len(names)):
+        trials = {name: maximise(counted, [*chosen_names, name], start) for name in names if name not in chosen_names}
+        best_name = max(trials, key=lambda name: trials[name][1])
+        values, top = trials[best_name]
+        if top - value_so_far < needed:
+            break
+        values, top = _polish_values(counted, values)
+        results.append(Finding(best_name, values[best_name], top - value_so_far))
+        chosen_names, start, value_so_far = [*chosen_names, best_name], values, top
+    return [
+        replace(
+            finding,
+            value=start[finding.name],
+            from_zero=_is_distinguished_from_zero(counted, finding.name, start, value_so_far),
+        )
+        for finding in results
+    ]
+
+
+def _is_distinguished_from_zero(
+    likelihood: CountedLikelihood, name: str, values: dict[str, float], maximum: float
+) -> bool:
+    """Whether the plots distinguish a key from zero, whatever the other keys are: tested where it is smaller than
+    stated."""
+    configured = dict(zip(likelihood.keys, likelihood.stated.tolist(), strict=True))
+    if name not in configured or values[name] >= configured[name]:
+        return True
+    fixed = {key: value for key, value in (configured | values).items() if key != name}
+    # An interval ends where it first leaves the maximum: in x and y a needle of σ = 0 across and kilometres along,
+    # which turns with each measured bearing, explains errors across too.
+    smaller = (float(likelihood.likelihood.least[likelihood.keys.index(name)]), values[name] / 2)
+    return any(
+        climb(LikelihoodSlice(likelihood, list(fixed), {name: lowest}), fixed)[1] < maximum - HALF_CHI2_95
+        for lowest in smaller
+    )
+
+
+def compare_filters(likelihoods: Sequence[Likelihood]) -> FilterComparison:
+    """Compare how well filters predict the plots with the configured numbers."""
+    sums = {likelihood.filter: likelihood.by_number(np.asarray(likelihood.stated)) for likelihood in likelihoods}
+    common = set.intersection(*(set(sums) for sums in sums.values()))
+    totals = {name: sum(sums[number] for number in common) for name, sums in sums.items()}
+    best_name = max(totals, key=lambda name: totals[name])
+    column_count = max(len(sums) for sums in sums.values())
+    full_sums = {name: sum(sums.values()) for name, sums in sums.items() if len(sums) == column_count}
+    return FilterComparison(
+        best_name,
+        {name: totals[best_name] - total for name, total in totals.items()},
+        max(full_sums, key=full_sums.__getitem__),
+    )
+
+
+def _polish_values(likelihood: CountedLikelihood, start: dict[str, float]) -> tuple[dict[str, float], float]:
+    """Refine roughly searched values: printed numbers must not depend on the last digits of a processor."""
+    slice_ = LikelihoodSlice(likelihood, list(start))
+    point = polish_maximum(slice_, slice_.to_search(start))
+    return slice_.to_values(point), slice_(point)

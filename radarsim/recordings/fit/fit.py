@@ -1,0 +1,312 @@
+"""Fit the numbers of a config to recorded plots by maximum likelihood.
+
+The filter's predictions give each plot a density; their product is the likelihood of the filter's parameters (Schweppe
+1965). Estimates maximise it; intervals are those of `profile_search`. Besides the keys, outliers, a bias, or errors
+correlated from plot to plot may explain the plots. Clear outliers and clear correlation are fitted too."""
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from radarsim.config.experiment import Case, Experiment
+from radarsim.errors import ConfigError
+from radarsim.language.current import use_language
+from radarsim.recordings import read_plots
+from radarsim.recordings.fit.folded_doppler import VELOCITY_COLUMN, detect_case_folding, folding_message
+from radarsim.recordings.fit.likelihood_slice import (
+    IMPOSSIBLE_LOG_LIKELIHOOD,
+    CountedLikelihood,
+    LikelihoodSlice,
+    Progress,
+    climb,
+    maximise,
+    no_progress,
+)
+from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, FittedKey, LikelihoodSearch
+from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
+from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
+from radarsim.recordings.track_rows import split_by_track
+from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, Likelihood
+
+SECOND_FIT_COST = 1.5  # evaluations of a fit that allows for more, in those of the plain one
+
+
+class FitStages:
+    """Progress over several fits.
+
+    has_second_fit: whether a second fit, which takes SECOND_FIT_COST times as many likelihoods, will follow."""
+
+    def __init__(self, progress: Progress, has_second_fit: bool):
+        self.progress, self.has_second_fit, self.evaluations_before, self.done = progress, has_second_fit, 0, 0
+
+    def report(self, evaluations: int, expected: int | None = None) -> None:
+        self.done = self.evaluations_before + evaluations
+        total = expected and self.evaluations_before + round(expected * (1 + SECOND_FIT_COST * self.has_second_fit))
+        self.progress(self.done, total)
+
+    def next(self) -> Progress:
+        """Start the next fit, and return its progress."""
+        self.evaluations_before, self.has_second_fit = self.done, False
+        return self.report
+
+
+MAX_PLAUSIBLE_OUTLIERS = 0.3  # of plots that may have ten times their σ; with more, the errors follow another law
+CORRELATION_TIME_KEY = "correlation_time_s"
+ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
+PLAIN_GAIN = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The fit: filter, tracks and plots used, the keys, the share of outliers where allowed for, and the increase of
+    the log-likelihood over the stated values; another explanation that the plots have: then the intervals do not hold;
+    and the fit without outliers and correlation, where these are allowed for."""
+
+    filter: str
+    tracks: int
+    rows: int
+    keys: tuple[FittedKey, ...]
+    outliers: float | None
+    gain: float
+    beside: "FurtherExplanation | None" = None
+    plain: "Fit | None" = None
+    doubles: int = 0  # further plots of a track in a scan, left out
+
+
+class FurtherExplanation(NamedTuple):
+    """An explanation besides the keys, one of EXPLANATIONS: its value, and the increase of the log-likelihood by it."""
+
+    name: str
+    value: float
+    gain: float
+
+
+class CorrelatedLikelihood:
+    """A likelihood with the correlation time of the errors as a further key, s: of an error a share exp(-t / it) is
+    left after a time t (first-order Gauss-Markov process)."""
+
+    def __init__(self, likelihood: Likelihood):
+        self.likelihood = likelihood
+        self.filter = likelihood.filter
+        self.tracks = likelihood.tracks
+        self.rows = likelihood.rows
+        self.usual_s = likelihood.usual_s
+        self.keys, self.stated = (*likelihood.keys, CORRELATION_TIME_KEY), np.append(likelihood.stated, 0.0)
+        self.least = np.append(likelihood.least, ZERO_CORRELATION_TIME * likelihood.usual_s)
+        self.explains = tuple(name for name in likelihood.explains if name != CORRELATION)
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+        """The logarithm of the likelihood; `correlation` is that of the last of the values (n,), whatever is given."""
+        return self.likelihood(values[:-1], outliers, bias, math.exp(-self.usual_s / values[-1]) if values[-1] else 0.0)
+
+    def by_number(self, values: np.ndarray) -> Mapping[str, float]:
+        """The same for the keys alone, without correlation."""
+        return self.likelihood.by_number(values[:-1])
+
+
+def file_likelihoods(
+    experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None
+) -> tuple[Likelihood, Likelihood | None, int]:
+    """The likelihood of a filter of an experiment's one case over all tracks of a file, and over a sample of its rows;
+    without a name, of the filter that takes most columns of a plot. And how many further plots of a track in a scan are
+    left out. Raises ConfigError."""
+    case = single_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
+    refuse_inherited_part(case, "likelihood")
+    interface = recording_interface(case)
+    filter_names = [member.name for member in case.spec.members]
+    if filter_name is not None and filter_name not in filter_names:
+        user_filters = [user_filter.name for user_filter in case.outside]
+        why = ": it is written in Python, and radarsim does not know its keys" if filter_name in user_filters else ""
+        raise ConfigError(f"filter: must be one of {', '.join(filter_names)}; got {filter_name}{why}")
+    tracks, doubles = _read_tracks(source, interface.columns(case.spec), interface.from_any_origin)
+    long_tracks = [columns for columns in tracks if len(columns["t_s"]) >= MIN_TRACK_ROWS]
+    if not long_tracks:
+        raise ConfigError(f"{source}: must have a track of at least {MIN_TRACK_ROWS} rows")
+    if constant_columns := [
+        name for name in long_tracks[0] if name != "t_s" and all(np.ptp(columns[name]) == 0 for columns in long_tracks)
+    ]:
+        raise ConfigError(
+            f"{source}: {constant_columns[0]}: must differ between plots, or σ cannot be estimated; all are the same"
+        )
+    likelihood = interface.likelihood(case, filter_name, long_tracks)
+    folding = detect_case_folding(case, long_tracks)
+    if folding and likelihood is not None and VELOCITY_COLUMN in likelihood.by_number(np.asarray(likelihood.stated)):
+        with use_language("en"):  # as all faults
+            raise ConfigError(f"{source}: {folding_message(folding, case)}")
+    if likelihood is None:
+        raise ConfigError(
+            no_likelihood_message(
+                case, filter_name, [name for name in filter_names if interface.likelihood(case, name, long_tracks)]
+            )
+        )
+    return (
+        likelihood,
+        interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked))),
+        doubles,
+    )
+
+
+def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters: Sequence[str]) -> str:
+    """The fault that no likelihood exists; fittable_filters: those for which the study has one."""
+    if filter_name is not None and fittable_filters:
+        allowed = ", ".join(fittable_filters)
+        return f"filter: {filter_name} does not say how likely plots are, which fit needs; must be one of {allowed}"
+    return (
+        f"{case.name}: study {case.study} does not say how likely recorded plots are under "
+        f"{'these filters' if filter_name is None else filter_name}, which fit needs; track takes them"
+    )
+
+
+def _read_tracks(
+    source: str | os.PathLike, choices: Sequence[Sequence[str]], any_origin: bool
+) -> tuple[list[dict[str, np.ndarray]], int]:
+    """The columns (n,) of each track of a file of plots, and how many further plots of a scan are left out."""
+    pieces_by_track, doubles = dict[str | None, list[dict[str, np.ndarray]]](), 0
+    for piece in read_plots.pieces(source, choices, any_origin=any_origin):
+        doubles = piece.doubles
+        for rows in split_by_track(piece):
+            if rows.name != "":
+                pieces_by_track.setdefault(rows.name, []).append(rows.columns)
+    tracks = [
+        {key: np.concatenate([piece[key] for piece in track_pieces]) for key in track_pieces[0]}
+        for track_pieces in pieces_by_track.values()
+    ]
+    return tracks, doubles
+
+
+def fit_plots(
+    experiment: Experiment,
+    source: str | os.PathLike,
+    filter_name: str | None = None,
+    allowing: Sequence[str] | None = None,
+    progress: Progress = no_progress,
+) -> Fit:
+    """Fit the config's numbers to the plots of a file; allowing: for these of OUTLIERS and CORRELATION; None: for those
+    that are plain. progress is called with the number of likelihoods computed. Raises ConfigError."""
+    likelihood, rough, doubles = file_likelihoods(experiment, source, filter_name)
+    return replace(fit_likelihood(likelihood, rough, allowing, progress), doubles=doubles)
+
+
+def fit_likelihood(
+    likelihood: Likelihood,
+    rough: Likelihood | None = None,
+    allowing: Sequence[str] | None = None,
+    progress: Progress = no_progress,
+) -> Fit:
+    """Fit a likelihood, plainly and with the errors it allows for.
+
+    allowing: which of OUTLIERS and CORRELATION; None: those that the plots show plainly."""
+    allowed = tuple(allowing or ())
+    check_explanations(likelihood, allowed)
+    stages = FitStages(progress, bool(allowed))
+    plain = result = fit_keys(likelihood, (), stages.report, rough)
+    if allowed:
+        result = fit_keys(likelihood, allowed, stages.next(), rough)
+    while allowing is None and (explanation := result.beside) and _is_plain_error(explanation):
+        allowed = (*allowed, explanation.name)
+        try:
+            result = fit_keys(likelihood, allowed, stages.next(), rough)
+        except ConfigError:  # so many outliers that the errors follow another law: the plain fit reports it
+            break
+    return result if result is plain else replace(result, plain=plain)
+
+
+def _is_plain_error(explanation: FurtherExplanation) -> bool:
+    """Whether outliers or correlation raise the likelihood by more than chance does in one recording of 1000."""
+    return explanation.name in (OUTLIERS, CORRELATION) and explanation.gain > PLAIN_GAIN
+
+
+def check_explanations(likelihood: Likelihood, allowing: Sequence[str]) -> None:
+    """Raise ConfigError unless a likelihood can allow for these explanations."""
+    for name in allowing:
+        if name not in likelihood.explains:
+            description = {OUTLIERS: "outliers", CORRELATION: "errors that last"}[name]
+            raise ConfigError(f"the likelihood of filter {likelihood.filter} cannot allow for {description}")
+
+
+def fit_keys(
+    likelihood: Likelihood,
+    allowing: Sequence[str] = (),
+    progress: Progress = no_progress,
+    rough: Likelihood | None = None,
+) -> Fit:
+    """The keys at the maximum of a likelihood, with profile intervals; allowing: for these of OUTLIERS and CORRELATION;
+    rough: the likelihood of fewer rows, for a first search. Raises ConfigError where these cannot be allowed for, or
+    the plots are impossible whatever the keys."""
+    check_explanations(likelihood, allowing)
+    robust = OUTLIERS in allowing
+    if CORRELATION in allowing:
+        likelihood, rough = CorrelatedLikelihood(likelihood), rough and CorrelatedLikelihood(rough)
+    start = LikelihoodSearch(rough, robust, no_progress).best if rough and rough.rows < likelihood.rows else None
+    search = LikelihoodSearch(likelihood, robust, progress, start)
+    while search.refine_zero():
+        search.raise_zero_keys()
+    if search.top <= IMPOSSIBLE_LOG_LIKELIHOOD:
+        raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
+    share = float(search.to_values(search.best)[-1]) if robust else None
+    if share is not None and share > MAX_PLAUSIBLE_OUTLIERS:
+        raise ConfigError(f"robust: {100 * share:.0f} % of the plots would have to be outliers: their errors follow "
+                          "another law (few different values?); fit without it")  # fmt: skip
+    keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
+    stated = likelihood(np.array(likelihood.stated), 0.0)
+    gain = search.top - stated
+    return Fit(
+        likelihood.filter,
+        likelihood.tracks,
+        likelihood.rows,
+        keys,
+        share,
+        gain,
+        _find_further_explanation(search, likelihood),
+    )
+
+
+def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood) -> FurtherExplanation | None:
+    """The explanation that raises the maximum most in addition to the fitted keys.
+
+    None if it raises it by less than chance does in one recording of twenty."""
+    from scipy.stats import chi2
+
+    fitted_values = search.to_values(search.best).tolist()
+    fixed = dict(zip((*likelihood.keys, OUTLIERS), fitted_values, strict=False))
+    names = [name for name in likelihood.explains if name not in fixed]
+    expected = search.evaluations + EXPLANATION_EVALUATIONS * len(names)
+    counted_likelihood = CountedLikelihood(likelihood, search.progress, search.evaluations, expected)
+    maxima = [maximise(counted_likelihood, [name], {}, fixed) for name in names]
+    if OUTLIERS in names and likelihood.rows <= ROUGH_ROWS:
+        # Outliers have raised σ, which hides a few of them: so the keys that are not zero are fitted again with them.
+        i, free_keys = names.index(OUTLIERS), [key for key in likelihood.keys if fixed[key] > 0]
+        slice_ = LikelihoodSlice(
+            counted_likelihood,
+            [*free_keys, OUTLIERS],
+            {key: value for key, value in fixed.items() if key not in free_keys},
+        )
+        values, maximum = climb(slice_, fixed | maxima[i][0])
+        maxima[i] = max(maxima[i], ({OUTLIERS: values[OUTLIERS]}, maximum), key=lambda maximum: maximum[1])
+    if not maxima:
+        return None
+    values, maximum = max(maxima, key=lambda maximum: maximum[1])
+    needed_gain = 0.5 * float(chi2.ppf(0.95 ** (1 / len(maxima)), 1))
+    return (
+        FurtherExplanation(*next(iter(values.items())), maximum - search.top)
+        if maximum > search.top + needed_gain
+        else None
+    )
+
+
+def fitted_settings(fit_: Fit) -> dict[str, float]:
+    """Settings for the config by key, to four digits; keys that the plots do not determine are left out."""
+    return {
+        row.key: float(f"{row.value:.4g}") for row in fit_.keys if row.identifiable and row.key != CORRELATION_TIME_KEY
+    }
+
+
+def fit_rows(fit_: Fit) -> list[dict[str, Any]]:
+    """The keys as rows of a table; columns plain…: those of the fit without outliers and correlation."""
+    plain_cells = {row.key: (row.value, row.lo, row.hi) for row in (fit_.plain or fit_).keys}
+    names = ("plain", "plain_lo", "plain_hi")
+    return [asdict(row) | dict(zip(names, plain_cells.get(row.key, (None,) * 3), strict=True)) for row in fit_.keys]

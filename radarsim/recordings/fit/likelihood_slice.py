@@ -1,0 +1,118 @@
+"""Maximise a likelihood along some of its keys and explanations, with rough accuracy."""
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from radarsim.studies.recording_interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS, Likelihood
+
+ROUGH_ACCURACY = 0.01  # relative accuracy, of a key and of the likelihood, to which explanations are compared
+MIN_LOG_FACTOR, MAX_LOG_FACTOR = np.log(1e-4), np.log(1e4)  # of a key's factor
+MAX_BIAS_SIGMAS = 50.0  # in σ of the velocity
+SHARE_LIMITS = {
+    OUTLIERS: (1e-3, 0.4, 3.0),
+    CORRELATION: (1e-3, 0.99, 0.0),
+}  # least, most, logit at the start of the search
+FAR_FROM_ZERO = 1e4  # times the value of a key that counts as zero
+IMPOSSIBLE_LOG_LIKELIHOOD = -1e300  # stands for the logarithm of zero likelihood: a search needs a number
+NO_VALUES: Mapping[str, float] = MappingProxyType({})
+SEARCH_STARTS = (-2.0, 0.0, 2.0)  # of a search
+Progress = Callable[[int, int | None], None]  # likelihoods computed, and their expected number where known
+
+
+def no_progress(evaluations: int, expected: int | None = None) -> None:
+    """Ignore progress."""
+
+
+def starting_values(likelihood: Likelihood) -> np.ndarray:
+    """Starting values of the keys: the configured ones; a key that is zero starts far above what counts as zero."""
+    is_zero = np.asarray(likelihood.stated) <= likelihood.least
+    return np.where(is_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
+
+
+class CountedLikelihood:
+    """A likelihood that counts its evaluations and reports progress."""
+
+    def __init__(self, likelihood: Likelihood, progress: Progress, count: int = 0, expected: int | None = None):
+        self.likelihood, self.progress, self.count, self.expected = likelihood, progress, count, expected
+        self.keys, self.stated = likelihood.keys, likelihood.stated
+
+    def __call__(self, values: np.ndarray, explanations: Mapping[str, float]) -> float:
+        self.count += 1
+        self.progress(self.count, self.expected and max(self.expected, self.count))
+        return self.likelihood(values, **explanations)
+
+
+def log_likelihood(likelihood: CountedLikelihood, changes: Mapping[str, float]) -> float:
+    """The log-likelihood with some keys changed and some explanations applied."""
+    configured = zip(likelihood.keys, likelihood.stated, strict=True)
+    values = np.array([changes.get(key, value) for key, value in configured])
+    result = likelihood(values, {name: changes[name] for name in EXPLANATIONS if name in changes})
+    return result if np.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
+
+
+class LikelihoodSlice:
+    """A likelihood as a function of some keys and explanations on their search scales; others are fixed."""
+
+    def __init__(self, likelihood: CountedLikelihood, names: Sequence[str], fixed: Mapping[str, float] = NO_VALUES):
+        starting = dict(zip(likelihood.keys, starting_values(likelihood.likelihood).tolist(), strict=True))
+        self.likelihood, self.fixed = likelihood, fixed
+        self.scales = {name: _search_scale(name, starting) for name in names}
+
+    def to_search(self, values: Mapping[str, float]) -> np.ndarray:
+        return np.array([to_search(values[name]) for name, (_, to_search) in self.scales.items()])
+
+    def to_values(self, point: np.ndarray) -> dict[str, float]:
+        return {name: to_value(x) for (name, (to_value, _)), x in zip(self.scales.items(), point, strict=True)}
+
+    def __call__(self, point: np.ndarray) -> float:
+        return log_likelihood(self.likelihood, {**self.fixed, **self.to_values(point)})
+
+
+def maximise(
+    likelihood: CountedLikelihood,
+    names: Sequence[str],
+    start: Mapping[str, float],
+    fixed: Mapping[str, float] = NO_VALUES,
+) -> tuple[dict[str, float], float]:
+    """The maximum of the likelihood along some explanations, others held, and its logarithm there: roughly, from three
+    starts of the last one."""
+    slice_, last_name = LikelihoodSlice(likelihood, names, fixed), names[-1]
+    maxima = [
+        climb(slice_, {**start, last_name: slice_.scales[last_name][0](last_start)}) for last_start in SEARCH_STARTS
+    ]
+    return max(maxima, key=lambda maximum: maximum[1])
+
+
+def climb(slice_: LikelihoodSlice, start: Mapping[str, float]) -> tuple[dict[str, float], float]:
+    """The maximum reached from a start with rough accuracy, and its log-likelihood."""
+    from scipy.optimize import minimize
+
+    def cost(start_point: np.ndarray) -> float:
+        return -slice_(start_point)
+
+    point = slice_.to_search(start)
+    simplex = np.concatenate([point[None], point + 0.5 * np.eye(len(point))])
+    options: Any = {"initial_simplex": simplex, "xatol": ROUGH_ACCURACY, "fatol": ROUGH_ACCURACY, "maxfev": 400}
+    result = minimize(cost, point, method="Nelder-Mead", options=options)
+    return slice_.to_values(result.x), -float(result.fun)
+
+
+def _search_scale(name: str, starting: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:
+    """Functions from the search scale to the value of a key or an explanation, and back.
+
+    starting: the starting value of each key."""
+    if name == BIAS:
+        return lambda x: float(np.clip(x, -MAX_BIAS_SIGMAS, MAX_BIAS_SIGMAS)), lambda value: value
+    if name in SHARE_LIMITS:
+        minimum, maximum, offset = SHARE_LIMITS[name]
+        return (
+            lambda x: float(np.clip(1 / (1 + np.exp(offset - x)), minimum, maximum)),
+            lambda value: offset - float(np.log(1 / value - 1)),
+        )
+    return (
+        lambda x: starting[name] * float(np.exp(np.clip(x, MIN_LOG_FACTOR, MAX_LOG_FACTOR))),
+        lambda value: float(np.log(value / starting[name])),
+    )

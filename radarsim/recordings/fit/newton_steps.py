@@ -1,0 +1,84 @@
+"""Newton steps to the maximum of a likelihood."""
+
+import itertools
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from radarsim.recordings.fit.likelihood_slice import IMPOSSIBLE_LOG_LIKELIHOOD
+
+# step of a search at its start, and its end before a restart, in the same logarithms
+FIRST_STEP = 0.3
+# Accuracy of a maximum and of an interval's end, in the logarithm of a key; of the likelihood a tenth of that. Far
+# finer than printed digits, since the path of a search depends on last digits, and these differ between processors.
+TOLERANCE = 1e-6
+SLOPE_STEP = 1e-3  # difference for a slope, in the logarithm of a key
+CURVATURE_STEP = 1e-2  # the same during the search, where curvature is needed too
+# curvature that counts as none, and the longest Newton step, in that logarithm
+MIN_CURVATURE = 1e-3
+MAX_NEWTON_STEP = 1.5
+MAX_CORRELATION = 0.999  # of the correlation of two keys
+
+
+def polish_maximum(log_likelihood_at: Callable[[np.ndarray], float], point: np.ndarray) -> np.ndarray:
+    """The maximum of a likelihood near the result of a search, by two Newton steps.
+
+    A search by comparison stalls at the root of the last digits. They make a difference over SLOPE_STEP wrong by 10⁻⁷,
+    and the maximum as well."""
+    curvature, start = Curvature(log_likelihood_at), point
+    start_value = log_likelihood_at(point)
+    if not math.isfinite(curvature.step(point, start_value, np.arange(point.size))[1]):
+        return start
+    for _ in range(2):
+        moves = SLOPE_STEP * np.eye(point.size)
+        point = point + curvature.newton_step(
+            np.array(
+                [
+                    (log_likelihood_at(point + move) - log_likelihood_at(point - move)) / (2 * SLOPE_STEP)
+                    for move in moves
+                ]
+            )
+        )
+    return (
+        point
+        if log_likelihood_at(point) >= start_value - TOLERANCE and np.abs(point - start).max() < FIRST_STEP
+        else start
+    )
+
+
+class Curvature:
+    """Curvature of a likelihood near a point, for Newton steps: along each coordinate it is computed anew at each step,
+    from the differences that give the slope; cross terms between coordinates, (n, n), are kept from before."""
+
+    def __init__(self, log_likelihood_at: Callable[[np.ndarray], float], correlations: np.ndarray | None = None):
+        self.log_likelihood_at, self.correlations = log_likelihood_at, correlations
+        self.H = np.zeros((0, 0))  # the curvature at the last step, of the coordinates free then
+
+    def step(self, point: np.ndarray, value: float, free: np.ndarray) -> tuple[np.ndarray, float]:
+        """An ascending step from `at`, of the free coordinates alone, and its predicted gain."""
+        moves = CURVATURE_STEP * np.eye(point.size)[free]
+        above, below = (np.array([self.log_likelihood_at(point + sign * move) for move in moves]) for sign in (1, -1))
+        if not (np.isfinite(value) and min(above.min(), below.min(), value) > IMPOSSIBLE_LOG_LIKELIHOOD):
+            return np.zeros(point.size), math.nan
+        slope, curvature = (above - below) / (2 * CURVATURE_STEP), (above - 2 * value + below) / CURVATURE_STEP**2
+        scale = np.sqrt(np.maximum(np.abs(curvature), MIN_CURVATURE))
+        if self.correlations is None:
+            self.correlations = np.eye(point.size)
+            for i, j in itertools.combinations(range(free.size), 2):
+                cross = self.log_likelihood_at(point + moves[i] + moves[j]) - above[i] - above[j] + value
+                correlation = float(
+                    np.clip(cross / CURVATURE_STEP**2 / (scale[i] * scale[j]), -MAX_CORRELATION, MAX_CORRELATION)
+                )
+                self.correlations[free[i], free[j]] = self.correlations[free[j], free[i]] = correlation
+        self.H = H = self.correlations[np.ix_(free, free)] * np.outer(scale, scale)
+        np.fill_diagonal(H, np.where(np.abs(curvature) < MIN_CURVATURE, -MIN_CURVATURE, curvature))
+        step = np.zeros(point.size)
+        step[free] = self.newton_step(slope)
+        return step, float(step[free] @ slope)
+
+    def newton_step(self, slope: np.ndarray) -> np.ndarray:
+        """The Newton step up a slope (n,), at most MAX_NEWTON_STEP along any axis of the curvature."""
+        sizes, axes = np.linalg.eigh(self.H)
+        coordinates = axes.T @ slope / np.maximum(np.abs(sizes), MIN_CURVATURE)
+        return axes @ np.clip(coordinates, -MAX_NEWTON_STEP, MAX_NEWTON_STEP)

@@ -1,0 +1,265 @@
+"""Quantities and units of the columns of a recording, found by their names.
+
+A column is found by its name, whatever its case and spaces; a unit may stand at its end (`range_km`, `Altitude [ft]`,
+`Latitude_degrees`). A name without a unit means SI and degrees; but positions with names from aviation (`gs`,
+`alt_baro`, …) are in feet, knots and feet a minute, and speeds of ships in knots, like the exports that use them.
+Ranges and bearings have no such convention: their units must be stated."""
+
+import math
+import re
+import shlex
+import types
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from radarsim.errors import ConfigError
+from radarsim.language.translate import tr
+
+KNOT_MPS = 1852 / 3600
+
+LENGTHS = {"m": 1.0, "km": 1e3, "ft": 0.3048, "feet": 0.3048, "nm": 1852.0, "nmi": 1852.0}
+HEIGHTS, FLIGHT_LEVELS = {**LENGTHS, "fl": 30.48}, ("fl", "flight_level")  # of 100 ft; names that are this unit
+SPEEDS = {
+    **dict.fromkeys(("mps", "m/s", "ms"), 1.0), **dict.fromkeys(("kn", "kt", "kts", "knots"), KNOT_MPS),
+    **dict.fromkeys(("kmh", "km/h"), 1 / 3.6), **dict.fromkeys(("fpm", "ft/min"), 0.3048 / 60),
+}  # fmt: skip
+DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 / math.pi}
+RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0}  # dmy, mdy: the order in 1/2/2024
+
+
+class Quantity(NamedTuple):
+    """The names of a quantity in files, in lower case without spaces and units, those that count first before others;
+    its units, as multiples of ours; the unit of a name that has none, '' where it must be stated."""
+
+    names: tuple[str, ...]
+    units: Mapping[str, float] = types.MappingProxyType({})
+    default_unit: str = ""
+
+
+QUANTITIES = {
+    "t_s": Quantity(
+        (
+            *("lastposupdate", "last_position", "time_position"),  # of the position; the following may be of a query
+            *("t", "time", "timestamp", "t_s", "datetime", "date_time", "basedatetime", "base_date_time", "utc"),
+            "date",
+        ),
+        TIME_UNITS,
+        "s",
+    ),
+    "date": Quantity(("date", "day")),  # of a time of day
+    "track": Quantity(
+        ("icao24", "icao", "hex", "mmsi", "track_id", "address", "callsign", "flight", "id", "track", "name")
+    ),
+    "latitude_deg": Quantity(("lat", "latitude"), DEGREES, "deg"),
+    "longitude_deg": Quantity(("lon", "lng", "long", "longitude"), DEGREES, "deg"),
+    "altitude_m": Quantity(
+        ("geoaltitude", "geo_altitude", "alt_geom", "altitude", "alt", "height", "ele"), HEIGHTS, "m"
+    ),
+    "barometric_m": Quantity(
+        ("baroaltitude", "baro_altitude", "alt_baro", "mode_c", "modec", *FLIGHT_LEVELS), HEIGHTS, "m"
+    ),
+    "speed_mps": Quantity(("velocity", "groundspeed", "ground_speed", "gs", "speed", "sog"), SPEEDS, "m/s"),
+    # Of a ship the heading is where its bow points; aircraft have their course under this name too.
+    "course_deg": Quantity(
+        ("true_track", "course", "cog", "track_angle", "direction", "heading", "track"), DEGREES, "deg"
+    ),
+    "up_mps": Quantity(
+        ("vertrate", "vertical_rate", "vert_rate", "geom_rate", "baro_rate", "climb"), SPEEDS, "m/s"
+    ),
+    "range_m": Quantity(("range", "slant_range", "distance", "rho"), LENGTHS),
+    "bearing_rad": Quantity(("bearing", "azimuth", "az", "theta"), RADIANS),
+    "velocity_mps": Quantity(("radial_velocity", "doppler", "radial_speed", "range_rate", "velocity"), SPEEDS, "m/s"),
+    "span_mps": Quantity(("span", "ambiguity", "doppler_span"), SPEEDS, "m/s"),
+}  # fmt: skip
+IDENTITIES = {  # what identifies an aircraft or a ship, by the names of columns
+    "address": ("icao24", "icao", "hex", "mmsi", "address"),
+    "callsign": ("callsign", "flight"),
+    "mode_3a": ("squawk", "mode_3a", "mode3a", "ssr"),
+}
+UNITS = {unit for quantity in QUANTITIES.values() for unit in quantity.units if unit}
+UNITLESS = ("t_s", "date", "track")  # what a bracket says of these is no unit: Time (UTC)
+EARTH_COLUMNS = ("latitude_deg", "longitude_deg")
+PLOT_COLUMNS = ("range_m", "bearing_rad")
+JOINT_POSITION = "position"  # latitude and longitude in one cell, parted by a comma
+AVIATION_NAMES = (  # names without a unit
+    *("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", "direction", "mode_c", "modec"),
+)
+AVIATION_UNITS = {"altitude_m": "ft", "barometric_m": "ft", "speed_mps": "kn", "up_mps": "fpm"}
+MARITIME_NAMES = ("sog", "cog", "mmsi")  # names of AIS
+HEADING_NAME = "heading"
+MARITIME_UNITS = {"speed_mps": "kn"}
+UNIT_PATTERN = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
+
+
+class Column(NamedTuple):
+    """A column of a file: its index, its name, what its numbers are multiplied by; its unit, and whether that is
+    assumed."""
+
+    position: int
+    name: str
+    factor: float
+    unit: str
+    is_assumed: bool
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """A column's name without its unit, in lower case, and its unit: `Range [km]` and `range_km` are (range, km)."""
+    name = name.strip().lower()
+    if match := UNIT_PATTERN.match(name):
+        return re.sub(r"\s+", "_", match[1].strip()), match[2].strip()
+    name = re.sub(r"\s+", "_", name)
+    stem, _, last = name.rpartition("_")
+    return (stem, last) if stem and last in UNITS else (name, "fl" if name in FLIGHT_LEVELS else "")
+
+
+def _printable(name: str) -> str:
+    """A name as a terminal can show it."""
+    return "".join(c if c.isprintable() else "�" for c in " ".join(name.split()))
+
+
+class Header:
+    """The columns of a file by our names, those assigned by the user first; raises ConfigError.
+
+    columns: by name of the quantity; identities: the indices of those in
+    IDENTITIES; on_earth: whether positions are read, not plots; aviation, maritime: whether
+    names follow their customs."""
+
+    def __init__(self, path: str, names: list[str], assigned: Mapping[str, str]):
+        self.path, self.names = path, [_printable(name) for name in names]
+        self.stems = [split_unit(name) for name in self.names]
+        self.maritime = any(stem in MARITIME_NAMES for stem, _ in self.stems)
+        self.aviation = any((name, "") in self.stems for name in AVIATION_NAMES)
+        self.customary_units = AVIATION_UNITS if self.aviation else MARITIME_UNITS if self.maritime else {}
+        self.columns: dict[str, Column] = {}
+        self._assign_columns(assigned)
+        has_positions = all(self._has(ours) or JOINT_POSITION in dict(self.stems) for ours in EARTH_COLUMNS)
+        self.reads_positions = has_positions and not any(ours in self.columns for ours in PLOT_COLUMNS)
+        self._find_columns(has_positions)
+        places = self._column_indices()
+        identity_columns = {
+            kind: [places[name] for name in names if name in places] for kind, names in IDENTITIES.items()
+        }
+        self.identities = {kind: indices[0] for kind, indices in identity_columns.items() if indices}
+        if "track" in self.columns and not self.identities:
+            self.identities["address"] = self.columns["track"].position  # one's own name of it
+        self._check()
+
+    def _has(self, ours: str) -> bool:
+        """Whether a quantity has been assigned, or has a known name."""
+        return ours in self.columns or any(stem in QUANTITIES[ours].names for stem, _ in self.stems)
+
+    def _assign_columns(self, assigned: Mapping[str, str]) -> None:
+        """Assign the columns that the user names."""
+        stems = {split_unit(ours)[0]: ours for ours in QUANTITIES}
+        for name, theirs in assigned.items() if self.names else ():
+            stem, unit = split_unit(name)
+            ours = name if name in QUANTITIES else stems.get(stem, "")
+            theirs = _printable(theirs)
+            if not ours or theirs not in self.names:
+                allowed = (
+                    f"a column of {', '.join(self.names)}" if ours else f"one of {', '.join(QUANTITIES)}, in any unit"
+                )
+                raise ConfigError(f"{self.path}:1: column {name}={theirs}: must name {allowed}")
+            stated_unit = split_unit(theirs)[1]
+            if unit and stated_unit and name != ours and unit != stated_unit:
+                raise ConfigError(
+                    f"{self.path}:1: column {name}={theirs}: must have the unit of its own name, {stated_unit}"
+                )
+            self.columns[ours] = self._column(ours, self.names.index(theirs), stated_unit or unit)
+
+    def _column_indices(self) -> dict[str, int]:
+        """The index of each name, of the first column that has it."""
+        return {stem: i for i, (stem, _) in reversed(list(enumerate(self.stems)))}
+
+    def _find_columns(self, has_positions: bool) -> None:
+        """Find the other columns by their known names."""
+        indices = self._column_indices()
+        left_out = (
+            (*PLOT_COLUMNS, "velocity_mps", "span_mps")
+            if self.reads_positions
+            else ("speed_mps", "course_deg", *EARTH_COLUMNS)
+        )
+        # beside a position it is the speed over ground
+        excluded = {("velocity_mps", "velocity")} if has_positions else set()
+        excluded |= {("course_deg", HEADING_NAME)} if self.maritime else set()
+        used_indices = {column.position for column in self.columns.values()}
+        for ours, quantity in QUANTITIES.items():
+            candidates = [
+                name
+                for name in quantity.names
+                if (ours, name) not in excluded and indices.get(name) not in used_indices
+            ]
+            match = next((name for name in candidates if name in indices), None)
+            if match and ours not in self.columns and ours not in left_out:
+                self.columns[ours] = self._column(ours, indices[match], self.stems[indices[match]][1])
+                used_indices.add(indices[match])
+        if self.reads_positions and JOINT_POSITION in indices:
+            for ours in set(EARTH_COLUMNS) - set(self.columns):
+                self.columns[ours] = self._column(ours, indices[JOINT_POSITION], "")
+
+    def _column(self, ours: str, index: int, unit: str) -> Column:
+        """A column in its unit; '' where neither its name nor the user states one."""
+        name, quantity = self.names[index], QUANTITIES[ours]
+        if self.names.count(name) > 1:
+            raise ConfigError(f"{self.path}:1: {name}: must be the name of one column; several have it")
+        is_known = unit in quantity.units or ours in UNITLESS
+        if unit and not is_known:
+            raise ConfigError(
+                f"{self.path}:1: {name}: the unit must be one of {', '.join(quantity.units)}; got {unit!r}"
+            )
+        unit_or_default = unit or self.customary_units.get(ours, quantity.default_unit)
+        is_assumed = not unit and ours not in UNITLESS and quantity.units is not DEGREES
+        return Column(index, name, quantity.units.get(unit_or_default, 1.0), unit_or_default, is_assumed)
+
+    def _check(self) -> None:
+        """Raise ConfigError for missing columns, and for units that must be stated."""
+        required = ("t_s", *EARTH_COLUMNS) if self.reads_positions else ("t_s", "range_m")
+        if missing := [name for name in required if name not in self.columns]:
+            hints = "; ".join(f"{name}: {', '.join(QUANTITIES[name].names)}" for name in missing)
+            got = ", ".join(self.names)[:200] or "nothing"
+            needed = "columns of time, and of latitude and longitude or of range (name them: --column OURS=THEIRS)"
+            raise ConfigError(f"{self.path}:1: must have {needed}; missing ({hints}); got {got}")
+        if columns_without_unit := {
+            ours: column.name for ours, column in self.columns.items() if not column.unit and ours not in UNITLESS
+        }:
+            cures = []
+            for ours, name in columns_without_unit.items():
+                by_factor: dict[float, str] = {}
+                for unit, factor in QUANTITIES[ours].units.items():
+                    by_factor.setdefault(factor, f"{split_unit(ours)[0]}_{unit}")
+                first, *alternatives = by_factor.values()
+                cures.append(f"--column {first}={shlex.quote(name)} (or {', '.join(alternatives)})")
+            names = ", ".join(columns_without_unit.values())
+            raise ConfigError(f"{self.path}:1: {names}: must have a unit in the name; where it has none, "
+                              f"{', '.join(cures)} states it")  # fmt: skip
+
+    def notes(self) -> list[str]:
+        """Notes on assumptions, and on columns that are not used."""
+        assumed = [column for column in self.columns.values() if column.is_assumed and column.unit]
+        unit_texts = ", ".join(tr("{name} in {unit}", name=column.name, unit=column.unit) for column in assumed)
+        lines = [tr("assumed because the name has no unit: {units}", units=unit_texts)] if unit_texts else []
+        time = self.columns["t_s"].name
+        names_by_stem = {stem: name for (stem, _), name in zip(self.stems, self.names, strict=True)}
+        used = {column.name for column in self.columns.values()}
+        unused = [
+            names_by_stem[stem]
+            for stem in names_by_stem
+            if stem in QUANTITIES["t_s"].names and names_by_stem[stem] not in used
+        ]
+        if unused:
+            lines.append(tr("times are {time}; not used: {others}", time=time, others=", ".join(unused)))
+        if (
+            self.maritime
+            and self.reads_positions
+            and HEADING_NAME in names_by_stem
+            and "course_deg" not in self.columns
+        ):
+            lines.append(
+                tr("no speeds: {heading} is where the bow points, not the course", heading=names_by_stem[HEADING_NAME])
+            )
+        ranges = [names_by_stem[stem] for stem in names_by_stem if stem in QUANTITIES["range_m"].names]
+        if self.reads_positions and ranges:
+            column = f"--column range_UNIT={shlex.quote(ranges[0])}"
+            lines.append(tr("positions are read, not plots; for these: {column}", column=column))
+        return lines

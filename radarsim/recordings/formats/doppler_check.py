@@ -1,0 +1,57 @@
+"""Check the sign and the folding of imported Doppler speeds."""
+
+import numpy as np
+
+from radarsim.language.translate import tr
+from radarsim.recordings.aircraft_match import MAX_GAP_S
+from radarsim.recordings.fit import folded_doppler
+from radarsim.recordings.formats.records import Batch
+from radarsim.recordings.grouping import rows_by_name
+
+DOPPLER_ROWS, MIN_DOPPLER_ROWS = 3000, 20  # rows on which sign and folding of the Doppler speed are tested
+DOPPLER_COLUMNS = ("t_s", "range_m", "velocity_mps")
+
+
+class DopplerCheck:
+    """Check the sign and the folding of Doppler speeds on the first rows of tracks."""
+
+    def __init__(self) -> None:
+        self.rows: dict[str, list[np.ndarray]] = {}
+        self.count = 0
+
+    def add(self, batch: Batch) -> None:
+        """Keep a batch, while there are fewer than DOPPLER_ROWS rows."""
+        if self.count >= DOPPLER_ROWS:
+            return
+        table = np.stack([batch.columns[name] for name in (*DOPPLER_COLUMNS, "span_mps")], axis=1)
+        usable = np.isfinite(table[:, :3]).all(axis=1)
+        self.count += int(usable.sum())
+        for name, rows in rows_by_name(batch.track).items():
+            if name:
+                self.rows.setdefault(name, []).append(table[rows][usable[rows]])
+
+    def notes(self, towards: bool) -> list[str]:
+        """Notes if the opposite sign fits the rate of the range clearly better, and if speeds are folded."""
+        tracks, notes = [np.concatenate(parts) for parts in self.rows.values()], []
+        offsets = np.abs(np.concatenate([np.empty((2, 0)), *map(_doppler_offsets, tracks)], axis=1))
+        if offsets.shape[1] >= MIN_DOPPLER_ROWS:
+            offset, opposite_offset = np.median(offsets, axis=1).tolist()
+            if opposite_offset < 0.5 * offset:
+                cure = tr("leave out --doppler-towards") if towards else tr("give --doppler-towards")
+                fields = {"as_is": offset, "turned": opposite_offset, "cure": cure}
+                notes = [tr("the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the "
+                            "other sign by {turned:.1f} m/s: {cure}", **fields)]  # fmt: skip
+        spanless_tracks = [
+            dict(zip(DOPPLER_COLUMNS, track[np.isnan(track[:, 3]), :3].T, strict=True)) for track in tracks
+        ]
+        folding = folded_doppler.detect_folding(spanless_tracks)
+        return notes if folding is None else [*notes, folded_doppler.folding_message(folding)]
+
+
+def _doppler_offsets(track: np.ndarray) -> np.ndarray:
+    """Differences (2, m) of a track's speeds, and of the opposite ones, from the rates of its range, m/s, without whole
+    spans."""
+    (dt, dr, *_), (v, span) = np.diff(track, axis=0).T, track[1:, 2:].T
+    is_close = (dt > 0) & (dt < MAX_GAP_S)
+    offsets = np.stack([v, -v])[:, is_close] - dr[is_close] / dt[is_close]
+    return offsets - np.nan_to_num(span[is_close] * np.rint(offsets / span[is_close]))

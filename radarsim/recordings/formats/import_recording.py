@@ -1,0 +1,325 @@
+"""Import a recording as a CSV file of plots (`radarsim import`).
+
+Records are read, placed and written in batches, so that memory does not grow with the file; only the truth is kept in
+memory, to be looked up by time. The file is written completely or not at all."""
+
+import datetime
+import math
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from radarsim.errors import ConfigError
+from radarsim.language.current import use_language
+from radarsim.language.translate import term, tr
+from radarsim.recordings.csv_rows import column_texts
+from radarsim.recordings.formats import asterix, asterix_decode
+from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
+from radarsim.recordings.formats.asterix import Asterix
+from radarsim.recordings.formats.doppler_check import DopplerCheck
+from radarsim.recordings.formats.import_options import Format, Options
+from radarsim.recordings.formats.open_recording import open_recording
+from radarsim.recordings.formats.records import BIASES, DAY_S, PLOTS, POSITIONS, Batch, Reader, skip_counts
+from radarsim.recordings.formats.sites import Site, antenna_angles, position_columns
+from radarsim.recordings.formats.table import Table
+from radarsim.recordings.grouping import rows_by_name
+from radarsim.report.atomic_files import Writer
+
+MAX_SITE_DISTANCE_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
+NOT_LATER_REASON = term("rows not later than the one before of their track")
+UNKNOWN_RADAR_REASON = term("rows of radar #/#, whose place neither it nor --at says")
+OTHER_KIND_REASONS = {PLOTS: term("plots beside positions"), POSITIONS: term("positions beside plots")}
+SEA_LEVEL_NOTE = term("positions without altitude, placed at sea level: {count} of {all}")
+NO_HEIGHT_NOTE = term(
+    "plots without height, or with one that their range cannot have: {count} of {all}; x_m, y_m, z_m are empty there"
+)
+BEHIND_ANTENNA_NOTE = term(
+    "plots behind the antenna or without height: {count} of {all}; elevation_rad and azimuth_rad are empty there"
+)
+NO_TRACK_NOTE = term("plots of no track, which `radarsim track` skips: {count} of {all}")
+MIN_DATED_S = 1e8  # since 1970; smaller times count from anywhere
+MEASURED_COLUMNS = ("range_m", "bearing_rad", "velocity_mps")
+
+
+@dataclass
+class ImportResult:
+    """Result of an import: format, records read, rows written, rows by track, skipped records, notes."""
+
+    format: Format
+    records: int = 0
+    rows: int = 0
+    tracks: dict[str, int] = field(default_factory=dict)
+    skipped: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    columns: tuple[str, ...] = ()
+
+
+def import_recording(
+    source: str | os.PathLike,
+    output: str | os.PathLike,
+    options: Options,
+    progress: Callable[[int], None] = lambda records: None,
+) -> ImportResult:
+    """Read a recording and write it as plots; raises ConfigError, StoreError, and then leaves no file.
+
+    progress is called from time to time with the number of records read."""
+    path = os.fspath(source)
+    with open_recording(path, options) as (format_, reader):
+        options, contradictions = add_stated_sites(options, reader)
+        if options.truth and not (options.site or options.sites):
+            raise ConfigError("truth: needs the place of the radar, --at LAT,LON,HEIGHT")
+        truth = AircraftTruth(path, options) if options.site or options.sites else None
+        work = _Import(format_, reader, options, truth)
+        with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
+            first = True
+            for rows in work.rows():
+                if first:
+                    file.write([(line,) for line in work.comment()])
+                    file.write([work.result.columns])
+                    first = False
+                file.write(rows)
+                progress(reader.records)
+            with use_language("en"):  # as all faults
+                if faults := work.faults() if work.result.rows else [work.no_rows_fault()]:
+                    raise ConfigError(*faults)
+    result = work.finish()
+    result.notes = contradictions + result.notes
+    return result
+
+
+def add_stated_sites(options: Options, reader: Reader) -> tuple[Options, list[str]]:
+    """Add the sites of radars that the recording states to the options; also notes where --at contradicts it."""
+    stated_places = reader.survey.positions if isinstance(reader, Asterix) else {}
+    sites, notes = {name: Site(*place) for name, place in stated_places.items()}, []
+    given_sites = {next(iter(sites)): options.site} if options.site and len(sites) == 1 else options.sites
+    for name, site in given_sites.items():
+        if name in sites and (distance_m := site.distance_m(sites[name])) > MAX_SITE_DISTANCE_M:
+            lat, lon, height = stated_places[name]
+            fields = {"name": name, "far": distance_m, "place": f"{lat:.5f},{lon:.5f},{height:.0f}"}
+            notes.append(tr("--at puts radar {name} {far:.0f} m from where it says it stands, {place} (I034/120); "
+                           "--at is taken", **fields))  # fmt: skip
+    return (options if options.site else replace(options, sites=sites | dict(options.sites))), notes
+
+
+class _Import:
+    """An import in progress: batches in, rows out."""
+
+    def __init__(self, format_: Format, reader: Reader, options: Options, truth: "AircraftTruth | None"):
+        self.reader, self.options, self.truth = reader, options, truth
+        self.result = ImportResult(format_)
+        self.kind: str | None = None  # of the rows
+        self.zero: float | None = None
+        self.tracks_are_addresses: bool | None = (
+            None  # whether tracks are addresses, and nothing else identifies an aircraft
+        )
+        self.last_times: dict[str, float] = {}
+        self.skipped = reader.skipped
+        self.radars = Counter[str]()
+        self.note_counts = Counter[str]()  # by what a note says of these rows
+        self.doppler = DopplerCheck()
+        self.track_names: set[str] = set()
+
+    def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
+        """The rows of the output, in batches."""
+        for batch in self.reader.batches():
+            if self.kind is None:
+                has_plots = (
+                    isinstance(self.reader, Asterix) and self.reader.survey.categories & asterix.RADAR_CATEGORIES
+                )
+                self.kind = PLOTS if has_plots else batch.kind
+            if batch.kind != self.kind:
+                if batch.kind == PLOTS or self.truth is None or not self.truth.is_same_file:
+                    self.skipped[OTHER_KIND_REASONS[batch.kind]] += len(batch.track)
+                continue
+            selected = self._select_rows(self._correct(batch))
+            if selected.track:
+                yield self._row_texts(selected)
+
+    def _correct(self, batch: Batch) -> Batch:
+        """A batch without the biases of the radar, with its sign of the Doppler speed turned, without spans of 0, and
+        without plots that have no range."""
+        biases, columns = self.options.biases, batch.columns
+        if batch.kind == POSITIONS:
+            if biases:
+                raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
+            return batch
+        if biases:
+            range_bias, range_scale, bearing_bias, time_bias = (biases.get(name, 0.0) for name in BIASES)
+            columns["t_s"] -= time_bias
+            columns["range_m"] = (columns["range_m"] - range_bias) / (1 + range_scale)
+            columns["bearing_rad"] = (columns["bearing_rad"] - bearing_bias) % (2 * math.pi)
+        columns["velocity_mps"] *= -1 if self.options.towards else 1
+        columns["span_mps"][columns["span_mps"] <= 0] = np.nan
+        if (is_invalid := columns["range_m"] <= 0).any():
+            self.skipped[term("plots whose range is not above 0")] += int(is_invalid.sum())
+            return batch.rows(np.flatnonzero(~is_invalid).tolist())
+        return batch
+
+    def _select_rows(self, batch: Batch) -> Batch:
+        """Select the records of a batch that are requested, and later than the last of their track."""
+        requested, rows = set(self.options.tracks), []
+        times = batch.columns["t_s"].tolist()
+        for i, (track, radar, t) in enumerate(zip(batch.track, batch.radar, times, strict=True)):
+            if len(self.track_names) < MAX_LISTED:
+                self.track_names.add(track)
+            if self.options.sites and batch.kind == PLOTS and radar not in self.options.sites:
+                self.skipped[
+                    UNKNOWN_RADAR_REASON.replace("#/#", radar) if radar else term("rows of a radar without a name")
+                ] += 1
+            elif requested and track not in requested:
+                self.skipped[term("rows of other tracks")] += 1
+            elif track and t <= self.last_times.get(track, -math.inf):
+                self.skipped[NOT_LATER_REASON] += 1
+            else:
+                rows.append(i)
+                self.last_times[track] = t
+                if batch.kind == PLOTS:
+                    self.radars[radar] += 1
+                self.result.tracks[track] = self.result.tracks.get(track, 0) + 1
+        return batch.rows(rows)
+
+    def _row_texts(self, batch: Batch) -> Iterable[tuple[str, ...]]:
+        """The rows of a batch, as text."""
+        t = batch.columns["t_s"]
+        if self.zero is None:
+            self.zero = self._time_zero(float(t[0]))
+        columns = {"t_s": t - self.zero} | self._add_places(batch)
+        if batch.kind == PLOTS:
+            self.doppler.add(batch)
+        if self.truth is not None:
+            columns |= self.truth.columns(batch, columns, self.reader)
+        names = {"track": batch.track}
+        if isinstance(self.reader, Asterix):
+            names["radar"] = batch.radar
+        if self.tracks_are_addresses is None:
+            self.tracks_are_addresses = not batch.texts and batch.address == [track.lower() for track in batch.track]
+        if not self.tracks_are_addresses:
+            names |= batch.identity
+        if not self.result.columns:
+            self.result.columns = ("t_s", *names, *(name for name in columns if name != "t_s"))
+        self.result.rows += len(t)
+        times, *other_columns = (column_texts(column) for column in columns.values())
+        return zip(times, *names.values(), *other_columns, strict=True)
+
+    def _time_zero(self, first: float) -> float:
+        """The origin of t_s, in the times of the recording."""
+        zero = self.options.zero
+        if zero == "first":
+            return first
+        if zero == "midnight":
+            return first - first % DAY_S
+        zero = float(zero)
+        return zero % DAY_S if self.reader.of_day else zero
+
+    def _add_places(self, batch: Batch) -> dict[str, np.ndarray]:
+        """Range, bearing, velocity and other columns that need the radar's place."""
+        site, batch_columns = self.options.only_site, batch.columns
+        if batch.kind == POSITIONS:
+            if site is None:
+                raise ConfigError("at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions "
+                                  "on the earth, not ranges")  # fmt: skip
+            measured = site.measure(batch_columns)
+            self.note_counts[SEA_LEVEL_NOTE] += int(np.isnan(batch_columns["altitude_m"]).sum())
+            columns = {name: measured[name] for name in (*MEASURED_COLUMNS, "level_elevation_rad", *LOCAL_COLUMNS)}
+            return columns | {"altitude_m": batch_columns["altitude_m"]} | self._antenna_angles(columns)
+        columns = {name: batch_columns[name] for name in (*MEASURED_COLUMNS, "span_mps", "altitude_m")}
+        if site is None and not self.options.sites:
+            return columns
+        local = np.full((len(batch.radar), 3), np.nan)
+        for name, rows in rows_by_name(batch.radar).items():
+            radar_site = self.options.sites.get(name) or site
+            assert radar_site is not None  # rows of other radars are left out
+            local[rows] = radar_site.local_positions(
+                *(batch_columns[key][rows] for key in ("range_m", "bearing_rad", "altitude_m"))
+            )
+        self.note_counts[NO_HEIGHT_NOTE] += int(np.isnan(local[:, 1]).sum())
+        columns |= {"level_elevation_rad": position_columns(local)["level_elevation_rad"]}
+        columns |= dict(zip(LOCAL_COLUMNS, local.T, strict=True))
+        return columns | self._antenna_angles(columns)
+
+    def _antenna_angles(self, columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        if self.options.antenna is None:
+            return {}
+        angles = antenna_angles(np.stack([columns[name] for name in LOCAL_COLUMNS], axis=-1), self.options.antenna)
+        self.note_counts[BEHIND_ANTENNA_NOTE] += int(np.isnan(angles["elevation_rad"]).sum())
+        return angles
+
+    def comment(self) -> list[str]:
+        """The lines before the header: the meaning of the columns."""
+        sites, antenna = dict(self.options.sites), self.options.antenna
+        if self.options.site:
+            sites[""] = self.options.site
+        track_line = "track: as in the recording"
+        if isinstance(self.reader, Asterix):
+            track_line = (
+                "track: number or address or A and the Mode 3/A code; radar: SAC/SIC; address: hexadecimal; mode_3a: "
+                f"octal; report: what saw the aircraft; marks: {' or '.join(asterix_decode.MARKS)}"
+            )
+        zero, is_dated = self.options.zero, self.zero is not None and self.zero >= MIN_DATED_S
+        if not isinstance(zero, str):
+            zero = datetime.datetime.fromtimestamp(zero, datetime.UTC).isoformat()
+        origin = {"first": "the first record", "midnight": "midnight (UTC) before the first record"}.get(zero, zero)
+        epoch = "midnight" if self.reader.of_day else "1970" if is_dated else "the start of its clock"
+        lines = [
+            f"# made by radarsim import from a recording in the format {self.result.format}",
+            f"# t_s: seconds from {origin} ({self.zero!r} s after {epoch}); {track_line}",
+            "# range_m: slant range; bearing_rad: from north to east; velocity_mps: radial and positive where the "
+            "range grows; span_mps: what a folded velocity is ambiguous by",
+        ]
+        for name, site in sites.items():
+            lat, lon, height = site.coordinates
+            position = f"{lat:.6f} deg {lon:.6f} deg {height:g} m; x_m north y_m up z_m east of it"
+            lines.append(f"# radar{f' {name}' if name else ''} (WGS 84): {position}")
+        if sites:
+            lines.append("# level_elevation_rad: above the plane that is level at the radar")
+        if antenna:
+            degrees = " ".join(f"{math.degrees(angle):g} deg" for angle in antenna)
+            lines.append(
+                f"# elevation_rad and azimuth_rad: from the normal of an antenna at azimuth and elevation {degrees}"
+            )
+        return lines
+
+    def no_rows_fault(self) -> str:
+        """The fault of a recording without any row."""
+        path, names = self.reader.path, self.options.tracks
+        if names and self.track_names:
+            ellipsis = " …" if len(self.track_names) >= MAX_LISTED else ""
+            return (
+                f"{path}: track: must be one of {', '.join(sorted(self.track_names))}{ellipsis}; got {', '.join(names)}"
+            )
+        reasons = skip_counts(self.skipped)
+        why = f"; left out: {', '.join(reasons)}" if reasons else ""
+        return f"{path}: has no plots; {self.reader.records} records were read{why}"
+
+    def faults(self) -> list[str]:
+        """Faults in the rows written, known when all are read."""
+        path, faults = self.reader.path, []
+        if len(self.radars) > 1 and self.options.site:
+            names = ", ".join(self.radars)
+            faults.append(f"at: must say where each radar stands whose plots are wanted, --at SAC/SIC=LAT,LON,HEIGHT: "
+                         f"{path} has plots of {len(self.radars)}: {names}")  # fmt: skip
+        if isinstance(self.reader, Table) and (question := self.reader.track_question(self.skipped[NOT_LATER_REASON])):
+            faults.append(question)
+        if self.truth is not None:
+            faults += self.truth.faults(sorted(self.track_names))
+        return faults
+
+    def finish(self) -> ImportResult:
+        """The result, with notes for the user."""
+        result = self.result
+        result.records = self.reader.records
+        result.skipped = skip_counts(self.skipped)
+        self.note_counts[NO_TRACK_NOTE] = result.tracks.get("", 0)
+        result.notes += [tr(note, count=count, all=result.rows) for note, count in self.note_counts.items() if count]
+        if len(self.radars) > 1:
+            counts_by_radar = ", ".join(f"{name} ({count})" for name, count in self.radars.items())
+            result.notes.append(tr("plots of several radars, SAC/SIC (rows): {each}; the tracks of all but the first "
+                                 "have its name before their number", each=counts_by_radar))  # fmt: skip
+        result.notes += self.reader.notes(self.radars)
+        if self.truth is not None:
+            result.notes += self.truth.notes()
+        result.notes += self.doppler.notes(self.options.towards)
+        return result

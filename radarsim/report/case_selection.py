@@ -1,0 +1,162 @@
+"""Which cases a figure or an answer shows, how they are grouped into panels, and remarks on the others."""
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.language.translate import plural, tr
+from radarsim.report import captions
+from radarsim.report.key_labels import (
+    config_device,
+    config_stem,
+    key_symbol,
+    plain_case_label,
+    swept_description,
+    value_with_unit,
+    without_markup,
+)
+
+MAX_CASES = 8  # cases of a panel; the others are named in its caption
+MAX_PANELS = 12
+MAX_MISSING_NAMES = 8  # names of what a figure leaves out
+MAX_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
+FEW_FILTERS = 3  # distinguished by dash, while shades distinguish the cases
+
+
+def after_swept_values(result: CaseResult, sentence: str) -> str:
+    """A sentence on a case, preceded by its swept values where there are several."""
+    where = without_markup(swept_description(result))
+    return f"{where}: {sentence}" if where else sentence
+
+
+def select_reported(results: Sequence[CaseResult], max_cases: int = 3) -> tuple[list[CaseResult], list[str]]:
+    """The cases that an answer reports: all, or the first and last of more than so many; and words on the others."""
+    if len(results) <= max_cases:
+        return list(results), []
+    remark = plural(
+        "The case in between is in the report's tables.",
+        "The {count} cases in between are in the report's tables.",
+        len(results) - 2,
+    )
+    return [results[0], results[-1]], [remark]
+
+
+def group_by_config(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
+    """Cases by config, in order: one panel each."""
+    groups: dict[str, list[CaseResult]] = {}
+    for result in results:
+        groups.setdefault(config_stem(result), []).append(result)
+    return groups
+
+
+def group_by_panel(results: Sequence[CaseResult], max_lines: float = MAX_LINES) -> dict[str, list[CaseResult]]:
+    """Group the cases that share a panel, by the panel's title.
+
+    A panel holds the cases of one config; where several keys are swept, those alike in all but the last. Cases with
+    many filters get a panel each if together they would draw more than `max_lines` lines."""
+    has_several_families = len(group_by_config(results)) > 1
+    groups: dict[tuple[str, str, str], list[CaseResult]] = {}
+    for result in results:
+        swept_text = ", ".join(
+            f"{key_symbol(result, key)} = {value_with_unit(result, key, value)}" for key, value in result.swept[:-1]
+        )
+        device_name = config_device(result) if has_several_families or not swept_text else ""
+        groups.setdefault((config_stem(result), device_name, swept_text), []).append(result)
+
+    titled: list[tuple[str, list[CaseResult]]] = []
+    for (_, *title_parts), members in groups.items():
+        line_counts = [len(result.axes.filters) for result in members]
+        if sum(line_counts) <= max_lines or max(line_counts) <= FEW_FILTERS or len(members) == 1:
+            titled.append((", ".join(filter(None, title_parts)), members))
+        else:
+            prefix = [config_device(members[0])] if has_several_families else []
+            titled += [(", ".join([*prefix, swept_description(result) or result.name]), [result]) for result in members]
+    titles_and_stems = [(title, config_stem(members[0])) for title, members in titled]
+    return with_distinct_titles(titles_and_stems, [members for _, members in titled])
+
+
+def with_distinct_titles(titles: Sequence[tuple[str, str]], values: Sequence[Any]) -> dict[str, Any]:
+    """Values by their titles; by config and title, the second of each pair first, where a title occurs twice."""
+    often = Counter(title for title, _ in titles)
+    names = [title if often[title] == 1 else ", ".join(filter(None, (config, title))) for title, config in titles]
+    return dict(zip(names, values, strict=True))
+
+
+def pick_evenly(items: Sequence[Any], max_count: int) -> list[Any]:
+    """At most so many of the items, evenly spaced from the first to the last."""
+    if len(items) <= max_count:
+        return list(items)
+    return [items[i] for i in np.linspace(0, len(items) - 1, max_count).round().astype(int)]
+
+
+def realisations_text(results: Sequence[CaseResult]) -> str:
+    """The number of realisations of a figure: "100,000 to 200,000 realisations" where its cases differ."""
+    return _of_realisations([result.count for result in results])
+
+
+def _of_realisations(counts: Sequence[int]) -> str:
+    smallest, largest = min(counts), max(counts)
+    if smallest == largest:
+        return plural("{count:,} realisation", "{count:,} realisations", largest)
+    return plural("{least:,} to {count:,} realisations", "{least:,} to {count:,} realisations", largest, least=smallest)
+
+
+def left_out_remark(all_names: Sequence[str], shown_names: Sequence[str]) -> str:
+    """Words on the omissions of a figure, after its caption: how many of how many it shows, and which are missing."""
+    missing = [name for name in all_names if name not in shown_names]
+    if not missing:
+        return ""
+    fields = {
+        "count": len(all_names) - len(missing),
+        "all": len(all_names),
+        "names": captions.join_few_names(map(without_markup, missing), MAX_MISSING_NAMES),
+    }
+    return " " + tr("Shown: {count} of {all}; only in the tables: {names}.", **fields)
+
+
+def distinct_case_names(results: Sequence[CaseResult]) -> list[str]:
+    """Distinct names of cases: by swept values, with the device where there are several."""
+    has_several_devices = len(group_by_config(results)) > 1
+    names = [
+        plain_case_label(result)
+        if has_several_devices or not result.swept
+        else without_markup(swept_description(result))
+        for result in results
+    ]
+    return names if len(set(names)) == len(names) else [result.name for result in results]
+
+
+def cases_left_out_remark(all_results: Sequence[CaseResult], shown_results: Sequence[CaseResult]) -> str:
+    """`left_out` of cases."""
+    names = dict(zip((result.name for result in all_results), distinct_case_names(all_results), strict=True))
+    return left_out_remark(list(names.values()), [names[result.name] for result in shown_results])
+
+
+def unswept_cases(results: Sequence[CaseResult]) -> list[CaseResult]:
+    """The cases without swept keys, if any; else all."""
+    return [result for result in results if not result.swept] or list(results)
+
+
+def cases_for_figure(experiment: Experiment, figure: str) -> list[str]:
+    """The cases that a config names for a figure."""
+    return [case.name for case in experiment.shown_in(figure)]
+
+
+def select_cases(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
+    """The results in a figure, of the cases named, at most eight evenly spaced; and words on the others."""
+    named_results = [result for result in results if result.name in set(names)]
+    visible = pick_evenly(named_results, MAX_CASES)
+    return visible, cases_left_out_remark(named_results, visible)
+
+
+def select_cases_by_panel(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
+    """The results of a figure with a panel for each of `by_panel`: at most twelve panels of at most eight cases. If
+    more, evenly spaced ones from the first to the last."""
+    named_results = [result for result in results if result.name in set(names)]
+    groups = pick_evenly(list(group_by_panel(named_results).values()), MAX_PANELS)
+    visible = [result for members in groups for result in pick_evenly(members, MAX_CASES)]
+    return visible, cases_left_out_remark(named_results, visible)

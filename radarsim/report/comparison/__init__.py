@@ -1,0 +1,1 @@
+"""The comparison of two runs: its table, figures and sentences."""

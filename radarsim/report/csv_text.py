@@ -1,0 +1,88 @@
+"""The bytes of tables as CSV, and tables from them."""
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.report.tables import frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+LABEL_COLUMNS = (
+    "case",
+    "filter",
+    "component",
+    "unit",
+    "baseline",
+    "model",
+    "floor_kind",
+    "note",
+)  # columns of text, whatever they hold
+
+
+def to_csv(table: "pd.DataFrame") -> bytes:
+    """A table as UTF-8 CSV: shortest numbers that read back equal, '
+
+    ' ends, an empty cell for NaN.
+
+    Several times faster than DataFrame.to_csv with the same text, and independent of pandas' version."""
+    columns = [_cells(table[name]) for name in table.columns]
+    lines = [",".join(map(_quoted, table.columns)), *map(",".join, zip(*columns, strict=True))]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def from_csv(content: bytes) -> "pd.DataFrame":
+    """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written. Raises ValueError where a
+    row has another length."""
+    names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
+    columns = zip(*rows, strict=True) if rows else ([] for _ in names)
+    return frame({name: _read(name, column) for name, column in zip(names, columns, strict=True)})
+
+
+def read_rows(rows: Sequence[Mapping[Any, Any]], names: Iterable[str]) -> "pd.DataFrame":
+    """Columns of rows of a CSV file: numbers as numbers, NaN where a cell is empty."""
+    columns = {name: [row[name] for row in rows] for name in names}
+    flags = {name for name, column in columns.items() if all(isinstance(cell, bool) for cell in column)}
+    read = {name: column if name in flags else _read(name, list(map(str, column))) for name, column in columns.items()}
+    return frame(read)
+
+
+def _read(name: str, column: Sequence[str]) -> Sequence[str] | np.ndarray:
+    """A column of text converted back: to numbers, except labels and words."""
+    if name in LABEL_COLUMNS:
+        return list(column)
+    try:
+        return np.array([float(text) if text else np.nan for text in column])
+    except ValueError:
+        return list(column)
+
+
+def _cells(column: "pd.Series") -> list[str]:
+    values = column.to_numpy()
+    if values.dtype.kind == "b":
+        return ["true" if value else "false" for value in values.tolist()]
+    if values.dtype.kind in "iu":
+        return list(map(str, values.tolist()))
+    if values.dtype.kind == "f":
+        texts = list(map(repr, values.tolist()))
+        for i in np.flatnonzero(np.isnan(values)).tolist():
+            texts[i] = ""
+        return texts
+    codes, distinct = column.factorize(use_na_sentinel=False)
+    of_code = [_text(value) for value in distinct]
+    return [of_code[code] for code in codes.tolist()]
+
+
+def _text(value: object) -> str:
+    return "" if value is None or value != value else _quoted(str(value))
+
+
+def _quoted(text: str) -> str:
+    if any(mark in text for mark in ',"\n\r'):
+        return '"' + text.replace('"', '""') + '"'
+    return text

@@ -1,0 +1,1 @@
+"""Figures: their description, and how Matplotlib draws them."""

@@ -1,0 +1,154 @@
+"""A panel's marks, drawn on Matplotlib's axes."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+
+from radarsim.language.translate import tr
+from radarsim.report.drawing import scales
+from radarsim.report.drawing.line_points import lone_points, marker_indices, marker_stride, thin_line
+from radarsim.report.drawing.model import Axis as AxisSpec
+from radarsim.report.drawing.model import Bars, Heat, Line, Mark, Note, Panel, Reference
+from radarsim.report.drawing.scales import Scale, scans_of, tick_text
+from radarsim.report.drawing.style import EXACT, SYMBOL, TOP_NOTE_PT, UPRIGHT, line_options, style_colour
+from radarsim.report.drawing.ticks import set_ticks
+from radarsim.report.wording import number
+
+MapColours = dict[str, Normalize]  # colour scales of maps, by the label of their bar
+MAX_WRITTEN_CELLS = 100  # of a map, whose values are written in
+SHARE_LIMITS = (0, 1)
+
+
+def draw_panel(axes: Axes, panel: Panel, map_colours: MapColours) -> None:
+    """Draw the marks and axes of a panel."""
+    axes.set_xscale(panel.x.scale)
+    axes.set_yscale(panel.y.scale)
+    axes.margins(x=0.02)
+    for mark in panel.marks:
+        _draw_mark(axes, mark, panel, map_colours)
+    axes.set_xlabel(panel.x.label)
+    axes.set_ylabel(panel.y.label, **(UPRIGHT if SYMBOL.fullmatch(panel.y.label) else {}))
+    has_top_notes = any(isinstance(mark, Note) and mark.place == "top" for mark in panel.marks)
+    axes.set_title(panel.title, loc="left", fontweight="bold", pad=TOP_NOTE_PT if has_top_notes else None)
+    for limits, set_limits in ((panel.x.limits, axes.set_xlim), (panel.y.limits, axes.set_ylim)):
+        if limits != (None, None):
+            set_limits(*limits)
+    if panel.equal:
+        is_limited = None not in (*panel.x.limits, *panel.y.limits)
+        axes.set_aspect("equal", adjustable="box" if is_limited else "datalim")
+    has_cells = any(isinstance(mark, Heat) for mark in panel.marks)
+    has_bars = any(isinstance(mark, Bars) for mark in panel.marks)
+    set_ticks(axes.xaxis, panel.x, has_bars or has_cells, scans_of(panel))
+    set_ticks(axes.yaxis, panel.y, has_cells)
+    if panel.y.limits == SHARE_LIMITS and panel.x.limits[1] is None:  # a share of one is drawn whole
+        for line in axes.lines:
+            line.set_clip_on(False)
+    if panel.remark:
+        axes.set_title(panel.remark, loc="right", fontsize=7)
+
+
+def _draw_mark(axes: Axes, mark: Mark, panel: Panel, map_colours: MapColours) -> None:
+    match mark:
+        case Line():
+            _draw_line(axes, mark, panel.crosses)
+        case Reference():
+            _draw_reference(axes, mark, panel.x)
+        case Bars():
+            _draw_bars(axes, mark)
+        case Heat():
+            _draw_map(axes, mark, map_colours)
+        case Note():
+            _draw_note(axes, mark)
+
+
+def _draw_line(axes: Axes, line: Line, crosses: str) -> None:
+    line = thin_line(line)
+    if axes.get_yscale() == "log":  # which has no zero
+        positive = np.where(np.asarray(line.y) > 0, 1.0, np.nan)
+        lo, hi = (None if end is None else end * positive for end in (line.lo, line.hi))
+        line = replace(line, y=line.y * positive, lo=lo, hi=hi)
+    colour, lone = style_colour(line.style), lone_points(line)
+    label = line.label or line.name or None
+    axes.plot(line.x, line.y, markevery=marker_indices(line), zorder=3, label=label, **line_options(line.style))
+    if line.lo is not None and line.hi is not None:
+        if line.style.dash is None:
+            axes.vlines(line.x, line.lo, line.hi, color=colour, linewidth=0.8, zorder=2.8)
+        else:
+            axes.fill_between(line.x, line.lo, line.hi, color=colour, alpha=0.25, linewidth=0, zorder=2)
+            axes.vlines(line.x[lone], line.lo[lone], line.hi[lone], color=colour, linewidth=0.8)
+    if line.exact is not None:
+        stride = marker_stride(line)
+        first = 0 if stride == 1 else stride // 2  # markers and crosses alternate
+        label = crosses or tr("exact")
+        axes.plot(line.x[first::stride], line.exact[first::stride], zorder=4, label=label, **EXACT)
+
+
+REFERENCE_SHARE = 0.2  # of an axis of x: the words of a reference line nearer to its left end stand right of it
+
+
+def _draw_reference(axes: Axes, mark: Reference, x: AxisSpec) -> None:
+    options: dict[str, Any] = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (2, 2)), "zorder": 1.5}
+    text: dict[str, Any] = {"s": f" {mark.label} ", "ha": "right", "va": "bottom", "color": "#555555"}
+    if mark.across == "y":
+        axes.axhline(mark.value, **options)
+        axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **text)
+    else:
+        axes.axvline(mark.value, **options)
+        low, high = x.limits
+        if low is not None and high is not None:
+            share = Scale(x.scale == "log", low, high, 0.0, 1.0).position(mark.value)
+            text["ha"] = "left" if share < REFERENCE_SHARE else "right"  # else its words would lie upon the axis
+        axes.text(mark.value, 0.02, transform=axes.get_xaxis_transform(), **text)
+
+
+def _draw_bars(axes: Axes, bars: Bars) -> None:
+    positions = np.arange(len(bars.names))
+    axes.bar(positions, bars.values, color=style_colour(bars.style), alpha=0.75, width=0.65, zorder=2)
+    if bars.lo is not None and bars.hi is not None:
+        axes.vlines(positions, bars.lo, bars.hi, color="black", linewidth=0.9, zorder=3)
+    axes.set_xticks(positions, bars.names)
+    axes.grid(False, axis="x")
+
+
+def common_map_colours(panels: Sequence[Panel]) -> MapColours:
+    """The colours of maps: one scale for all maps of a figure whose bars have the same label."""
+    return {
+        label: LogNorm(scale.low, scale.high) if scale.log else Normalize(scale.low, scale.high)
+        for label, scale in scales.heat_scales(panels).items()
+    }
+
+
+def _draw_map(axes: Axes, heat: Heat, map_colours: MapColours) -> None:
+    norm = map_colours[heat.label]
+    centres = np.arange(len(heat.x)), np.arange(len(heat.y))
+    mesh = axes.pcolormesh(*centres, heat.values, cmap="viridis", norm=norm, shading="nearest")
+    axes.set_xticks(centres[0], [tick_text(float(v)) for v in heat.x])
+    axes.set_yticks(centres[1], [tick_text(float(v)) for v in heat.y])
+    axes.grid(False)
+    bar = axes.figure.colorbar(mesh, ax=axes, label=heat.label)
+    set_ticks(bar.ax.yaxis, AxisSpec("", "log" if isinstance(norm, LogNorm) else "linear"), False)
+    if heat.values.size <= MAX_WRITTEN_CELLS:
+        for (i, j), value in np.ndenumerate(heat.values):
+            if np.isfinite(value):
+                ink = "white" if norm(value) < 0.5 else "black"
+                axes.text(j, i, number(float(value), 3), ha="center", va="center", color=ink, fontsize=7)
+
+
+def _draw_note(axes: Axes, note: Note) -> None:
+    if note.place == "top":
+        grey: dict[str, Any] = {"color": "#555555", "fontsize": 7, "ha": "center", "va": "bottom"}
+        axes.annotate(note.text, (note.x, 1.0), (0, 1.5), axes.get_xaxis_transform(), "offset points", **grey)
+        return
+    if note.place == "on":
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
+        axes.text(note.x, note.y, note.text, ha="center", va="center", fontsize=7, zorder=3.5, bbox=box)
+        return
+    up, right, level = "n" in note.place, "e" in note.place, note.place == "e"
+    options: dict[str, Any] = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": 7}
+    options |= {"va": "center", "annotation_clip": False} if level else {}
+    shift = (3 if right else -3, 0 if level else 3 if up else -3)
+    axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", **options)

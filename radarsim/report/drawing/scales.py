@@ -1,0 +1,134 @@
+"""Scales of axes and of map colours, and round values for their ticks."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from radarsim.language.numerals import power_of_ten
+from radarsim.report.drawing.model import Heat, Line, Panel
+from radarsim.report.wording import number
+
+STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)  # between ticks, times a power of ten
+TICK_DIGITS = 6
+WIDE_RATIO = 20.0  # of the values of a map, from which its colours are logarithmic
+MIN_SCANS = 5  # from which ticks stand at scans
+MIN_LAST_GAP = 0.5  # between the last two ticks at scans, in intervals
+MAX_EXTRA_TICKS = 3  # more than asked for, on a logarithmic axis
+MAX_DECADES = 7  # labelled on a logarithmic axis
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A linear or logarithmic axis from `low` to `high`, over the positions `start` to `end`."""
+
+    log: bool
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def position(self, values: ArrayLike) -> np.ndarray:
+        """Positions of values; not-a-number for a value that the axis cannot show."""
+        v = np.asarray(values, dtype=float)
+        low, high = self.low, self.high
+        if self.log:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                v = np.log10(np.where(v > 0, v, np.nan))
+            low, high = math.log10(low), math.log10(high)
+        return self.start + (self.end - self.start) * (v - low) / (high - low)
+
+    def ticks(self, count: int) -> list[tuple[float, str]]:
+        """About `count` round values on the axis, with their text."""
+        if self.log and self.high / self.low >= 10:
+            return decades(self.low, self.high, count)
+        return [(v, tick_text(v)) for v in steps(self.low, self.high, count)]
+
+
+def steps(low: float, high: float, count: int) -> list[float]:
+    """Multiples of a round step between low and high, about `count` of them."""
+    rough = (high - low) / max(count, 1)
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(s for s in STEPS if s * power >= rough * (1 - 1e-9)) * power
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [n * step for n in range(first, last + 1)]
+
+
+def decades(low: float, high: float, count: int) -> list[tuple[float, str]]:
+    """Powers of ten, and 2 and 5 times these if that gives not many more than `count`."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    stride = max(1, -(-(last - first + 1) // MAX_DECADES))
+    exponents = range(first, last + 1, stride)
+    ticks = list(zip((10.0**n for n in exponents), powers(exponents), strict=True))
+    multiples = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
+    if stride > 1 or len(ticks) + len(multiples) > count + MAX_EXTRA_TICKS:
+        return ticks
+    return sorted([*ticks, *((v, tick_text(v)) for v in multiples)])
+
+
+def powers(exponents: Sequence[int]) -> list[str]:
+    """Text of powers of ten: all written out where each is short, else all raised except 1 and 10."""
+    short = all(-4 <= n <= 4 for n in exponents)
+    return [tick_text(10.0**n) if short or n in (0, 1) else power_of_ten(n) for n in exponents]
+
+
+def tick_text(value: float) -> str:
+    """The number of a tick: at most six digits, a true minus, powers of ten raised."""
+    return number(value, TICK_DIGITS)
+
+
+class Scans(NamedTuple):
+    """Even values from zero to the last."""
+
+    step: float
+    last: float
+
+
+def scans_of(panel: Panel) -> Scans | None:
+    """Step and last value of the even grid from zero on which the points of all lines lie; None where there is none."""
+    columns = [np.asarray(mark.x, float) for mark in panel.marks if isinstance(mark, Line)]
+    x = np.unique(np.concatenate(columns or [np.zeros(0)]))
+    if panel.x.scale == "log" or len(x) < MIN_SCANS or x[0] < 0:
+        return None
+    step = float(x[-1] / np.round(x[-1] / np.diff(x).min()))
+    even = np.abs(x / step - np.round(x / step)).max() < 1e-6 and x[0] <= MIN_SCANS * step
+    is_short = abs(float(f"{step:.3g}") - step) < 1e-9 * step  # few digits write it
+    return Scans(step, float(x[-1])) if even and is_short else None
+
+
+def scan_ticks(scans: Scans, intervals: int) -> list[tuple[float, str]]:
+    """Ticks from zero at every few scans, and at the last scan, in about so many intervals.
+
+    There may be one interval more, or down to half as many, if all intervals are then equally long."""
+    count = round(scans.last / scans.step)
+    strides = [m * 10**p for p in range(9) for m in (1, 2, 3, 4, 5)]
+    divisors = [n for n in strides if count % n == 0 and intervals / 2 <= count / n <= intervals + 1]
+    stride = (divisors or [n for n in strides if count / n <= intervals])[0]
+    numbers = list(range(0, count + 1, stride))
+    if last_gap := count - numbers[-1]:
+        numbers = [*(numbers[:-1] if last_gap < MIN_LAST_GAP * stride and len(numbers) > 1 else numbers), count]
+    return [(n * scans.last / count, tick_text(n * scans.last / count)) for n in numbers]
+
+
+class HeatScale(NamedTuple):
+    """Least and largest value of the maps that share their colours, and whether the colours are logarithmic."""
+
+    low: float
+    high: float
+    log: bool
+
+
+def heat_scales(panels: Sequence[Panel]) -> dict[str, HeatScale]:
+    """The colour scales of maps by the label of their bar; maps of a figure with the same label share a scale."""
+    maps = [mark for panel in panels for mark in panel.marks if isinstance(mark, Heat)]
+    return {label: _heat_scale([m.values for m in maps if m.label == label]) for label in {m.label: None for m in maps}}
+
+
+def _heat_scale(maps: Sequence[np.ndarray]) -> HeatScale:
+    values = np.concatenate([np.zeros(0), *map(np.ravel, maps)])
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
+    return HeatScale(low, high, bool(low > 0 and high > WIDE_RATIO * low))

@@ -1,0 +1,19 @@
+"""Which tables are behind a figure, for the links of a page."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+TABLES_BY_KIND = {"sigma": ("curves",), "sweep": ("curves",), "dynamic": ("curves",), "gain": ("gains",)}
+
+
+def tables_behind_figure(
+    figure_name: str, declared: Mapping[str, Sequence[str]], table_names: Collection[str]
+) -> tuple[str, ...]:
+    """The tables behind a figure, of those that exist: as its study declares, by its own name, by its kind."""
+    prefixes = sorted((name for name in declared if figure_name.startswith(name)), key=len)
+    if prefixes and figure_name not in table_names:
+        names: Sequence[str] = declared[prefixes[-1]]
+    elif figure_name in table_names:
+        names = declared.get(figure_name, (figure_name,))
+    else:
+        names = TABLES_BY_KIND.get(figure_name.partition("_")[0], ())
+    return tuple(name for name in names if name in table_names)

@@ -1,0 +1,171 @@
+"""What a result records of its origin: run.json, versions, files of an earlier run.
+
+run.json holds the request, the software, and the outcome. Times are there and in the report, never in a CSV."""
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from radarsim.config.experiment import Experiment
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import plural, tr
+from radarsim.report.atomic_files import read
+
+if TYPE_CHECKING:
+    from radarsim.engine.results import CaseResult
+
+
+MAX_SHOWN_SEEDS = 5  # named in a line
+PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml")
+
+
+def record(
+    experiment: Experiment,
+    results: "Sequence[CaseResult]",
+    run: Mapping[str, Any],
+    contents: Mapping[str, bytes],
+    answer: Sequence[str],
+    machine: Mapping[str, object],
+) -> dict[str, Any]:
+    """All of run.json except the report's own hash.
+
+    run: the facts of the run (stop reason, threads, times, warnings, identities …), copied; contents: the outputs, by
+    path; machine: its description. Realisations requested and done are sums over the cases, which may differ in both.
+    """
+    facts = dict(run)
+    stop = facts.pop("stop", "done")
+    done = {result.name: result.count for result in results}
+    return {
+        "config": experiment.stem,
+        "config_path": path_of(experiment),
+        "study": experiment.study,
+        "answer": list(answer),
+        "realisations_asked": sum(case.realisations for case in experiment.cases),
+        "realisations_done": sum(done.get(case.name, 0) for case in experiment.cases),
+        "cases": {
+            case.name: {"asked": case.realisations, "done": done.get(case.name, 0), "seed": case.seed}
+            for case in experiment.cases
+        },
+        "stop": stop,
+        "seed": experiment.seed,
+        "resolved": experiment.resolved,
+        "resolved_sha256": resolved_sha256(experiment),
+        **facts,
+        "versions": versions(),
+        "machine": dict(machine),
+        "outputs": {path: hashlib.sha256(data).hexdigest() for path, data in sorted(contents.items())},
+    }
+
+
+def resolved_sha256(experiment: Experiment) -> str:
+    """SHA-256 of a resolved config in hexadecimal."""
+    return hashlib.sha256(to_json(experiment.resolved)).hexdigest()
+
+
+def with_output(record: dict, path: str, data: bytes) -> dict:
+    """The record with one more output."""
+    return {**record, "outputs": {**record["outputs"], path: hashlib.sha256(data).hexdigest()}}
+
+
+def earlier_record(folder: Path, name: str = "run.json") -> dict:
+    """The record of an earlier run in a folder; empty where none can be read."""
+    try:
+        record = json.loads(read(folder / name))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return record if isinstance(record, dict) else {}
+
+
+def outputs(folder: Path, name: str = "run.json") -> list[str]:
+    """The outputs that an earlier record of the folder names; none where there is no such record."""
+    earlier_outputs = earlier_record(folder, name).get("outputs")
+    return [path for path in earlier_outputs if isinstance(path, str)] if isinstance(earlier_outputs, dict) else []
+
+
+def replacement_warnings(folder: Path, experiment: Experiment) -> list[str]:
+    """A warning where a folder holds the results of another config of the same name."""
+    record = earlier_record(folder)
+    earlier_path, config_path = record.get("config_path"), path_of(experiment)
+    if not isinstance(earlier_path, str) or earlier_path == config_path or holds_results_of(folder, experiment):
+        return []
+    return [f"{folder}: held the results of another config of this name, {earlier_path}; they are replaced"]
+
+
+def holds_results_of(folder: Path, experiment: Experiment) -> bool:
+    """Whether a folder holds the results of an experiment, with any seed and number of realisations."""
+    return _comparable(earlier_record(folder).get("resolved")) == _comparable(experiment.resolved)
+
+
+def path_of(experiment: Experiment) -> str:
+    """The file of a config, as printable text."""
+    if experiment.path is None:
+        return "a mapping in Python"
+    return os.fsencode(os.path.abspath(experiment.path)).decode("utf-8", "backslashreplace")
+
+
+def _comparable(resolved: Any) -> object:
+    """A resolved config without its number of realisations and seed."""
+    try:
+        cases = [{key: case[key] for key in case if key not in ("realisations", "seed")} for case in resolved["cases"]]
+    except (LookupError, TypeError):
+        return None
+    return json.loads(to_json(cases))
+
+
+def extent(record: Mapping) -> str:
+    """Realisations of a case and the seeds in words; the requested number only where a case is short of it."""
+    cases = record["cases"].values()
+    done, requested, seeds = (sorted({case[key] for case in cases}) for key in ("done", "asked", "seed"))
+    max_done, counts = max(done, default=0), {"done": span(done), "asked": span(requested)}
+    short = any(case["done"] < case["asked"] for case in cases)
+    if len(cases) > 1 and short:
+        count_text = plural(
+            "{done} realisation a case of {asked} requested",
+            "{done} realisations a case of {asked} requested",
+            max_done,
+            **counts,
+        )
+    elif len(cases) > 1:
+        count_text = plural("{done} realisation a case", "{done} realisations a case", max_done, **counts)
+    elif short:
+        count_text = plural(
+            "{done} realisation of {asked} requested", "{done} realisations of {asked} requested", max_done, **counts
+        )
+    else:
+        count_text = plural("{done} realisation", "{done} realisations", max_done, **counts)
+    seed_names = ", ".join(map(str, seeds[:MAX_SHOWN_SEEDS])) + (", …" if len(seeds) > MAX_SHOWN_SEEDS else "")
+    return plural("{words}, seed {seeds}", "{words}, seeds {seeds}", len(seeds), words=count_text, seeds=seed_names)
+
+
+def span(counts: Sequence[int]) -> str:
+    """Counts in words: a single one, or the least to the largest."""
+    low, high = min(counts, default=0), max(counts, default=0)
+    return numeral(f"{low:,}") if low == high else tr("{low:,} to {high:,}", low=low, high=high)
+
+
+def realisations_text(counts: Sequence[int]) -> str:
+    """The span of numbers of realisations, with the noun."""
+    return plural("{done} realisation", "{done} realisations", max(counts, default=0), done=span(counts))
+
+
+def to_json(value: object) -> bytes:
+    """JSON as written to files: readable, keys in their order, without NaN."""
+    return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+@cache  # a tenth of a small run's time, asked for several times
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that affect numbers or figures."""
+    version_numbers = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            version_numbers[name] = version(name)
+        except PackageNotFoundError:
+            version_numbers[name] = "not installed"
+    return version_numbers

@@ -1,0 +1,232 @@
+"""Figures of σ, gain, bias and spread against time, of every study."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.language.translate import term, tr
+from radarsim.report import captions
+from radarsim.report import tables as common
+from radarsim.report.case_selection import (
+    MAX_PANELS,
+    cases_for_figure,
+    group_by_panel,
+    left_out_remark,
+    pick_evenly,
+    realisations_text,
+    select_cases_by_panel,
+)
+from radarsim.report.drawing.model import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.figure_lines import GAIN, SIGMA, all_filters, case_lines, line_from_rows
+from radarsim.report.key_labels import (
+    case_label,
+    config_device,
+    escape_dollars,
+    label_with_unit,
+    sigma_axis_label,
+    swept_description,
+)
+from radarsim.report.panel_layout import (
+    MAX_LINES_NAMED_AT_ENDS,
+    WIDE_MM,
+    arrange_columns,
+    fitting_axis,
+    time_axis,
+    with_keys,
+)
+from radarsim.report.quantities import Component
+from radarsim.report.statistics import Z95
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+CUT_LOSS_PERCENT = 100.0  # per cent at which much lower gains are cut
+LONGEST_INSIDE = 28  # letters of a name in a legend inside a panel of many lines
+
+
+def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: Component) -> Figure:
+    """σ(t) of one component: a panel for each config, a line for each filter and swept value.
+
+    curves is tables.groups(table, "case", "filter", "component")."""
+    groups = group_by_panel(results)
+    filters = all_filters(results)
+    panels = [_sigma_panel(title, members, curves, component, filters) for title, members in groups.items()]
+    panels = [panel for panel in panels if panel.marks]
+    caption = tr(
+        "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
+        "Bands: 95 % intervals; a band that is not visible is narrower than the line.",
+        quantity=component.words,
+        realisations=realisations_text(results),
+    )
+    title = tr("σ of the {quantity}", quantity=component.words)
+    figure = arrange_columns(Figure(name, title, caption, tuple(panels)))
+    return figure
+
+
+def with_floor(figure: Figure, curves: "pd.DataFrame", component: str, factor: float = 1.0) -> Figure:
+    """A figure of σ of one case, of few lines, with its floor. Of filters that have other plots it is that of those
+    with the most."""
+    rows = curves[curves["component"].eq(component) & curves["floor"].notna()] if "floor" in curves else curves[:0]
+    if not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MAX_LINES_NAMED_AT_ENDS:
+        return figure
+    lowest = factor * rows.groupby("t_s", sort=True)["floor"].min()
+    (panel,) = figure.panels
+    line = Line(lowest.index.to_numpy(), lowest.to_numpy(), tr("floor"), GUIDE)
+    panel = replace(panel, marks=(*panel.marks, line))
+    posterior = rows["floor_kind"].str.startswith("posterior").all()
+    remark = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
+    return replace(figure, panels=(panel,), caption=f"{figure.caption} {remark}")
+
+
+UNDER_UNBIASED = term("Grey: the floor, a Cramér-Rao bound of unbiased estimators.")
+GUIDE = Style(GREY, 0, width_pt=0.8)
+
+
+def _sigma_panel(
+    title: str, members: Sequence[CaseResult], curves: Mapping, component: Component, filters: Sequence[str]
+) -> Panel:
+    marks = case_lines(members, curves, component.name, SIGMA, filters)
+    y = fitting_axis(sigma_axis_label(component.symbol, component.unit), marks)
+    return with_keys(Panel(time_axis(), y, tuple(marks), title), members, filters)
+
+
+def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: Component) -> Figure:
+    """Relative gain of one component against time, a line for each case and filter.
+
+    One panel where no config is swept; else one for each of `by_panel`. gains is tables.groups(table, "case", "filter",
+    "component")."""
+    caption = tr(
+        "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
+        "Bands: 95 % intervals. Below zero: a loss.",
+        quantity=component.words,
+        base=results[0].axes.filters[results[0].axes.baseline],
+        realisations=realisations_text(results),
+    )
+    y = Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=component.symbol))
+    title = tr("Gain in σ of the {quantity}", quantity=component.words)
+    has_several_gains = any(len(result.axes.filters) > 2 for result in results)
+    if any(result.swept for result in results) or (has_several_gains and len(results) > 1):
+        panels, filters = [], all_filters(results)
+        for panel_title, members in group_by_panel(results).items():
+            if lines := case_lines(members, gains, component.name, GAIN, filters):
+                panel = Panel(time_axis(), *_cut(y, lines), panel_title)
+                panels.append(with_keys(panel, members, filters, baseline=False))
+        return _with_remark_on_losses(arrange_columns(Figure(name, title, caption, tuple(panels))))
+    marks = _gain_lines(results, gains, component, has_several_gains)
+    # Many long names would cover the lines: the legend is beside the panel.
+    has_long_names = any(isinstance(mark, Line) and len(mark.label) > LONGEST_INSIDE for mark in marks)
+    is_beside = len(marks) > 3 and has_long_names
+    panel = Panel(time_axis(), *_cut(y, marks), direct=not is_beside, legend="right" if is_beside else "best")
+    width = PAGE_MM if is_beside else COLUMN_MM if len(results) < 3 else WIDE_MM
+    return _with_remark_on_losses(Figure(name, title, caption, (panel,), width_mm=width))
+
+
+def _gain_lines(
+    results: Sequence[CaseResult], gains: Mapping, component: Component, has_several_gains: bool
+) -> list[Mark]:
+    """The lines of a single panel of gains, named by case and filter as far as these differ."""
+    marks: list[Mark] = []
+    for i, result in enumerate(results):
+        for n, filter_name in enumerate(result.axes.filters):
+            rows = gains.get((result.name, filter_name, component.name))
+            if rows is not None:
+                case = case_label(result) if len(results) > 1 else ""
+                own_name = escape_dollars(filter_name) if has_several_gains or len(results) == 1 else ""
+                text = ", ".join(filter(None, (case, own_name)))
+                look_number = n if has_several_gains else i
+                style = Style(i if len(results) > 1 else n, look_number, look_number)
+                marks.append(line_from_rows(rows, GAIN, text, style, text))
+    return marks
+
+
+def _with_remark_on_losses(figure: Figure) -> Figure:
+    """A figure of gains, with a remark in its caption where losses are cut."""
+    if not any(panel.y.limits[0] == -CUT_LOSS_PERCENT for panel in figure.panels):
+        return figure
+    names = captions.lines_below(figure, -CUT_LOSS_PERCENT)
+    remark = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=CUT_LOSS_PERCENT, names=names)
+    return replace(figure, caption=f"{figure.caption} {remark}")
+
+
+def _cut(y: Axis, lines: Sequence[Mark]) -> tuple[Axis, tuple[Mark, ...]]:
+    """The axis of gains and its marks: losses far beyond 100 % would hide everything else, and are cut."""
+    values = [mark.y[np.isfinite(mark.y)] for mark in lines if isinstance(mark, Line)]
+    lowest = min((float(column.min()) for column in values if column.size), default=0.0)
+    return replace(y, limits=(-CUT_LOSS_PERCENT, 100.0)) if lowest < -2 * CUT_LOSS_PERCENT else y, (
+        Reference(0),
+        *lines,
+    )
+
+
+def component_figures(
+    results: Sequence[CaseResult],
+    tables: "Mapping[str, pd.DataFrame]",
+    components: Iterable[Component],
+    experiment: Experiment,
+) -> dict[str, Figure]:
+    """gain_<component> and sigma_<component> of every component; each with the cases that the config names for it."""
+    curves, gains = (common.group_by(tables[name], "case", "filter", "component") for name in ("curves", "gains"))
+    figures = {}
+    for component in components:
+        for kind, draw, rows in (
+            ("gain", gain_figure, gains),
+            ("sigma", sigma_figure, curves),
+            ("dynamic", dynamic_figure, curves),
+        ):
+            name = f"{kind}_{component.name}"
+            visible, remark = select_cases_by_panel(results, cases_for_figure(experiment, name))
+            figure = draw(name, visible, rows, component) if visible else None
+            if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
+                if kind == "sigma" and len(results) == 1:
+                    figure = with_floor(figure, tables["curves"], component.name)
+                figures[name] = replace(figure, caption=figure.caption + remark)
+    return figures
+
+
+def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: Component) -> Figure | None:
+    """Dynamic error (bias) and fluctuation error (spread) of one component, a panel for each case that has both. None
+    where no case's bias exceeds its spread anywhere: then σ suffices."""
+    panels: list[Panel] = []
+    for result in results:
+        filter_rows = [
+            (f, curves[(result.name, f, component.name)])
+            for f in result.axes.filters
+            if (result.name, f, component.name) in curves
+        ]
+        if any((abs(rows["bias"]) > rows["spread"]).any() for _, rows in filter_rows):
+            panel = _dynamic_panel(result, filter_rows, component)
+            panels.append(replace(panel, keys=()) if panels else panel)
+    if not panels:
+        return None
+    caption = tr(
+        "Errors of the {quantity} in cases with a mean error above the spread at some time: mean error "
+        "(dynamic, bias) and standard deviation (fluctuation, spread) of {realisations}; σ² is the sum "
+        "of their squares.",
+        quantity=component.words,
+        realisations=realisations_text(results),
+    )
+    titles = [panel.title for panel in panels]
+    caption += left_out_remark(titles, pick_evenly(titles, MAX_PANELS))
+    title = tr("Dynamic and fluctuation error of the {quantity}", quantity=component.words)
+    figure = arrange_columns(Figure(name, title, caption, tuple(pick_evenly(panels, MAX_PANELS))))
+    return figure
+
+
+def _dynamic_panel(result: CaseResult, filter_rows: Sequence[tuple], component: Component) -> Panel:
+    marks: list[Mark] = [Reference(0)]
+    for n, (f, rows) in enumerate(filter_rows):
+        t = rows["t_s"].to_numpy()
+        bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
+        name = escape_dollars(f)
+        marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=tr("{name}: bias", name=name)))
+        marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=tr("{name}: spread", name=name)))
+    keys = [(escape_dollars(f), Style(n, None, n)) for n, (f, _) in enumerate(filter_rows)]
+    keys += [(tr("bias"), Style(0, 0)), (tr("spread"), Style(0, 1))]
+    title = swept_description(result) or config_device(result)
+    y = Axis(label_with_unit(tr("error of {symbol}", symbol=component.symbol), component.unit))
+    return Panel(time_axis(), y, tuple(marks), title, tuple(keys))

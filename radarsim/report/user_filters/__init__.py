@@ -1,0 +1,1 @@
+"""Tables, figures and sentences of user filters beside those of a config."""

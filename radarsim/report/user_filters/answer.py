@@ -1,0 +1,266 @@
+"""Question and answer of an experiment with user filters: how each compares with the config's filters."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import join_names, shorten_names, term, tr
+from radarsim.report import key_labels, sentences, wording
+from radarsim.report import tables as common
+from radarsim.report.sentences import Sentence
+from radarsim.report.user_filters.tables import IMPROPER, REASONS, TablesByName, user_filter_cases
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
+GAIN = ("gain_percent", "gain_lo", "gain_hi")
+SIGMA = ("sigma", "sigma_lo", "sigma_hi")
+UNBIASED = term("the Cramér-Rao bound of unbiased estimators")
+ANY = term("the posterior Cramér-Rao bound")
+
+
+def question(experiment: Experiment) -> str:
+    """What an experiment with user filters asks; empty where it has none."""
+    filters = list(dict.fromkeys(member.name for case in experiment.cases for member in case.outside))
+    if len(filters) > 1:
+        return tr("Are {names} better than the filters of the config?", names=shorten_names(filters))
+    return tr("Is {name} better than the filters of the config?", name=filters[0]) if filters else ""
+
+
+def answer(results: Sequence[CaseResult], tables_by_name: TablesByName) -> list[Sentence]:
+    """How every user filter compares with the config's filters, case by case."""
+    return [
+        sentence
+        for result in results
+        for case in user_filter_cases(result)
+        for name in case.axes.filters
+        for sentence in _filter_sentences(result, name, f"{result.name}: " if len(results) > 1 else "", tables_by_name)
+    ]
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """The rows by which a user filter is compared with the config's filters: of one component at one scan."""
+
+    name: str
+    unit: str
+    gains: "pd.DataFrame"  # against every other filter
+    sigma: "pd.Series[Any]"  # of `curves`: the user filter's
+    best_sigma: "pd.Series[Any]"  # of `curves`: that of the config's best filter
+    rivals: Mapping[str, float]  # the config's best filter, then its best tuned one, if any; their σ, exact first
+
+    @property
+    def best(self) -> str:
+        return next(iter(self.rivals))
+
+    def gain_against(self, baseline: str) -> "pd.Series[Any]":
+        return self.gains[self.gains["baseline"] == baseline].iloc[0]
+
+
+def _filter_sentences(result: CaseResult, name: str, prefix: str, tables_by_name: TablesByName) -> list[Sentence]:
+    """Whether a user filter is better than the config's best, how often it fails, then all gains at that scan."""
+    gains = common.select_rows(tables_by_name["gains"], case=result.name, filter=name)
+    failing = _failing_clause(common.select_rows(tables_by_name["failures"], case=result.name, filter=name), name)
+    if not len(gains):
+        no_estimate = tr("{name} has no estimate that could be compared", name=name)
+        return [clause.with_text(f"{prefix}{clause.text}.") for clause in failing or [Sentence(no_estimate)]]
+
+    comparison = _compare(result, name, gains, tables_by_name)
+    verdict = _verdict_sentence(comparison)
+    if failing:
+        text = tr("{failing}, and in the others ", failing=failing[0].text)
+        verdict = sentences.compose(text + verdict.text, [*failing, verdict])
+    return [
+        verdict.with_text(prefix + verdict.text),
+        *_floor_sentence(comparison),
+        *_further_gains(comparison),
+        *_extreme_gains(gains, comparison),
+        *_nees_sentences(result, name, tables_by_name),
+    ]
+
+
+def _failing_clause(failures: "pd.DataFrame", name: str) -> list[Sentence]:
+    """How often a user filter fails, and why; none where it never does."""
+    total, *by_reason = (row for _, row in failures.iterrows())
+    if not total["failed"]:
+        return []
+    share = wording.share(*(100 * total[key] for key in ("share", "share_lo", "share_hi")))
+    reasons = [
+        f"{tr(REASONS[row['reason']])} {row['failed']:,}"
+        for row in by_reason
+        if row["failed"] and row["reason"] in REASONS
+    ]
+    text = tr(
+        "{name} fails in {share} of the realisations ({reasons})", name=name, share=share, reasons=join_names(reasons)
+    )
+    return [Sentence(text, sentences.intervals("failures", "share", total))]
+
+
+def _compare(result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_name: TablesByName) -> _Comparison:
+    """The rows of the component and scan that the answer is about: those asked for, else the first and the last."""
+    components = [component for component in result.axes.components if component[0] in set(gains["component"])]
+    requested, t_s = user_filter_cases(result)[0].axes.judged_at or (components[0][0], np.inf)
+    component, unit = next((c for c in components if c[0] == requested), components[0])
+    gains = gains[gains["component"] == component]
+    distance_s = (gains["t_s"] - min(t_s, gains["t_s"].max())).abs()
+    gains = gains[gains["k"] == gains["k"][distance_s.idxmin()]]
+    curves = common.select_rows(tables_by_name["curves"], case=result.name, component=component, k=gains["k"].iloc[0])
+    sigma = dict(zip(curves["filter"], common.exact_first(curves, "sigma", "exact_sigma"), strict=True))
+    baselines = [baseline for baseline in gains["baseline"] if baseline in result.axes.filters]
+    tuned = [baseline for baseline in baselines if baseline.endswith(TUNED)]
+    best = min((baseline for baseline in baselines if baseline not in tuned), key=lambda baseline: sigma[baseline])
+    rivals = [best, *sorted(tuned, key=lambda baseline: sigma[baseline])[:1]]
+    rows = {row["filter"]: row for _, row in curves.iterrows()}
+    unit = key_labels.unit_label(unit)
+    return _Comparison(name, unit, gains, rows[name], rows[best], {rival: sigma[rival] for rival in rivals})
+
+
+def _verdict_sentence(comparison: _Comparison) -> Sentence:
+    """Whether a filter is better than the config's best one, and than its best tuned one; its σ, and theirs."""
+    best, *tuned = comparison.rivals
+    clauses = [_against_best(comparison, best), *(_against_tuned(comparison, rival) for rival in tuned)]
+    sigma = wording.estimate((comparison.sigma[key] for key in SIGMA), comparison.unit)
+    text = tr("its σ is {sigma}, {floor}.", sigma=sigma, floor=_best_sigma(comparison))
+    intervals = sentences.intervals("curves", "sigma", comparison.sigma)
+    if np.isnan(comparison.best_sigma["exact_sigma"]):
+        intervals += sentences.intervals("curves", "sigma", comparison.best_sigma)
+    verdict = sentences.join("", clauses)
+    return sentences.compose(f"{verdict.text}; {text}", [verdict, Sentence(text, intervals)])
+
+
+def _against_best(comparison: _Comparison, best: str) -> Sentence:
+    row = comparison.gain_against(best)
+    fields = {
+        "name": comparison.name,
+        "best": best,
+        "component": row["component"],
+        "t": numeral(f"{row['t_s']:g}"),
+        "gain": _gain(row),
+    }
+    if row["gain_lo"] > 0:
+        text = tr("{name} is better than {best}, the config's best in {component} at {t} s: gain {gain}", **fields)
+    elif row["gain_hi"] < 0:
+        text = tr("{name} is worse than {best}, the config's best in {component} at {t} s: gain {gain}", **fields)
+    else:
+        text = tr(
+            "{name} cannot be distinguished from {best}, the config's best in {component} at {t} s: gain {gain}",
+            **fields,
+        )
+    return Sentence(text, sentences.intervals("gains", "gain", row))
+
+
+def _against_tuned(comparison: _Comparison, rival: str) -> Sentence:
+    row = comparison.gain_against(rival)
+    fields = {"best": rival, "gain": _gain(row)}
+    if row["gain_lo"] > 0:
+        text = tr(", and better than {best}: gain {gain}", **fields)
+    elif row["gain_hi"] < 0:
+        text = tr(", and worse than {best}: gain {gain}", **fields)
+    else:
+        text = tr(", and cannot be distinguished from {best}: gain {gain}", **fields)
+    sigma = f"{wording.number(comparison.rivals[rival])} {comparison.unit}".rstrip()
+    return Sentence(text + tr(", whose σ is {sigma}", sigma=sigma), sentences.intervals("gains", "gain", row))
+
+
+def _best_sigma(comparison: _Comparison) -> str:
+    """σ of the config's best filter, exact where it is known exactly."""
+    row, unit = comparison.best_sigma, comparison.unit
+    if np.isnan(row["exact_sigma"]):
+        sigma = wording.estimate((row[key] for key in SIGMA), unit)
+        return tr("that of {best} {sigma}", best=comparison.best, sigma=sigma)
+    return tr(
+        "that of {best} {sigma} {unit} exactly",
+        best=comparison.best,
+        sigma=wording.number(row["exact_sigma"]),
+        unit=unit,
+    )
+
+
+def _floor_sentence(comparison: _Comparison) -> list[Sentence]:
+    """How far the user filter, the config's best one, and the best tuned one are above the floor; none without one."""
+    lowest = float(comparison.sigma["floor"])
+    if np.isnan(lowest):
+        return []
+    above = wording.estimate((100 * (comparison.sigma[key] / lowest - 1) for key in SIGMA), "%", ".3g")
+    rivals = [
+        f"{name} {wording.number(round(100 * (sigma / lowest - 1), 2), 3)} %"
+        for name, sigma in comparison.rivals.items()
+    ]
+    text = tr(
+        "The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.",
+        kind=tr(UNBIASED if comparison.sigma["floor_kind"].startswith("CRB") else ANY),
+        floor=f"{wording.number(lowest)} {comparison.unit}".rstrip(),
+        name=comparison.name,
+        own=above,
+        others=join_names(rivals),
+    )
+    if comparison.sigma["sigma_hi"] < lowest:
+        text += " " + tr("Below it is only what is biased, or knows more than these plots.")
+    return [Sentence(text, sentences.intervals("curves", "sigma", comparison.sigma))]
+
+
+def _further_gains(comparison: _Comparison) -> list[Sentence]:
+    """The gains at the same scan against all filters but the config's best."""
+    rows = comparison.gains[comparison.gains["baseline"] != comparison.best]
+    if not len(rows):
+        return []
+    against = [f"{row['baseline']} {_gain(row)}" for _, row in rows.iterrows()]
+    text = tr("Further gains of {name} there: against {gains}.", name=comparison.name, gains=join_names(against))
+    return [Sentence(text, sentences.intervals("gains", "gain", rows))]
+
+
+def _extreme_gains(gains: "pd.DataFrame", comparison: _Comparison) -> list[Sentence]:
+    """The least and the largest gain against the config's best over all components and scans, if there are several."""
+    if len(gains) <= len(comparison.gains):
+        return []
+    extremes = gains[gains["baseline"] == comparison.best].sort_values("gain_percent").iloc[[0, -1]]
+    smallest, largest = (
+        tr("{gain} ({component} at {t} s)", gain=_gain(row), component=row["component"], t=numeral(f"{row['t_s']:g}"))
+        for _, row in extremes.iterrows()
+    )
+    text = tr(
+        "Over all components and scans its gain against {best} is from {least} to {most}.",
+        best=comparison.best,
+        least=smallest,
+        most=largest,
+    )
+    return [Sentence(text, sentences.intervals("gains", "gain", extremes))]
+
+
+def _gain(row: "pd.Series[Any]") -> str:
+    """A gain with its interval, to a thousandth of a per cent, its bounds outward: what is finer is rounding."""
+    value, low, high = (float(row[key]) for key in GAIN)
+    rounded = np.round(value, 3), np.floor(1e3 * low) / 1e3, np.ceil(1e3 * high) / 1e3
+    return wording.estimate((number + 0.0 for number in rounded), "%", ".3g")
+
+
+def _nees_sentences(result: CaseResult, name: str, tables_by_name: TablesByName) -> Iterator[Sentence]:
+    """Whether the covariances of a user filter are right at the last scan, and how many are no covariances."""
+    rows = (
+        common.select_rows(tables_by_name["nees"], case=result.name, filter=name) if "nees" in tables_by_name else None
+    )
+    if rows is not None and len(rows):
+        row = rows.iloc[-1]
+        nees = wording.estimate((row[key] for key in ("nees", "nees_lo", "nees_hi")), "", ".3g")
+        text = tr(
+            "NEES of {name} at {t} s: {nees} (1 if its covariance is right).", name=name, t=f"{row['t_s']:g}", nees=nees
+        )
+        yield Sentence(text, sentences.intervals("nees", "nees", row))
+    improper = common.select_rows(tables_by_name["failures"], case=result.name, filter=name, reason=IMPROPER)
+    if len(improper) and (count := int(improper["failed"].iloc[0])):
+        yield Sentence(
+            tr(
+                "In {count:,} of {n:,} realisations {name} gives a covariance that is not positive definite: it is no "
+                "part of NEES.",
+                count=count,
+                n=int(improper["n"].iloc[0]),
+                name=name,
+            )
+        )

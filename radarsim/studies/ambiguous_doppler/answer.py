@@ -1,0 +1,375 @@
+"""What the report of folded Doppler asks and answers, in sentences."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from radarsim.config.experiment import Case, Experiment
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import join_names, plural, tr
+from radarsim.report import case_selection, key_labels, rare_events, sentences, tables, wording
+from radarsim.report.sentences import Sentence
+from radarsim.studies.ambiguous_doppler.kernels.layout import OFF_BY_HALF_SPAN_SUM
+from radarsim.studies.ambiguous_doppler.study import prepare, simulate
+from radarsim.studies.ambiguous_doppler.tables import Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+TablesByName = Mapping[str, "pd.DataFrame"]
+AS_GOOD_PERCENT = 5.0  # above the oracle's σ
+LOST_SHARE = 0.5  # of realisations, from which a filter counts as lost
+LOST_PERCENT = 100.0  # above the oracle's σ, from which a σ is rather a share of lost tracks
+# What brings a filter that loses its folds back to them: remedies tried on realisations of the same case.
+TRIAL_REALISATIONS = 400  # a share of a tenth is known to 1.5 points
+MAX_LOST_SHARE = 0.1  # of realisations, up to which a remedy helps
+SMOOTH_MPS2 = 10.0  # acceleration that the model of order 1 allows for: what keeps the lock through turns of some g
+LARGER = 100.0  # times the manoeuvre variance
+STAGGER = (1.0, 7 / 6, 4 / 3)  # times the repetition rate, used in turn
+
+
+def warnings(experiment: Experiment) -> list[str]:
+    """Spans of velocity in which next to nothing can be unfolded: a line for each config and span."""
+    lines: dict[str, None] = {}
+    for case in experiment.cases:
+        radar = case.spec.radar
+        for span in radar.spans_mps:
+            if span < 2 * radar.sigma_velocity_mps and any(f.folds for f in case.spec.filters):
+                text = tr(
+                    "its span of {span:g} m/s is under 2 σ_V, {sigma:g} m/s: next to nothing can be unfolded",
+                    span=span,
+                    sigma=2 * radar.sigma_velocity_mps,
+                )
+                lines[f"{case.stem}: radar.repetition_rate_hz: {text}"] = None
+    return list(lines)
+
+
+def question(experiment: Experiment) -> str:
+    """What the experiment asks, in one sentence."""
+    names = join_names(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
+    if any(f.folds for case in experiment.cases for f in case.spec.filters):
+        return tr("How much is the folded velocity of {radars} worth, and from which scan on?", radars=names)
+    return tr("Which filter order follows the target of {radars}, and how should several be combined?", radars=names)
+
+
+def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """For each case: from which scan on folded velocity is as good as unfolded, within 5 %; how often it is right.
+
+    Of filters of several orders: the largest error of each over the scans, beside that of the best single order.
+    First, of all cases: the filter of the least error, or in how many folded velocity is as good."""
+    reported, remark = case_selection.select_reported(results, 6)
+    of_all_cases = [*_least_error_of_all(results, tables_by_name), *_as_good_in_cases(results, tables_by_name)]
+    of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name)]
+    remedies = _remedy_sentence(reported, tables_by_name)
+    return [*of_all_cases[:1], *of_cases, *remedies, *map(Sentence, remark)]
+
+
+def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Sentence]:
+    case_sentences = []
+    spans = wording.list_numbers(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
+    for name in _reported_filters(result):
+        subject = f"{key_labels.plain_case_label(result)}, D = {spans} {tr('m/s')}, {name}"
+        clauses = [
+            *_as_good_clause(result, name, tables_by_name),
+            *(_wrong_folds_sought(result, name, tables_by_name) or _right_folds(result, name, tables_by_name)),
+        ]
+        if clauses:
+            sentence = sentences.join("; ", clauses)
+            case_sentences.append(sentence.with_text(f"{subject}: {sentence.text}."))
+    return [*case_sentences, *(_orders_sentence(result, tables_by_name) if result.axes.combines.any() else [])]
+
+
+def _reported_filters(result: Result) -> list[str]:
+    """The filters that unfold and that the answer is about: the means over kept hypotheses, else all."""
+    unfolding = [f for f in result.spec.filters if f.folds and f.combine in (None, "likelihood")]
+    means = [f for f in unfolding if f.merge == "never" and f.estimate == "mean" and f.hypotheses > 1]
+    return [f.name for f in means or unfolding]
+
+
+def _largest_errors(result: Result, tables_by_name: TablesByName) -> "pd.DataFrame":
+    """The row of each filter's largest σ of range over the scans; the first plot is common.
+
+    decides: σ, exact where it is known exactly"""
+    curves = tables.select_rows(tables_by_name["curves"], case=result.name, component="r")
+    curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
+    curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"))
+    return curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
+
+
+def _sigma_m(row: "pd.Series[Any]") -> str:
+    return wording.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m"))
+
+
+def _least_error_of_all(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """The filter whose largest σ of range in any case is least, and the best of the other kind: one order, or several.
+
+    None where no filter combines orders, or none had a plot."""
+    combining = [result for result in results if result.axes.combines.any()]
+    combinations = {f.name for result in combining for f in result.spec.filters if f.combine is not None}
+    worst_rows: dict[str, tuple[pd.Series[Any], Result]] = {}
+    for result in combining:
+        for _, row in _largest_errors(result, tables_by_name).iterrows():
+            name = row["filter"]
+            if name not in worst_rows or row["decides"] > worst_rows[name][0]["decides"]:
+                worst_rows[name] = row, result
+    ranked = sorted(worst_rows, key=lambda name: worst_rows[name][0]["decides"])
+    other_kind = [name for name in ranked if (name in combinations) != (ranked[0] in combinations)]
+    if not other_kind:
+        return []
+    best_row, _ = worst_rows[ranked[0]]
+    other_row, other_case = worst_rows[other_kind[0]]
+    text = plural(
+        "{best} keeps σ of the range after the first plot within {least}; {kind}, {other}, comes to {most} ({where}).",
+        "{best} keeps σ of the range after the first plot within {least} in all {count} cases; {kind}, {other}, "
+        "comes to {most} ({where}).",
+        len(combining),
+        best=ranked[0],
+        least=_sigma_m(best_row),
+        kind=tr("the best combination") if other_kind[0] in combinations else tr("the best single order"),
+        other=other_kind[0],
+        most=_sigma_m(other_row),
+        where=key_labels.plain_case_label(other_case),
+    )
+    return [Sentence(text, sentences.intervals("curves", "sigma", best_row, other_row))]
+
+
+def _orders_sentence(result: Result, tables_by_name: TablesByName) -> list[Sentence]:
+    """The largest σ of range over the scans of every filter, and what remains to be gained.
+
+    None where no realisation had a plot."""
+    worst = _largest_errors(result, tables_by_name)
+    if not len(worst):
+        return []
+    errors = [
+        tr("{filter}, {sigma} at scan {k}", filter=row["filter"], sigma=_sigma_m(row), k=row["k"])
+        for _, row in worst.iterrows()
+    ]
+    clauses = [tr("largest σ of the range after the first plot: {filters}", filters="; ".join(errors))]
+    axes = result.axes
+    best_order, best_combination = (
+        float(np.min(np.max(sigma[axes.combines, 1:, 0], axis=1))) for sigma in (axes.best_order, axes.best_combination)
+    )
+    if np.isfinite(best_order) and np.isfinite(best_combination):
+        clauses.append(
+            tr(
+                "with the trajectory known, the best order of each scan gives {best:.4g} m, the best combination "
+                "{whole:.4g} m",
+                best=best_order,
+                whole=best_combination,
+            )
+        )
+    elif np.isfinite(best_order):
+        clauses.append(tr("with the trajectory known, the best order of each scan gives {best:.4g} m", best=best_order))
+    text = f"{key_labels.plain_case_label(result)}: {'; '.join(clauses)}."
+    return [Sentence(text, sentences.intervals("curves", "sigma", worst))]
+
+
+class _CaseComparison(NamedTuple):
+    """How a filter compares with its oracle in a case: ordered from the best to the worst."""
+
+    since_scan: float  # from which on it is as good; infinite where it is not at the last scan
+    above_percent: float  # at the last scan
+    text: str
+    clause: Sentence
+    deciding: tuple[sentences.MeasuredInterval, ...]
+
+
+def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """Of several cases: in how many the filter that unfolds best is as good as unfolded velocity; and the worst."""
+    comparisons: dict[str, list[_CaseComparison]] = {}
+    for result in results if len(results) > 1 else ():
+        for name in _reported_filters(result):
+            for clause in _as_good_clause(result, name, tables_by_name):
+                gains = _gains_over_oracle(result, name, tables_by_name)
+                since = _first_good_scan(gains) or np.inf
+                text = f"{key_labels.plain_case_label(result)}: {clause.text}"
+                deciding = _near_the_limit(gains.tail(1))
+                above = gains["above_oracle_percent"].iloc[-1]
+                comparisons.setdefault(name, []).append(_CaseComparison(since, above, text, clause, deciding))
+    if not comparisons:
+        return []
+    good = {name: sum(np.isfinite(case.since_scan) for case in cases) for name, cases in comparisons.items()}
+    worst = {name: max(cases, key=lambda case: case[:3]) for name, cases in comparisons.items()}
+    best_name = min(comparisons, key=lambda name: (-good[name], worst[name][:3]))
+    text = tr(
+        "{filter}: as good as unfolded velocity, within {percent:g} %, in {good} of {count} cases by the last "
+        "scan; {worst}.",
+        filter=best_name,
+        percent=AS_GOOD_PERCENT,
+        good=good[best_name],
+        count=len(comparisons[best_name]),
+        worst=worst[best_name].text,
+    )
+    by_limit = (interval for case in comparisons[best_name] for interval in case.deciding)
+    return [Sentence(text, (*worst[best_name].clause.intervals, *by_limit))]
+
+
+def _gains_over_oracle(result: Result, name: str, tables_by_name: TablesByName) -> "pd.DataFrame":
+    """The rows (scans) of `gains` in the velocity, of a filter that is compared with its oracle."""
+    rows = tables.select_rows(tables_by_name["gains"], case=result.name, filter=name, component="Vr")
+    return rows.dropna(subset=["above_oracle_percent"])
+
+
+def _first_good_scan(gains: "pd.DataFrame") -> int:
+    """The scan from which on a filter is as good as its oracle, for good; 0 where it is not at the last one."""
+    is_worse = gains["above_oracle_hi"].to_numpy() > AS_GOOD_PERCENT
+    if is_worse[-1]:
+        return 0
+    return int(gains["k"].to_numpy()[int(is_worse.nonzero()[0][-1]) + 1 if is_worse.any() else 0])
+
+
+def _near_the_limit(gains: "pd.DataFrame") -> tuple[sentences.MeasuredInterval, ...]:
+    """The intervals by which a filter is as good as its oracle, and would not be if they were twice as wide."""
+    low, high = (gains[name].to_numpy() for name in ("above_oracle_lo", "above_oracle_hi"))
+    return sentences.intervals("gains", "above_oracle", gains[sentences.would_exceed(AS_GOOD_PERCENT, low, high)])
+
+
+def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName) -> list[Sentence]:
+    """From which scan on σ of the velocity is within 5 % of the oracle's, for good; none without an oracle."""
+    gains = _gains_over_oracle(result, name, tables_by_name)
+    if not len(gains):
+        return []
+    if since := _first_good_scan(gains):
+        text = tr(
+            "as good as unfolded velocity, within {percent:g} %, from scan {k} on", percent=AS_GOOD_PERCENT, k=since
+        )
+        return [Sentence(text, _near_the_limit(gains[gains["k"] >= since]))]
+    final = gains.iloc[-1]
+    if final["above_oracle_percent"] > LOST_PERCENT:
+        return [
+            _lost_clause(
+                tables.select_rows(tables_by_name["folds"], case=result.name, filter=name).iloc[-1], final["k"]
+            )
+        ]
+    values = (final[key] for key in ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi"))
+    fields = {"above": wording.estimate(values, "%", ".3g"), "k": final["k"]}
+    if final["above_oracle_percent"] <= AS_GOOD_PERCENT:
+        text = tr(
+            "σ of the velocity is {above} above that of unfolded velocity at scan {k}, the last: too few realisations "
+            "to tell whether within {percent:g} %",
+            percent=AS_GOOD_PERCENT,
+            **fields,
+        )
+    else:
+        text = tr("σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last", **fields)
+    return [Sentence(text, sentences.intervals("gains", "above_oracle", final))]
+
+
+def _lost_clause(folds: "pd.Series[Any]", k: int) -> Sentence:
+    """The share of realisations whose velocity is off by more than half the span at the last scan, k."""
+    text = tr(
+        "at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
+        k=k,
+        share=wording.share(*(100 * folds[key] for key in ("beyond", "beyond_lo", "beyond_hi"))),
+    )
+    if folds["beyond"] > LOST_SHARE:
+        text = tr("lost: {off}", off=text)
+    return Sentence(text, sentences.intervals("folds", "beyond", folds))
+
+
+def _right_folds(result: Result, name: str, tables_by_name: TablesByName) -> list[Sentence]:
+    """How often all folds are right at the last scan; none where no realisation had a plot."""
+    rows = tables.select_rows(tables_by_name["folds"], case=result.name, filter=name)
+    if not len(rows):
+        return []
+    final = rows.iloc[-1]
+    share = wording.share(*(100 * final[key] for key in ("right", "right_lo", "right_hi")))
+    text = tr("all folds are right in {share} of realisations at scan {k}", share=share, k=final["k"])
+    return [Sentence(text, sentences.intervals("folds", "right", final))]
+
+
+def _wrong_folds_sought(result: Result, name: str, tables_by_name: TablesByName) -> list[Sentence]:
+    """How often a fold is wrong at the last scan, by importance sampling; none where it was not drawn so."""
+    rows = tables.group_by(tables_by_name["rare"], "case", "filter") if result.spec.rare is not None else {}
+    if (result.name, name) not in rows:
+        return []
+    row = rows[result.name, name].iloc[0]
+    text = tr(
+        "a fold is wrong at scan {k} in {rate:.3g} [{low:.3g}, {high:.3g}] of realisations, by importance sampling "
+        "from {events:,} of them, {n_eff:,.0f} effective ones",
+        k=row["k"],
+        **rare_events.rate_fields(row),
+    )
+    return [Sentence(text, sentences.intervals("rare", "rate", row))]
+
+
+def _remedy_sentence(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """What helps the first filter that is lost, where something does of what is tried."""
+    for result in results:
+        for name in _reported_filters(result):
+            folds = tables.select_rows(tables_by_name["folds"], case=result.name, filter=name)
+            if not len(folds) or folds.iloc[-1]["beyond"] <= LOST_SHARE:
+                continue
+            helping = [
+                tr("{settings} ({share} % lost)", settings=settings, share=numeral(f"{100 * share:.2g}"))
+                for settings, share in cures(result.spec, name, dict(result.swept))
+            ]
+            if not helping:
+                return []
+            text = tr(
+                "{case}, {filter}: what helps, tried on {count} realisations: {cures}.",
+                case=key_labels.plain_case_label(result),
+                filter=name,
+                count=TRIAL_REALISATIONS,
+                cures="; ".join(helping),
+            )
+            return [Sentence(text)]
+    return []
+
+
+class _Remedy(NamedTuple):
+    """Settings of the config that may help a filter, by key; the filter and the radar that they make."""
+
+    settings: Mapping[str, str]
+    filter: Any
+    radar: Any
+
+    @property
+    def options(self) -> str:
+        return " ".join(f"--set {key}={value}" for key, value in self.settings.items())
+
+
+def cures(spec: Any, name: str, swept: Collection[str] = ()) -> Iterator[tuple[str, float]]:
+    """The remedies that help a filter, as settings of the config, and the share of realisations it then loses.
+
+    swept: keys that the config sweeps, which no setting may change beside it."""
+    for remedy in _remedies(spec, name):
+        if any(f"{setting}.".startswith(f"{key}.") for setting in remedy.settings for key in swept):
+            continue
+        changes = {"radar": remedy.radar, "filters": (remedy.filter,), "baseline": None, "rare": None}
+        share = _share_lost(spec.model_copy(update=changes))
+        if share <= MAX_LOST_SHARE:
+            yield remedy.options, share
+
+
+def _remedies(spec: Any, name: str) -> Iterable[_Remedy]:
+    """What is tried: two orders with a smoother one, a larger manoeuvre variance, staggered repetition rates."""
+    index, lost = next((i, f) for i, f in enumerate(spec.filters) if f.name == name)
+    key = f"filters.{index}"
+    (variance, *_), rates = lost.variances, spec.radar.rates_hz
+    if lost.combine is None:
+        both = {"orders": (1, 2), "combine": "likelihood", "manoeuvre_variance": (SMOOTH_MPS2**2, variance)}
+        settings = {
+            f"{key}.orders": "[1,2]",
+            f"{key}.combine": "likelihood",
+            f"{key}.manoeuvre_variance": f"[{SMOOTH_MPS2**2:g},{variance:g}]",
+        }
+        yield _Remedy(settings, lost.model_copy(update=both | {"stay_probability": 0.95}), spec.radar)
+        larger = LARGER * variance
+        settings = {f"{key}.manoeuvre_variance": f"{larger:g}"}
+        yield _Remedy(settings, lost.model_copy(update={"manoeuvre_variance": larger}), spec.radar)
+    if len(rates) == 1:
+        staggered = tuple(float(f"{factor * rates[0]:.4g}") for factor in STAGGER)
+        settings = {"radar.repetition_rate_hz": f"[{','.join(f'{rate:g}' for rate in staggered)}]"}
+        yield _Remedy(settings, lost, spec.radar.model_copy(update={"repetition_rate_hz": staggered}))
+
+
+@lru_cache(maxsize=64)  # the answer is made for the page, and again where a program asks for it
+def _share_lost(spec: Any) -> float:
+    """The share of realisations in which the only filter's velocity is off by more than half the span at the end."""
+    plan = prepare(Case("", "", "ambiguous_doppler", spec, (), TRIAL_REALISATIONS, 1))
+    arrays = plan.layout.unpack(simulate(plan, 0, TRIAL_REALISATIONS))
+    return float(arrays["folds"][0, -1, OFF_BY_HALF_SPAN_SUM] / arrays["estimates"][0, -1, 0])

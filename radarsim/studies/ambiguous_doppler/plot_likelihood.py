@@ -1,0 +1,108 @@
+"""The likelihood of recorded plots under a filter, over all its hypotheses."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.studies.ambiguous_doppler import filter_design
+from radarsim.studies.ambiguous_doppler.fold_resolver import FoldResolver
+from radarsim.studies.ambiguous_doppler.followers import list_limits, packed_motion, prior_covariance
+from radarsim.studies.ambiguous_doppler.kernels import recorded_rows
+from radarsim.studies.ambiguous_doppler.tracking import MEASURED, plot_rows
+from radarsim.studies.recording_interface import BIAS, usual_interval_s
+
+MIN_SIGMA_RATIO, MIN_VARIANCE_RATIO = 1e-4, 1e-6  # to the configured values: smaller ones count as zero
+
+
+class PlotLikelihood:
+    """The likelihood of tracks under a filter: the density of each range and folded velocity over all its hypotheses.
+
+    The state before the first plot has the prior's distribution."""
+
+    explains: tuple[str, ...] = (BIAS,)
+
+    def __init__(self, case: Case, options: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
+        self.spec: Any = case.spec
+        self.options, self.filter, self.tracks = options, options.name, len(tracks)
+        self.rows, self.usual_s = sum(len(columns["t_s"]) for columns in tracks), usual_interval_s(tracks)
+        radar, filter_index = case.spec.radar, list(case.spec.filters).index(options)
+        self.observes = 1 if options.doppler == "none" else 2
+        configured = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
+        configured = dict(list(configured.items())[: self.observes])
+        configured[f"filters.{filter_index}.manoeuvre_variance"] = options.variances[0]
+        self.keys, self.stated = tuple(configured), np.array(list(configured.values()), dtype=float)
+        one_sigma_variance = (radar.sigma_velocity_mps / radar.scan_period_s ** options.orders[0]) ** 2  # in a scan
+        self.least = np.array([MIN_SIGMA_RATIO] * self.observes + [MIN_VARIANCE_RATIO]) * np.append(
+            self.stated[: self.observes], self.stated[-1] or one_sigma_variance
+        )
+        if self.observes == 1:
+            self.explains = ()
+        (self.member,) = filter_design.members(options)
+        self.problems = [self._problem(columns) for columns in tracks]
+
+    def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem":
+        """The arrays of a track for the kernel."""
+        dt = np.diff(columns["t_s"], prepend=columns["t_s"][0])
+        steps, step_indices = np.unique(dt, return_inverse=True)
+        motions = [packed_motion(self.member.order, 1.0, step) for step in steps.tolist()]
+        f, q = (np.array([motion[i] for motion in motions], dtype=float)[step_indices] for i in (1, 2))
+        rows = np.array(plot_rows(columns))
+        folds = FoldResolver(self.spec.radar)
+        for row in rows:
+            folds.begin_row(row[0], row[3])
+            row[3] = folds.span
+        return _Problem(f, q, rows[:, 1:])
+
+    def _scores(self, values: np.ndarray, bias: float) -> np.ndarray:
+        """Log likelihoods (2,) of range and velocity over all tracks; minus infinity if a row cannot be taken."""
+        sigma = np.ones(2)
+        sigma[: self.observes] = values[: self.observes]
+        reach = (1 if self.options.hypotheses == 1 else 2) if self.member.doppler == "folded" else 0
+        prior, total = np.array(prior_covariance(self.member, self.spec)), np.zeros(2)
+        for problem in self.problems:
+            score = np.empty((len(problem.rows), 2))
+            rows = self._velocities(problem.rows, bias * sigma[1])
+            present = np.isfinite(rows[:, :2])
+            arguments = np.where(np.isfinite(rows), rows, 0.0), present, prior, sigma**2, float(values[-1])
+            if not recorded_rows.log_likelihood(
+                problem.F, problem.Q, *arguments, reach, *list_limits(self.options), score
+            ):
+                return np.full(2, -np.inf)
+            total += score.sum(axis=0)
+        return total
+
+    def _velocities(self, rows: np.ndarray, offset: float) -> np.ndarray:
+        """The rows (n, 3) with velocities as the filter takes them, minus an offset."""
+        shifted = rows.copy()
+        shifted[:, 1] -= offset
+        if self.member.doppler == "none":
+            shifted[:, 1] = np.nan
+        if self.member.doppler == "remainder":
+            folds = FoldResolver(self.spec.radar)
+            for i in np.flatnonzero(np.isfinite(shifted[:, 1])):
+                folds.span = shifted[i, 2]
+                shifted[i, 1] = folds.remainder(shifted[i, 1])
+        return shifted
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+        """The log likelihood. bias: of the velocity, in units of its σ; outliers and correlation are ignored."""
+        return float(self._scores(values, bias).sum())
+
+    def by_number(self, values: np.ndarray) -> dict[str, float]:
+        """The log likelihoods of range and velocity."""
+        return {
+            name: float(score)
+            for (name, _), score in zip(MEASURED[: self.observes], self._scores(values, 0.0), strict=False)
+        }
+
+
+class _Problem(NamedTuple):
+    """A track for the kernel: motions F (n, 5) and Q (n, 6) to each row, of unit variance, and rows (n, 3).
+
+    A row holds range, velocity and span."""
+
+    F: np.ndarray
+    Q: np.ndarray
+    rows: np.ndarray

@@ -1,0 +1,1 @@
+"""Sums over the errors of bursts, and the weights of bursts that are drawn where locks are lost."""

@@ -1,0 +1,176 @@
+"""Linear filters over recorded plots, and the likelihood of tracks."""
+
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.engine.results import Track
+from radarsim.studies.linear_design import period
+from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, usual_interval_s
+
+if TYPE_CHECKING:
+    from radarsim.studies.linear import LinearStudy
+
+
+ZERO_SHARE = 1e-6  # of a fitted key's stated value: what counts as zero
+
+
+class RowModel:
+    """A filter's model over rows of recorded plots, whatever the times between them."""
+
+    def __init__(self, study: "LinearStudy", spec: Any, filter_keys: Any):
+        self.study, self.spec, self.filter_keys = study, spec, filter_keys
+        self.columns = study.columns(spec, filter_keys)
+        self.matrices = study.matrices(spec, filter_keys)
+        self.period = period(self.matrices.H, self.matrices.R)
+
+    def numbers(self, columns: Mapping[str, np.ndarray], n: int) -> np.ndarray:
+        """The numbers z (n, D), NaN where a column is absent."""
+        none = np.full(n, np.nan)
+        return np.stack([columns.get(name, none) for name in self.columns], axis=1)
+
+    def moves(self, dt: np.ndarray, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
+        """F and Q (n, n, n) over times; over a time of zero the state stays."""
+        motion, n = self.study.assumed_motion(spec or self.spec, self.filter_keys), self.matrices.x.size
+        times, places = np.unique(dt, return_inverse=True)
+        F, Q = np.tile(np.eye(n), (times.size, 1, 1)), np.zeros((times.size, n, n))
+        for name, function, matrices in (("F", motion.F, F), ("Q", motion.Q, Q)):
+            values = [self.study.call(function, t) for t in times[times != 0].tolist()]
+            matrices[times != 0] = self.study._array(
+                f"assumed_motion: {name}(dt)", values or matrices[:0], len(values), n, n
+            )
+        for i in np.flatnonzero(np.linalg.eigvalsh(Q)[:, 0] < 0):
+            self.study._covariance(f"assumed_motion: Q({times[i]:g} s)", Q[i], n)
+        return F[places], Q[places]
+
+    def rows(self, first: int, n: int, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
+        """H (n, D, d) and R (n, D) of rows from number `first` on."""
+        if spec is None and self.period < len(self.matrices.H):
+            phases = (first + np.arange(n)) % self.period
+            return self.matrices.H[phases], self.matrices.R[phases]
+        plots = [self.study.assumed_plot(spec or self.spec, self.filter_keys, first + k) for k in range(n)]
+        H = np.stack([np.atleast_2d(row) for row, _ in plots]).astype(float)
+        return H, np.stack([np.atleast_1d(sigma) for _, sigma in plots]).astype(float) ** 2
+
+    def gains(self, first: int, n: int) -> np.ndarray:
+        """A filter's own gains at rows; after its last scan those of the last period repeat."""
+        k, scans = first + np.arange(n), len(self.matrices.gains)
+        last = scans - min(self.period, scans)
+        return self.matrices.gains[np.where(k < scans, k, last + (k - last) % (scans - last))]
+
+
+class LinearTracker:
+    """The filters of a case over recorded plots, chunk by chunk in constant memory.
+
+    The first row is the first scan: there the state is as in the config. A filter none of whose columns are in the file
+    has no estimates."""
+
+    most_rows: int | None = None
+    several = False
+
+    def __init__(self, study: "LinearStudy", spec: Any):
+        self.study, self.names = study, tuple(keys.name for keys in spec.filters)
+        self.filters = [RowModel(study, spec, keys) for keys in spec.filters]
+        self.states = [(rows.matrices.x.copy(), rows.matrices.P.copy()) for rows in self.filters]
+        self.count, self.last = 0, np.nan
+
+    def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
+        """The estimates over the next rows: columns (n,), NaN where a value is missing."""
+        t = columns["t_s"]
+        dt = np.diff(t, prepend=self.last if self.count else t[0])
+        results = [
+            self._follow(rows, *state, dt, columns) for rows, state in zip(self.filters, self.states, strict=True)
+        ]
+        self.count, self.last = self.count + len(t), t[-1]
+        out, residual = (np.stack([result[i] for result in results]) for i in range(2))
+        states, components = self.filters[0].matrices.x.size, len(self.study.components)
+        measured = self.study.measured
+        return Track(
+            filters=self.names,
+            components=tuple((component.name, component.unit) for component in self.study.components),
+            t_s=t,
+            estimate=out[..., :components],
+            sigma=out[..., states : states + components],
+            measured=tuple((number.column, number.unit) for number in measured),
+            residual=residual,
+            tested=tuple((number.column, 1) for number in measured),
+            nis=out[..., 2 * states :],
+        )
+
+    def _follow(
+        self, model: RowModel, x: np.ndarray, P: np.ndarray, dt: np.ndarray, columns: Mapping[str, np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The result of `linear_recorded.filter_recorded` for a filter, and its residuals (n, D)."""
+        from radarsim.kernels import linear_recorded
+
+        rows, z = len(dt), model.numbers(columns, len(dt))
+        (F, Q), (H, R) = model.moves(dt), model.rows(self.count, rows)
+        out, has_number = np.full((rows, 2 * x.size + z.shape[1]), np.nan), np.isfinite(z)
+        gains = model.gains(self.count, rows) if model.matrices.has_own_gains else np.zeros_like(H)
+        linear_recorded.filter_recorded(
+            x, P, F, Q, H, R, gains, not model.matrices.has_own_gains, np.where(has_number, z, 0.0), has_number, out
+        )
+        if not any(name in columns for name in model.columns):
+            out[:] = np.nan
+        return out, z - np.einsum("kdn,kn->kd", H, out[:, : x.size])
+
+
+class PlotLikelihood:
+    """The likelihood of tracks under a filter's model, by the keys that the study names as `fitted`. The state at the
+    first plot is as in the config."""
+
+    explains: tuple[str, ...] = (OUTLIERS, CORRELATION)
+
+    def __init__(self, study: "LinearStudy", spec: Any, track: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
+        self.spec, self.filter, self.model = spec, track.name, RowModel(study, spec, track)
+        self.tracks, self.rows = len(tracks), sum(len(track["t_s"]) for track in tracks)
+        self.keys = study.fitted
+        stated = [attrgetter(key)(spec) for key in self.keys]
+        if None in stated:
+            raise study._fault("fitted", f"{self.keys[stated.index(None)]} is not given")
+        self.stated = np.array(stated, dtype=float)
+        self.least = ZERO_SHARE * np.where(self.stated > 0, self.stated, 1.0)
+        self.plots = [
+            (np.diff(track["t_s"], prepend=track["t_s"][0]), self.model.numbers(track, len(track["t_s"])))
+            for track in tracks
+        ]
+        self.usual_s = usual_interval_s(tracks)
+
+    def _scores(self, values: np.ndarray, outliers: float, correlation: float) -> np.ndarray:
+        """Sums over all tracks for each number of a plot."""
+        from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
+
+        spec = self.spec
+        for key, value in zip(self.keys, values, strict=True):
+            spec = _changed(spec, key.split("."), float(value))
+        start = self.model.study.assumed_motion(spec, self.model.filter_keys)
+        total: np.ndarray = np.zeros(len(self.model.columns))
+        for dt, z in self.plots:
+            (F, Q), (H, R) = self.model.moves(dt, spec), self.model.rows(0, len(dt), spec)
+            x, P = np.array(start.mean, dtype=float), np.array(start.covariance, dtype=float)
+            model, white, has_number = (x, P, F, Q, H), 1.0, np.isfinite(z)
+            if correlation:
+                first = np.zeros((x.size, z.shape[1]))
+                model, white = with_lasting_errors(x, P, first, F, Q, H, R, correlation ** (dt / self.usual_s)), 0.0
+            score = np.empty(z.shape)
+            log_likelihood(*model, np.where(has_number, z, 0.0), R, has_number, 1.0, outliers, white, score)
+            total += score.sum(axis=0)
+        return total
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+        """The logarithm of the likelihood."""
+        return float(self._scores(values, outliers, correlation).sum())
+
+    def by_number(self, values: np.ndarray) -> dict[str, float]:
+        """The sums of each number of a plot."""
+        return dict(zip(self.model.columns, self._scores(values, 0.0, 0.0).tolist(), strict=True))
+
+
+def _changed(model: Any, path: Sequence[str], value: float) -> Any:
+    """A config's keys with another value of the key at a path."""
+    key, *remaining_path = path
+    return model.model_copy(
+        update={key: _changed(getattr(model, key), remaining_path, value) if remaining_path else value}
+    )

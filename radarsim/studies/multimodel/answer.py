@@ -1,0 +1,103 @@
+"""What the report of P2's experiments asks and answers, in sentences."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from radarsim.config.experiment import Experiment
+from radarsim.engine.results import CaseResult
+from radarsim.language.translate import plural, shorten_names, term, tr
+from radarsim.report import case_selection, key_labels, sentences, tables, wording
+from radarsim.report.sentences import Sentence
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def question(experiment: Experiment) -> str:
+    """What the experiment asks, in one sentence."""
+    filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
+    cases = len(experiment.cases)
+    if cases == 1:
+        return tr("How accurately do {filters} track the target?", filters=shorten_names(filters))
+    return plural(
+        "How accurately do {filters} track the target in {count} case?",
+        "How accurately do {filters} track the target in {count} cases?",
+        cases,
+        filters=shorten_names(filters),
+    )
+
+
+def answer(results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
+    """The filter that is closest to the best one of every stage.
+
+    Of one case, or where no filter can be compared so, the least σ of each stage."""
+    stages = tables_by_name["stages"]
+    closest = _closest_to_the_best(results, stages)
+    if closest and len(results) > 1:
+        return closest
+    reported, remark = case_selection.select_reported(results, 4)
+    quantities = [("y", term("the height")), *([("vy", term("the rate of climb"))] if len(results) == 1 else [])]
+    stage_sentences = [_least_sigma(result, stages, *quantity) for result in reported for quantity in quantities]
+    return [*closest, *stage_sentences, *map(Sentence, remark)]
+
+
+def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") -> list[Sentence]:
+    """The filter whose σ of the height is nowhere far above the least of a stage, that stage, and the next filter.
+
+    Of filters that all cases have; nothing where there are not two."""
+    rows = stages[(stages["component"] == "y") & (stages["sigma"] > 0)]
+    rows = rows[rows.groupby("filter")["case"].transform("nunique") == len(results)]
+    if rows["filter"].nunique() < 2:
+        return []
+    lowest_rows = rows.loc[rows.groupby(["case", "stage"], sort=False)["sigma"].idxmin()]
+    least_by_stage = lowest_rows.set_index(["case", "stage"])["sigma"]
+    least_sigma = least_by_stage.loc[list(zip(rows["case"], rows["stage"], strict=True))]
+    rows = rows.assign(above=100 * (rows["sigma"].to_numpy() / least_sigma.to_numpy() - 1))
+    worst_stages = rows.loc[rows.groupby("filter", sort=False)["above"].idxmax()]
+    worst_stages = worst_stages.sort_values("above", kind="stable")
+    closest, second = worst_stages.iloc[0], worst_stages.iloc[1]
+    fields = {"filter": closest["filter"], "second": second["filter"], "more": _percent(second["above"])}
+    if not closest["above"]:
+        text = tr("Least σ of the height in every stage: {filter}; next {second}, at most {more} above it.", **fields)
+        return [Sentence(text)]
+    best = lowest_rows[(lowest_rows["case"] == closest["case"]) & (lowest_rows["stage"] == closest["stage"])].iloc[0]
+    text = tr(
+        "Closest to the best filter of {every}: {filter}, σ of the height at most {percent} above the least "
+        "({where}: {sigma}; {best}: {least}); next {second}, {more}.",
+        every=tr("each stage of every case") if len(results) > 1 else tr("each stage"),
+        percent=_percent(closest["above"]),
+        where=_stage_label(results, closest),
+        sigma=_sigma(closest),
+        best=best["filter"],
+        least=_sigma(best),
+        **fields,
+    )
+    return [Sentence(text, sentences.intervals("stages", "sigma", closest, best))]
+
+
+def _stage_label(results: Sequence[CaseResult], row: "pd.Series[Any]") -> str:
+    """The stage of a row, after its case where there are several."""
+    case_names = dict(
+        zip((result.name for result in results), case_selection.distinct_case_names(results), strict=True)
+    )
+    stage = tr(str(row["stage"]))
+    return f"{case_names[row['case']]}, {stage}" if len(results) > 1 else stage
+
+
+def _percent(value: float) -> str:
+    return f"{wording.number(value, 2)} %"
+
+
+def _least_sigma(result: CaseResult, stages: "pd.DataFrame", component: str, quantity: str) -> Sentence:
+    """The filter of the least σ in each stage, with the interval."""
+    rows = tables.select_rows(stages, case=result.name, component=component)
+    best = rows.loc[rows.groupby("stage", sort=False)["sigma"].idxmin()]
+    clauses = [f"{tr(str(row['stage']))}: {row['filter']}, {_sigma(row)}" for _, row in best.iterrows()]
+    text = tr("Least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(clauses))
+    return Sentence(case_selection.after_swept_values(result, text), sentences.intervals("stages", "sigma", best))
+
+
+def _sigma(row: "pd.Series[Any]") -> str:
+    """σ of a row of the stages with its interval, to three digits."""
+    values = (float(f"{row[name]:.3g}") for name in ("sigma", "sigma_lo", "sigma_hi"))
+    return wording.estimate(values, key_labels.unit_label(row["unit"]), ",.10g")

@@ -1,0 +1,1 @@
+"""One block of realisations, compiled: bursts, their estimates, and the tracks from these."""

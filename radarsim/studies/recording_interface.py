@@ -1,0 +1,193 @@
+"""What a study offers for simulated and recorded plots: drawing them, its filters over them, their likelihood."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from threading import RLock
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from radarsim.errors import ConfigError
+from radarsim.studies.plot_arrays import TRUTH_PREFIX, UNITS_IN_NAMES, DrawPlots, SimulatedPlots
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from radarsim.config.experiment import Case
+    from radarsim.engine.results import Track
+
+
+class Tracker(Protocol):
+    """The filters of a case over recorded plots, chunk by chunk.
+
+    most_rows: how many rows it takes, all at once; None: any number, chunk by chunk in constant memory. several:
+    whether a row may have the same time as the previous one, as plots of one scan do."""
+
+    @property
+    def most_rows(self) -> int | None: ...
+    @property
+    def several(self) -> bool: ...
+
+    def feed(self, columns: Mapping[str, "np.ndarray"]) -> "Track":
+        """The estimates over the next rows: columns (n,), NaN where a value is missing. Raises PlotFault for a row that
+        a filter cannot take."""
+
+
+MAX_PREPARED = 4  # cases that stay prepared: those whose plots were drawn last
+
+OUTLIERS, BIAS, CORRELATION = EXPLANATIONS = ("outliers", "bias", "correlation")
+
+
+class Likelihood(Protocol):
+    """The likelihood of recorded plots under a filter, as a function of the config keys that it was designed with.
+
+    filter: its name; tracks and rows: numbers of them; keys: dotted names; stated (n,): their values in the config;
+    least (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
+    EXPLANATIONS; usual_s: the usual interval between plots."""
+
+    filter: str
+    tracks: int
+    rows: int
+    keys: tuple[str, ...]
+    stated: "np.ndarray"
+    least: "np.ndarray"
+    explains: tuple[str, ...]
+    usual_s: float
+
+    def __call__(
+        self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0
+    ) -> float:
+        """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
+
+        outliers: the share of plots with ten times their σ; bias: a constant error of a number that can show one, in
+        its σ; correlation: of the errors of neighbouring plots, at the recording's usual interval."""
+
+    def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
+        """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
+
+
+def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:
+    """The usual interval between plots of tracks, columns (n,) each: the median of their medians; 1 without any."""
+    import numpy as np
+
+    medians = [float(np.median(np.diff(track["t_s"]))) for track in tracks if len(track["t_s"]) > 1]
+    return float(np.median(medians)) if medians else 1.0
+
+
+class TurnError(NamedTuple):
+    """The largest standard error of a component in a turn, as a config states it and with other values."""
+
+    component: str
+    unit: str
+    acceleration_g: float
+    stated: float
+    changed: float
+
+
+class RecordingInterface(ABC):
+    """How a study simulates plots and takes recorded ones: `radarsim simulate`, `track` and `fit`.
+
+    A study has `drawing`, or the slower `simulated`; the other one follows.
+
+    rows_asked: number of rows that the advice of `radarsim track` uses for its likelihood, so that it takes seconds.
+    from_any_origin: whether ranges count from any point, so that they may be negative. of_any_keys: whether it uses
+    only methods of the study, so that it cannot ignore keys."""
+
+    rows_asked: int = 3000
+    from_any_origin: bool = False
+    of_any_keys: bool = False
+
+    @abstractmethod
+    def columns(self, spec: Any) -> Sequence[Sequence[str]]:
+        """The columns to read, `t_s` first; the first of these choices that a file has is taken."""
+
+    def columns_of(self, spec: Any, filter_keys: Any) -> Sequence[str]:
+        """The columns that a filter needs to take a plot. Default: none, it takes what is read."""
+        return ()
+
+    @abstractmethod
+    def sigmas(self, spec: Any) -> Mapping[str, Sequence[str]]:
+        """The keys of the standard deviations of each measured number."""
+
+    @abstractmethod
+    def scan_period_s(self, spec: Any) -> float:
+        """The config's time between two plots."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        for name, counterpart in (("simulated", "drawing"), ("drawing", "simulated")):
+            if name in vars(cls) and counterpart not in vars(
+                cls
+            ):  # what a base class has of the other one is of its plots
+                setattr(cls, counterpart, vars(RecordingInterface)[counterpart])
+        if cls.drawing is RecordingInterface.drawing and cls.simulated is RecordingInterface.simulated:
+            raise TypeError(f"{cls.__name__} must have `drawing` or `simulated`")
+
+    def drawing(self, case: "Case") -> DrawPlots:
+        """Prepare a case; the result draws the plots of realisations first … first + count - 1.
+
+        Default: one after the other by `simulated`."""
+        return lambda first, count: _one_by_one(self, case, first, count)
+
+    def simulated(self, case: "Case", realisation: int) -> Mapping[str, "np.ndarray"]:
+        """The plots of one realisation, as a run draws them, and the truth in columns true_…; columns (n,).
+
+        Default: by `drawing`."""
+        return self.drawn(case, realisation, 1).rows(0)
+
+    def drawn(self, case: "Case", first: int, count: int) -> SimulatedPlots:
+        """The plots of realisations first … first + count - 1; the case is prepared only once."""
+        with _LOCK:
+            draw = next(
+                (draw for plots_type, last_case, draw in _LAST if last_case is case and plots_type is type(self)), None
+            )
+            if draw is None:
+                draw = self.drawing(case)
+                _LAST[:] = [*_LAST[1 - MAX_PREPARED :], (type(self), case, draw)]
+        return draw(first, count)
+
+    @abstractmethod
+    def tracker(self, case: "Case") -> Tracker:
+        """The filters of a case before their first plot."""
+
+    def likelihood(
+        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
+    ) -> "Likelihood | None":
+        """The likelihood of tracks, columns (n,) each, under a filter, by default that which uses most of a plot.
+
+        Default: not known; `radarsim fit` refuses its configs."""
+        return None
+
+    def span_mps(self, spec: Any) -> float | None:
+        """The span of unambiguous velocities of a config's radar, m/s; None, the default, if it is not stated."""
+        return None
+
+    def unfolding(self, spec: Any, span_mps: float) -> Sequence[str]:
+        """The settings `KEY=VALUE` by which a config allows for velocities folded by this span; none by default."""
+        return ()
+
+    def unfolds(self, filter_keys: Any = None) -> bool:
+        """Whether a filter, by default any filter of the study, unfolds velocities. Default: no."""
+        return False
+
+    def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "TurnError | None":
+        """The largest error of a filter in a turn, as stated and with other values of its keys. Default: not known."""
+        return None
+
+
+_LOCK, _LAST = RLock(), list[tuple[type[RecordingInterface], "Case", DrawPlots]]()
+
+
+def _one_by_one(plots: RecordingInterface, case: "Case", first: int, count: int) -> SimulatedPlots:
+    """The plots of a study that has only `simulated`."""
+    import numpy as np
+
+    simulated = [plots.simulated(case, i) for i in range(first, first + count)]
+    t_s = simulated[0]["t_s"]
+    if not all(np.array_equal(arrays["t_s"], t_s) for arrays in simulated) or not (np.diff(t_s) > 0).all():
+        raise ConfigError(f"study {case.study}: has plots of several realisations only if its `drawing` gives them")
+    columns = {name: np.stack([arrays[name] for arrays in simulated]) for name in simulated[0] if name != "t_s"}
+    true_columns = {name: column for name, column in columns.items() if name.startswith(TRUTH_PREFIX)}
+    units = {short: unit for unit, short in UNITS_IN_NAMES.items()}
+    name_parts = [name.removeprefix(TRUTH_PREFIX).rpartition("_") for name in true_columns]
+    components = tuple((name, units.get(unit, unit)) for name, _, unit in name_parts)
+    measured = {name: column for name, column in columns.items() if name not in true_columns}
+    return SimulatedPlots(t_s, measured, components, np.stack([*true_columns.values()], axis=-1), first=first)

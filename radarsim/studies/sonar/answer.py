@@ -1,0 +1,146 @@
+"""Question and answer of the report on smoothed plots."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from radarsim.engine.results import CaseResult
+from radarsim.language.translate import shorten_names, tr
+from radarsim.report import case_selection, consistency_tables, key_labels, sentences, tables, wording
+from radarsim.report.sentences import Sentence
+from radarsim.studies.sonar.axes import SonarAxes
+from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
+from radarsim.studies.sonar.config import Keys
+from radarsim.studies.sonar.sensor_keys import coordinate_correlation
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+SIGMA_DECIMALS, EQUAL_RATIOS = 9, 1e-9  # to which filters are of equal accuracy
+MIN_OPTIMISM = 1.05  # true over believed σ, by the interval, from which a filter is called optimistic
+
+
+def question(specs: Sequence[Keys]) -> str:
+    """The question of cases whose filters know their plots."""
+    if any(spec.frame != "polar" for spec in specs):
+        return tr(
+            "What does it cost to convert range and bearing to x and y, and when does the conversion's bias matter?"
+        )
+    if _has_correlated_errors(specs):
+        return tr("What does it cost to ignore that the errors of neighbouring plots are correlated?")
+    if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
+        return tr("What does a missed plot cost?")
+    names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
+    return tr("How accurate are range and bearing smoothed by {filters}?", filters=shorten_names(names))
+
+
+def _has_correlated_errors(specs: Sequence[Keys]) -> bool:
+    return any(coordinate_correlation(spec.sensor.error_correlation, c) for spec in specs for c in range(3))
+
+
+def answer(results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
+    """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter.
+
+    First what the question is about: the bias of the conversion, or what correlated errors do to a filter's own σ."""
+    reported, remark = case_selection.select_reported(results)
+    sigma = [_final_sigma(result, tables_by_name["curves"]) for result in reported]
+    optimistic = _most_optimistic(results, tables_by_name)
+    if _has_correlated_errors([result.spec for result in results]):
+        return [*optimistic, *sigma, *map(Sentence, remark)]
+    return [*_bias_of_conversion(results, tables_by_name), *sigma, *optimistic, *map(Sentence, remark)]
+
+
+def _bias_of_conversion(
+    results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
+) -> list[Sentence]:
+    """The largest bias of plots that are converted plainly, and of unbiased ones; none if none are plain."""
+    if "conversion" not in tables_by_name:
+        return []
+    conversion = tables_by_name["conversion"]
+    worst = {
+        str(frame): rows.iloc[int(rows["bias_m"].abs().to_numpy().argmax())]
+        for frame, rows in conversion.groupby("frame", sort=False)
+    }
+    if "cartesian" not in worst:
+        return []
+    text = tr(
+        "Largest bias of a plot along the line of sight, converted plainly: {bias}, {ratio} σ of the range ({case})",
+        **_bias_fields(results, worst["cartesian"]),
+    )
+    rows = [worst["cartesian"]]
+    if "cartesian_unbiased" in worst:
+        rows.append(worst["cartesian_unbiased"])
+        text += "; " + tr("converted without bias: {bias}, {ratio} σ ({case})", **_bias_fields(results, rows[-1]))
+    return [Sentence(f"{text}.", sentences.intervals("conversion", "bias", *rows))]
+
+
+def _bias_fields(results: Sequence[CaseResult[SonarAxes]], row: "pd.Series[Any]") -> dict[str, str]:
+    result = next(result for result in results if result.name == row["case"])
+    return {
+        "bias": wording.estimate((row[key] for key in ("bias_m", "bias_lo", "bias_hi")), tr("m"), ".3g"),
+        "ratio": wording.number(float(row["bias_to_sigma_range"]), 3),
+        "case": key_labels.without_markup(
+            key_labels.swept_description(result, without=["frame"]) or key_labels.config_device(result)
+        ),
+    }
+
+
+def _final_sigma(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> Sentence:
+    """The filters with the least and the largest σ at the end of a case."""
+    component = result.axes.components[0][0]
+    rows = tables.select_rows(curves, case=result.name, component=component)
+    final = rows[rows["k"] == rows["k"].max()]
+    # By exact values where all are known, so that filters of equal accuracy are not ranked by their noise.
+    order = final["exact_sigma"] if final["exact_sigma"].notna().all() else final["sigma"]
+    order = order.round(SIGMA_DECIMALS)
+    lowest, highest = (final.loc[order == extreme] for extreme in (order.min(), order.max()))
+    fields = {
+        "quantity": COMPONENTS_BY_NAME[component].words,
+        "t_s": final["t_s"].iloc[0],
+        "least": _filters_and_sigma(lowest),
+        "most": _filters_and_sigma(highest),
+    }
+    if order.nunique() > 1:
+        text = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **fields)
+    else:
+        text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)
+    return Sentence(
+        case_selection.after_swept_values(result, text),
+        sentences.intervals("curves", "sigma", lowest.iloc[0], highest.iloc[0]),
+    )
+
+
+def _filters_and_sigma(rows: "pd.DataFrame") -> str:
+    """Filters of equal σ, and it with the interval."""
+    row = rows.iloc[0]
+    sigma = wording.estimate(
+        (row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), key_labels.unit_label(row["unit"])
+    )
+    return f"{shorten_names(list(rows['filter']))}, {sigma}"
+
+
+def _most_optimistic(
+    results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
+) -> list[Sentence]:
+    """The filters, of complete state, that overestimate their accuracy the most; none if no filter does."""
+    curves = tables_by_name["curves"]
+    curves = curves[curves["case"].isin([result.name for result in results])]
+    complete = set(tables_by_name["consistency"][["case", "filter", "k"]].itertuples(index=False, name=None))
+    curves = curves[[key in complete for key in curves[["case", "filter", "k"]].itertuples(index=False, name=None)]]
+    ratio = consistency_tables.sigma_over_believed(curves)
+    curves = curves.assign(ratio=ratio.value, ratio_lo=ratio.lo, ratio_hi=ratio.hi)
+    worst = curves.iloc[int(curves["ratio"].argmax())]
+    if worst["ratio_lo"] <= MIN_OPTIMISM:
+        return []
+    result = next(result for result in results if result.name == worst["case"])
+    filters = tables.select_rows(curves, case=worst["case"], component=worst["component"], k=worst["k"])
+    equal = shorten_names(list(filters["filter"][(filters["ratio"] - worst["ratio"]).abs() < EQUAL_RATIOS]))
+    swept = key_labels.without_markup(key_labels.swept_description(result))
+    text = tr(
+        "Most optimistic: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan {k}).",
+        filter=f"{equal} ({swept})" if swept else equal,
+        ratio=wording.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
+        quantity=COMPONENTS_BY_NAME[worst["component"]].words,
+        k=worst["k"],
+    )
+    return [Sentence(text, sentences.intervals("curves", "sigma", worst))]

@@ -1,0 +1,137 @@
+"""Question and answer of the report on tracks among false plots."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.engine.results import CaseResult
+from radarsim.language.translate import tr
+from radarsim.report import key_labels, rare_events, sentences, tables, wording
+from radarsim.report.sentences import Sentence
+from radarsim.studies.sonar.clutter.axes import ClutterAxes
+from radarsim.studies.sonar.clutter.tables import ENDED_TRACK_EVENT, FALSE_TRACK_EVENT
+from radarsim.studies.sonar.config import Keys
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def question(specs: Sequence[Keys]) -> str:
+    """The question of cases whose filters have to find their plots."""
+    return tr(
+        "How reliably and how soon is a target's track confirmed among false and missed plots, how long "
+        "is it kept, and how many false tracks does that cost?"
+    )
+
+
+def answer(results: Sequence[CaseResult[ClutterAxes]], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
+    """Of the case in which tracks end most often: the tracker that keeps them longest, the others, what is rare.
+
+    Of each: the time to a confirmed track, track life, false tracks per hour."""
+    events = tables_by_name.get("rare")
+    ranked = _ranked_trackers(tables_by_name["tracking"], events)
+    case_name = ranked.groupby("case", sort=False)["ends"].min().idxmax()
+    result = next(result for result in results if result.name == case_name)
+    sought = None if events is None else events[(events["case"] == case_name) & events["sought"]]
+    longest, *other_trackers = (
+        _tracker_clause(row, sought) for _, row in tables.select_rows(ranked, case=case_name).iterrows()
+    )
+    case = key_labels.without_markup(key_labels.swept_description(result)) or key_labels.plain_case_label(result)
+    text = tr("Longest track life: {tracker}.", tracker=longest.text)
+    if len(results) > 1:
+        text = tr("Longest track life in the hardest case, {case}: {tracker}.", case=case, tracker=longest.text)
+    answer = [longest.with_text(text)]
+    if other_trackers:
+        clauses = sentences.join("; ", other_trackers)
+        answer.append(clauses.with_text(tr("The others there: {trackers}.", trackers=clauses.text)))
+    for event, make_sentence in ((FALSE_TRACK_EVENT, _false_tracks_sought), (ENDED_TRACK_EVENT, _ended_tracks_sought)):
+        if sought is not None and (sought["event"] == event).any():
+            answer.append(make_sentence(sought[sought["event"] == event]))
+    return answer
+
+
+def _ranked_trackers(tracking: "pd.DataFrame", events: "pd.DataFrame | None") -> "pd.DataFrame":
+    """The rows of `tracking` by how often tracks end, which `ends` gives, then by false tracks.
+
+    Ends by importance sampling where they are known of every tracker."""
+    ends = tracking["ends_per_hour"].fillna(np.inf)
+    if events is not None:
+        ended = events[events["sought"] & (events["event"] == ENDED_TRACK_EVENT)]
+        rates = tracking.merge(ended[["case", "filter", "rate"]], "left", ["case", "filter"])["rate"]
+        ends = ends if rates.isna().any() else rates
+    return tracking.assign(ends=ends).sort_values(["ends", "false_tracks_per_hour"], kind="stable")
+
+
+def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
+    """How surely and how soon a tracker confirms a track, how long it keeps it, and its false tracks."""
+    if not row["confirmed"]:
+        return Sentence(tr("{filter} confirms no track", filter=row["filter"]))
+    life = _life_clause(row, sought)
+    text = tr(
+        "{filter} confirms {confirmed} after {time} on average, {life}, {rate} false tracks per hour",
+        filter=row["filter"],
+        confirmed=wording.share(*(100 * row[key] for key in ("confirmed", "confirmed_lo", "confirmed_hi"))),
+        time=_estimate(row, "time_to_confirm_s", "time", tr("s")),
+        life=life.text,
+        rate=_estimate(row, "false_tracks_per_hour", "false"),
+    )
+    intervals = (interval for name in ("confirmed", "time", "false") for interval in _tracking_interval(row, name))
+    return Sentence(text, (*intervals, *life.intervals))
+
+
+def _tracking_interval(row: "pd.Series[Any]", name: str) -> tuple[sentences.MeasuredInterval, ...]:
+    return sentences.intervals("tracking", name, row)
+
+
+def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
+    """How long a tracker keeps a track; where ends were sought, how many tracks have ended by the last scan."""
+    if sought is not None:
+        ended = sought[(sought["filter"] == row["filter"]) & (sought["event"] == ENDED_TRACK_EVENT)]
+        if len(ended):
+            rates = (100 * ended.iloc[0][key] for key in ("rate", "rate_lo", "rate_hi"))
+            share = wording.estimate(rates, "%", ".2g")
+            text = tr("of its tracks {share} ended by the last scan", share=share)
+            return Sentence(text, sentences.intervals("rare", "rate", ended.iloc[0]))
+    if not row["ends_per_hour"]:
+        return Sentence(tr("no track lost"))
+    text = tr("life {life}", life=_estimate(row, "life_s", "life", tr("s")))
+    return Sentence(text, _tracking_interval(row, "life"))
+
+
+def _estimate(row: "pd.Series[Any]", column: str, interval: str, unit: str = "") -> str:
+    """The value of a column with its interval, to three digits."""
+    values = (float(f"{row[key]:.3g}") for key in (column, f"{interval}_lo", f"{interval}_hi"))
+    return wording.estimate(values, unit, ",.10g")
+
+
+def _false_tracks_sought(rows: "pd.DataFrame") -> Sentence:
+    """The events from which importance sampling has the rates of false tracks, by tracker."""
+    trackers = (
+        tr(
+            "{filter}, {events:,} of them, {n_eff:,.0f} effective",
+            filter=row["filter"],
+            events=row["events"],
+            n_eff=row["n_eff"],
+        )
+        for _, row in rows.iterrows()
+    )
+    return Sentence(tr("False tracks are drawn by importance sampling: {found}.", found="; ".join(trackers)))
+
+
+def _ended_tracks_sought(rows: "pd.DataFrame") -> Sentence:
+    """How rarely the target's track ends by importance sampling, and from how many events, by tracker."""
+    trackers = (
+        tr(
+            "{filter}, {rate:.3g} [{low:.3g}, {high:.3g}] from {events:,} of them, {n_eff:,.0f} effective",
+            filter=row["filter"],
+            **rare_events.rate_fields(row),
+        )
+        for _, row in rows.iterrows()
+    )
+    text = tr(
+        "The probability that the target's first confirmed track has ended by the last scan, by importance sampling: "
+        "{found}.",
+        found="; ".join(trackers),
+    )
+    return Sentence(text, sentences.intervals("rare", "rate", rows))

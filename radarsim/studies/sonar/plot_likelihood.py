@@ -1,0 +1,160 @@
+"""The likelihood of recorded sonar plots under a filter."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
+from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, usual_interval_s
+from radarsim.studies.sonar import conversion
+from radarsim.studies.sonar.scene import lateral_scale, third_coordinate
+from radarsim.studies.sonar.tracking import BEARING, RANGE, THIRD_COLUMN_AND_KEY, unwrap_bearings
+
+MODELLED_KINDS = ("growing_memory", "kalman")  # kinds that model the target's motion and white errors
+STARTING_PLOTS = 3  # complete plots from which the likelihood determines the state of a track
+WIDE_RATE_SIGMAS = 1e3  # σ of a plot by which a rate may differ, in an interval, from that of the first two plots
+MIN_SIGMA_SHARE = 1e-4  # of a configured σ: less counts as zero
+MIN_MANOEUVRE_SHARE = 1e-8  # of the variance that moves a target by a σ of a plot: less counts as zero
+
+
+class PlotLikelihood:
+    """The likelihood of tracks under a filter's model.
+
+    A polynomial of the filter's degree in each coordinate, whose next derivative is random, and independent errors of
+    range, bearing and a third coordinate. The state before the first complete plot is taken as unknown."""
+
+    def __init__(self, case: Case, number: int, tracks: Sequence[Mapping[str, np.ndarray]]):
+        self.spec: Any = case.spec
+        # Errors that last are of range and bearing, which in other frames are not measured along one direction each.
+        self.explains: tuple[str, ...] = (OUTLIERS, CORRELATION) if self.spec.frame == "polar" else (OUTLIERS,)
+        member, scale = self.spec.filters[number], lateral_scale(self.spec, 2)
+        self.filter, self.tracks, self.size = member.name, len(tracks), member.degree + 1
+        self.rows, self.usual_s = sum(len(columns["t_s"]) for columns in tracks), usual_interval_s(tracks)
+        sensor = self.spec.sensor
+        third, third_sigma = third_coordinate(sensor)
+        sigma = {RANGE: sensor.sigma_range_m, BEARING: sensor.sigma_bearing_rad}
+        sigma |= {THIRD_COLUMN_AND_KEY[third][1]: third_sigma} if third else {}
+        self.coordinates = len(sigma)
+        configured = list(sigma.values())
+        smallest = [MIN_SIGMA_SHARE * configured_sigma for configured_sigma in sigma.values()]
+        names = list(sigma)
+        if member.kind == "kalman":
+            names.append(f"filters.{number}.manoeuvre_variance")
+            configured.append(member.manoeuvre_variance or 0.0)
+            smallest.append(MIN_MANOEUVRE_SHARE * (sensor.sigma_range_m / sensor.scan_period_s**self.size) ** 2)
+        self.keys, self.stated, self.least = tuple(names), np.array(configured), np.array(smallest)
+        problems = (self._problem(list(columns.values()), scale) for columns in tracks)
+        self.problems = [problem for problem in problems if problem is not None]
+
+    def _problem(self, columns: Sequence[np.ndarray], scale: np.ndarray) -> "_TrackProblem | None":
+        """A track from its first complete plot on; None if it has none."""
+        t, *values = columns
+        is_whole = np.isfinite(np.stack(values)).all(axis=0)
+        if not is_whole.any():
+            return None
+        first, C, size = int(is_whole.argmax()), self.coordinates, self.size
+        t, z = t[first:], np.stack(values)[:, first:]
+        z[1] = unwrap_bearings(z[1])
+        is_used = np.isfinite(z).T.copy()
+        if self.spec.frame != "polar":
+            is_used[:, :2] = is_used[:, :2].all(axis=1, keepdims=True)
+        steps = np.diff(t, prepend=t[0])
+        eye = np.eye(C)
+        F = np.stack([np.kron(eye, transition(step, size)) for step in steps])
+        Q = np.stack([np.kron(np.diag(scale), manoeuvre_covariance(1.0, step, size)) for step in steps])
+        settled = int(np.searchsorted(np.cumsum(is_whole[first:]), STARTING_PLOTS, side="right"))
+        usual_interval_s = float(np.median(steps[1:])) if len(steps) > 1 else self.spec.sensor.scan_period_s
+        rates = WIDE_RATE_SIGMAS * usual_interval_s ** -np.arange(1.0, size)
+        is_used[0] = False  # it starts the track
+        second_whole = int(is_whole[first + 1 :].argmax()) + 1 if is_whole[first + 1 :].any() else 0
+        problem = _TrackProblem(F, Q, np.where(np.isfinite(z), z, 0.0), is_used, t - t[0], rates, second_whole, settled)
+        _, directions, variance = self._numbers(problem, self.stated[:C])  # the stated errors, whatever is tried
+        position_sigma = np.sqrt(np.diag(directions[0].T @ np.diag(variance[0]) @ directions[0]))
+        return problem._replace(rates=np.outer(rates, position_sigma))
+
+    def _numbers(self, problem: "_TrackProblem", sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions (n, C) in the frame of the filters, independent directions, and variances (n, C) along these.
+
+        The directions (n, C, C) are rows."""
+        n, C = problem.is_used.shape
+        directions, variance = np.tile(np.eye(C), (n, 1, 1)), np.tile(sigma**2, (n, 1))
+        positions = problem.z.T.copy()
+        if self.spec.frame != "polar":
+            convert = conversion.convert_plainly if self.spec.frame == "cartesian" else conversion.convert_unbiased
+            x, y, _ = convert(*problem.z[:2], *sigma[:2])
+            is_plain = self.spec.frame == "cartesian"
+            weighting = problem.z[:2] if is_plain else conversion.weighting_positions(*problem.z[:2])
+            xx, xy, yy = convert(*weighting, *sigma[:2])[2]
+            values, vectors = np.linalg.eigh(np.stack([xx, xy, xy, yy], axis=1).reshape(n, 2, 2))
+            positions[:, 0], positions[:, 1] = x, y
+            variance[:, :2], directions[:, :2, :2] = np.maximum(values, 0.0), np.swapaxes(vectors, 1, 2)
+        return positions, directions, variance
+
+    def _score(self, values: np.ndarray, outliers: float, correlation: float = 0.0) -> float:
+        sigma, C, size = values[: self.coordinates], self.coordinates, self.size
+        manoeuvre, total = float(values[C]) if len(values) > C else 0.0, 0.0
+        for problem in self.problems:
+            positions, directions, variance = self._numbers(problem, sigma)
+            H = np.zeros((*directions.shape[:2], C * size))
+            H[:, :, ::size] = directions
+            z = np.einsum("nij,nj->ni", directions, positions)
+            x, P = np.zeros(C * size), np.zeros((C * size, C * size))
+            x[::size] = positions[0]
+            if problem.second_whole:
+                x[1::size] = (positions[problem.second_whole] - positions[0]) / problem.t[problem.second_whole]
+            start = directions[0].T @ np.diag(variance[0]) @ directions[0]
+            P[::size, ::size] = start
+            for i, rate in enumerate(problem.rates, start=1):
+                P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
+            model, scale, white = (x, P, problem.F, problem.Q, H), manoeuvre, 1.0
+            if correlation:
+                error_loading = np.zeros((C * size, C))
+                coordinates = np.arange(C)
+                error_loading[coordinates * size, coordinates] = -sigma
+                shares = correlation ** (np.diff(problem.t, prepend=0.0) / self.usual_s)
+                model = with_lasting_errors(x, P, error_loading, problem.F, manoeuvre * problem.Q, H, variance, shares)
+                scale, white = 1.0, 0.0
+            score = np.empty(z.shape)
+            log_likelihood(*model, z, variance, problem.is_used, scale, outliers, white, score)
+            total += float(score[problem.settled :].sum())
+        return total
+
+    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+        """The logarithm of the likelihood; a bias is not part of the model."""
+        return self._score(values, outliers, correlation)
+
+    def by_number(self, values: np.ndarray) -> dict[str, float]:
+        """The logarithm of the likelihood of complete plots: their numbers are not independent in every frame."""
+        return {"plot": self._score(values, 0.0)}
+
+
+class _TrackProblem(NamedTuple):
+    """A recorded track as the kernel needs it, from its first complete plot on."""
+
+    F: np.ndarray  #: (n, d, d) transitions
+    Q: np.ndarray  #: (n, d, d) process noise of unit variance
+    z: np.ndarray  #: (C, n) values as measured
+    is_used: np.ndarray  #: (n, C) which values update the state
+    t: np.ndarray  #: (n,) from the first plot
+    rates: np.ndarray  #: (size - 1, C) σ of the rates of each order before the first plot
+    second_whole: int  #: row of the second complete plot, 0 if there is none
+    settled: int  #: row from which the state is known
+
+
+def likelihood(
+    case: Case, filter_name: str | None, tracks: Sequence[Mapping[str, np.ndarray]]
+) -> PlotLikelihood | None:
+    """The likelihood of tracks under a filter; without a name, under the first Kalman filter with a manoeuvre variance.
+
+    Without such a filter, under the first one that models the target. None if the filter does not model it."""
+    members = case.spec.filters
+    candidates = [i for i, member in enumerate(members) if member.kind in MODELLED_KINDS and member.association is None]
+    if filter_name is None:
+        kalman = [i for i in candidates if members[i].kind == "kalman" and members[i].manoeuvre_variance]
+        candidates = [*kalman, *candidates][:1]
+    else:
+        candidates = [i for i in candidates if members[i].name == filter_name]
+    return PlotLikelihood(case, candidates[0], tracks) if candidates else None

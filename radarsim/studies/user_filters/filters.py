@@ -1,0 +1,187 @@
+"""User filters: an object, a function or arrays that give estimates for plots.
+
+A filter is an object (or a class, made anew for every batch) with
+
+    start(world)                   before the first scan: `World`
+    step(plots) -> estimate        one scan of n realisations: `Plots`, columns (n,); estimate (n, d), or
+                                   (estimate, covariance (n, d, d))
+
+or a function of all scans, `f(plots) -> estimates (n, K, d)`, or `(estimates, covariances (n, K, d, d))`, columns (n,
+K); or one of a single realisation, columns (K,), estimates (K, d). An estimate holds the leading components of the
+state, or those that the attribute `components` names. Not-a-number stands where a filter has no estimate yet.
+
+`World` and `Plots` are those of `radarsim.studies.plot_arrays` and of this file."""
+
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.errors import ConfigError
+from radarsim.studies.plot_arrays import World, plot_column
+from radarsim.studies.user_filters.estimates import (
+    Estimates,
+    check_estimates,
+    components_of,
+    copy_estimates,
+    stack_estimates,
+)
+
+
+@dataclass(frozen=True)
+class Plots:
+    """Plots of n realisations from number `first` on, not-a-number where missing: `plots["range_m"]`, (n, K). Of one
+    scan these are (n,), and t_s is its time; of one realisation (K,)."""
+
+    t_s: Any
+    columns: Mapping[str, np.ndarray]
+    world: World
+    first: int
+    n: int
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return plot_column(self.columns, name)
+
+
+class UserFilter(ABC):
+    """A user filter. identity: what its numbers depend on besides the plots; components: names of those it estimates,
+    by default the leading ones. in_order: realisations must be computed in their order, by one thread."""
+
+    name: str
+    identity: str
+    components: tuple[str, ...] = ()
+    in_order: bool = False
+    written: Mapping[str, Any] | None = None  #: its keys, where a config has it
+    baseline: bool = False  #: whether gains of the others are against it too
+    judged_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
+
+    @abstractmethod
+    def estimates(self, plots: Plots) -> Any:
+        """The estimates for these plots."""
+
+    def bound_to(self, case: Case) -> "UserFilter":
+        """The filter as one of a case."""
+        return self
+
+    def warnings(self) -> list[str]:
+        """Warnings about its numbers, from what has run so far."""
+        return []
+
+
+@dataclass
+class CalledFilter(UserFilter):
+    """An object, class or function that is called with plots, by one thread at a time.
+
+    alone: it is a function of one realisation."""
+
+    name: str
+    target: Any
+    identity: str = ""
+    components: tuple[str, ...] = ()
+    alone: bool = False
+    _lock: Any = field(default_factory=threading.Lock, repr=False)
+
+    def estimates(self, plots: Plots) -> Any:
+        with self._lock, np.errstate():  # which the code may change
+            target = self.target
+            if hasattr(target, "step") or hasattr(target, "start"):
+                instance = build_filter(self.name, target) if isinstance(target, type) else target
+                if not (hasattr(instance, "step") and hasattr(instance, "start")):
+                    raise ConfigError(
+                        f"{self.name}: a filter that is asked scan by scan must have start(world) and step(plots)"
+                    )
+                return run_steps(self.name, instance, plots)
+            if not self.alone:
+                return target(plots)
+            answers = [copy_estimates(target(plots_of_realisation(plots, i))) for i in range(plots.n)]
+            return stack_estimates(
+                self.name, answers, [f"realisation {plots.first + i}" for i in range(plots.n)], axis=0
+            )
+
+
+def plots_of_realisation(plots: Plots, i: int) -> Plots:
+    """The plots of one realisation alone."""
+    return replace(plots, columns={name: v[i] for name, v in plots.columns.items()}, first=plots.first + i, n=1)
+
+
+def build_filter(name: str, target: type, **keys: Any) -> Any:
+    """An object of a filter's class."""
+    instance = target(**keys)
+    if components_of(instance) != components_of(target):
+        raise ConfigError(f"{name}: components must be an attribute of the class itself, not of its objects")
+    return instance
+
+
+def run_steps(name: str, target: Any, plots: Plots) -> Any:
+    """The estimates of a filter that is called scan by scan."""
+    target.start(plots.world)
+    estimates = []
+    for k, t in enumerate(plots.t_s):
+        columns = {column: np.ascontiguousarray(v[:, k]) for column, v in plots.columns.items()}
+        answer = target.step(replace(plots, t_s=float(t), columns=columns))
+        estimates.append(copy_estimates(answer))
+        if (shape := estimates[-1][0].shape)[:1] != (plots.n,):
+            got = f"shape {shape}" if shape else type(answer).__name__
+            raise ConfigError(f"{name}: step must give estimates (n, d) of n = {plots.n} realisations, got {got}")
+    return stack_estimates(name, estimates, [f"{t:g} s" for t in plots.t_s], axis=1)
+
+
+@dataclass
+class StoredEstimates(UserFilter):
+    """Estimates that are there already, of realisations 0, 1, 2, …"""
+
+    name: str
+    arrays: Estimates
+    identity: str = ""
+    components: tuple[str, ...] = ()
+
+    def estimates(self, plots: Plots) -> Estimates:
+        rows = slice(plots.first, plots.first + plots.n)
+        x, P = self.arrays
+        return x[rows], None if P is None else P[rows]
+
+
+@dataclass
+class EstimateChunks(UserFilter):
+    """Estimates that an iterator gives, chunk by chunk, of realisations 0, 1, 2, …; those of a block are kept."""
+
+    name: str
+    source: Iterator[Any]
+    identity: str = ""
+    components: tuple[str, ...] = ()
+    in_order = True
+    _first: int = 0
+    _kept: list[Estimates] = field(default_factory=list)
+
+    def estimates(self, plots: Plots) -> Estimates:
+        start, stop = plots.first, plots.first + plots.n
+        while self._kept and self._first + len(self._kept[0][0]) <= start:
+            self._first += len(self._kept.pop(0)[0])
+        while (available := self._first + sum(len(x) for x, _ in self._kept)) < stop:
+            chunk = next(self.source, None)
+            if chunk is None:
+                takes = f"; realisations={available} takes these" if available else ""
+                raise ConfigError(f"{self.name}: must give {stop} realisations, ended after {available}{takes}")
+            self._kept.append(self._chunk(chunk, plots))
+        rows = slice(start - self._first, stop - self._first)
+        x = np.concatenate([x for x, _ in self._kept])
+        if all(P is None for _, P in self._kept):
+            return x[rows], None
+        covariances = [np.full((*x.shape, x.shape[2]), np.nan) if P is None else P for x, P in self._kept]
+        return x[rows], np.concatenate(covariances)[rows]
+
+    def _chunk(self, answer: Any, plots: Plots) -> Estimates:
+        """A chunk's estimates (n, K, d) and covariances, in arrays of their own."""
+        x, P = copy_estimates(answer)
+        names = [name for name, _ in plots.world.components]
+        shape = check_estimates(self.name, (x, P), len(x) if x.ndim else 0, len(plots.t_s), names, self.components)[
+            0
+        ].shape
+        if self._kept and shape[2] != self._kept[0][0].shape[2]:
+            raise ConfigError(f"{self.name}: chunks must hold the same components, got {self._kept[0][0].shape[2]} "
+                              f"and then {shape[2]}")  # fmt: skip
+        return x.reshape(shape), P

@@ -1,0 +1,478 @@
+"""How likely recorded plots are under the filters of each study, against textbook twins; and what is fitted by it."""
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal as normal
+
+from radarsim.api.load_experiments import load_all
+from radarsim.kernels.likelihood import OUTLIER_FACTOR, log_likelihood, with_lasting_errors
+from radarsim.physics import frames
+from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.recordings import simulate_plots
+from radarsim.recordings.fit import advice, fit
+from radarsim.recordings.study_part import recording_interface
+from radarsim.studies.multimodel.model_bank import start_weights
+from radarsim.studies.sonar import conversion
+from tests.tolerances import Z, assert_rounded, polynomial_condition, rounding, scaled_condition
+
+
+def loaded(config, *overrides):
+    (one,) = load_all([config], overrides)
+    return one.cases[0]
+
+
+def recording(config, *overrides, number=0):
+    """The measured columns of a realisation."""
+    (one,) = load_all([config], overrides)
+    columns = simulate_plots.simulate_realisation(one, number)
+    return {name: column for name, column in columns.items() if not name.startswith("true_")}
+
+
+def likelihood(case, name, *tracks):
+    return recording_interface(case).likelihood(case, name, list(tracks))
+
+
+def density_size(off, spread):
+    """What a change of a covariance, relative in its own units, changes a normal density's logarithm by, at most: n of
+    the determinant's, and the quadratic form; each times κ."""
+    return scaled_condition(spread) * (len(off) + off @ np.linalg.solve(spread, off))
+
+
+# ---- the kernel ------------------------------------------------------------------------------------------------------
+
+
+def test_the_kernel_is_the_density_of_all_numbers_together():
+    """By the joint normal density of everything that is measured, without a filter."""
+    rng, n = np.random.default_rng(1), 6
+    F, q = np.tile(transition(2.0, 2), (n, 1, 1)), 0.3
+    Q = np.tile(manoeuvre_covariance(1.0, 2.0, 2), (n, 1, 1))
+    H, variance = rng.normal(size=(n, 2, 2)), rng.uniform(0.5, 2, (n, 2))
+    z, there = rng.normal(size=(n, 2)), rng.random((n, 2)) < 0.7
+    x, P = rng.normal(size=2), np.diag([2.0, 0.5])
+    means, states = [x], [[P]]  # states[j][i]: covariance of the states at rows i and j
+    for k in range(1, n):
+        means.append(F[k] @ means[-1])
+        states.append([states[-1][i] @ F[k].T for i in range(k)])
+        states[-1].append(F[k] @ states[k - 1][k - 1] @ F[k].T + q * Q[k])
+    whole = np.block([[states[max(i, j)][min(i, j)] if i <= j else states[i][j].T for j in range(n)] for i in range(n)])
+    rows = np.zeros((2 * n, 2 * n))
+    for k in range(n):
+        rows[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = H[k]
+    chosen = there.ravel()
+    spread = (rows @ whole @ rows.T + np.diag(variance.ravel()))[np.ix_(chosen, chosen)]
+    off = (z.ravel() - rows @ np.concatenate(means))[chosen]
+    expected = normal.logpdf(off, cov=spread)
+    score = np.empty((n, 2))
+    log_likelihood(x.copy(), P.copy(), F, Q, H, z, variance, there, q, 0.0, 1.0, score)
+    assert_rounded(score.sum(), expected, density_size(off, spread), operations=len(off))
+    assert np.all(score[~there] == 0)
+
+
+def test_nothing_known_before_the_first_plot_costs_no_digits():
+    """Against the same steps in extended precision, each P made symmetric: of 2000 numbers a part in 10⁸ of one. Wide
+    variances of the start cancel, and what two halves of P differ by would grow from row to row."""
+    n, T, q, variance = 1000, 10.0, 1e-3, np.array([250.0**2, 15.0**2])
+    rng, real = np.random.default_rng(2), np.longdouble
+    F, Q = transition(T), manoeuvre_covariance(1.0, T)
+    z = np.stack([2e6 + 250.0 * T * np.arange(n), np.full(n, 250.0)], axis=1) + rng.normal(size=(n, 2)) * variance**0.5
+    wide = np.diag([variance[0], 9e8, 9e6])
+    x, P, expected, size = np.array([z[0, 0], 0, 0], dtype=real), wide.astype(real), real(0), 0.0
+    for k in range(1, n):
+        x, P = F.astype(real) @ x, F.astype(real) @ P @ F.T.astype(real) + real(q) * Q.astype(real)
+        for j in range(2):
+            p, S, e = P[:, j], P[j, j] + variance[j], z[k, j] - x[j]
+            expected -= (np.log(2 * np.pi * S) + e * e / S) / 2
+            size += float(np.abs(e * z[k, j]) / S)  # the innovation is a difference of numbers of that size
+            x, P = x + p * e / S, P - np.outer(p, p) / S
+            P = (P + P.T) / 2
+    there, score = np.ones((n, 2), dtype=bool), np.empty((n, 2))
+    there[0] = False
+    rows = np.tile(np.eye(3)[:2], (n, 1, 1)), z, np.tile(variance, (n, 1)), there
+    start = np.array([z[0, 0], 0.0, 0.0]), wide
+    log_likelihood(*start, np.tile(F, (n, 1, 1)), np.tile(Q, (n, 1, 1)), *rows, q, 0.0, 1.0, score)
+    assert_rounded(score.sum(), float(expected), size)
+
+
+def test_errors_that_last_have_the_density_of_their_correlations():
+    """By the joint normal density, without a filter: of errors whose correlation falls as a power of the time, at
+    uneven times, some numbers missing; the state at the first row is known by a plot whose error it has."""
+    rng, n, d, m, rho, q = np.random.default_rng(3), 6, 2, 2, 0.6, 0.3
+    t = np.array([0.0, 1.0, 2.0, 4.5, 5.0, 6.0])
+    steps = np.diff(t, prepend=0.0)
+    F = np.stack([transition(step, d) for step in steps])
+    Q = np.stack([manoeuvre_covariance(1.0, step, d) for step in steps])
+    H, sigma = rng.normal(size=(n, m, d)), np.array([1.5, 0.7])
+    z, there = rng.normal(size=(n, m)), rng.random((n, m)) < 0.8
+    x, P, first = rng.normal(size=d), np.diag([2.0, 0.5]), np.array([[-1.0, 0.0], [0.0, 0.1]])
+    of_states, moved, own = np.zeros((n, d, n, d)), [np.eye(d)], [P]
+    for k in range(1, n):
+        moved.append(F[k] @ moved[-1])
+        own.append(F[k] @ own[-1] @ F[k].T + q * Q[k])
+    for i in range(n):
+        for j in range(i, n):
+            of_states[j, :, i] = moved[j] @ np.linalg.inv(moved[i]) @ own[i]
+            of_states[i, :, j] = of_states[j, :, i].T
+    errors = rho ** np.abs(t[:, None] - t)[:, None, :, None] * np.diag(sigma**2)[None, :, None]
+    crossed = np.einsum("iab,bc,j->iajc", np.stack(moved), first * sigma, rho**t)
+    whole = np.einsum("iad,idje,jbe->iajb", H, of_states, H) + errors
+    whole += (both := np.einsum("iad,idjb->iajb", H, crossed)) + both.transpose(2, 3, 0, 1)
+    chosen, size = there.ravel(), n * m
+    means = np.concatenate([H[k] @ moved[k] @ x for k in range(n)])[chosen]
+    off, spread = z.ravel()[chosen] - means, whole.reshape(size, size)[np.ix_(chosen, chosen)]
+    expected = normal.logpdf(off, cov=spread)
+    variance, score = np.tile(sigma**2, (n, 1)), np.empty((n, m))
+    model = with_lasting_errors(x, P, first, F, q * Q, H, variance, rho**steps)
+    log_likelihood(*model, z, variance, there, 1.0, 0.0, 0.0, score)
+    assert_rounded(score.sum(), expected, density_size(off, spread), operations=len(off))
+
+
+def test_an_outlier_leaves_the_moments_of_both_explanations():
+    """Of the second number, after a first that is a mixture: Bayes' rule by hand."""
+    P, variance, share, z = 4.0, 1.0, 0.2, np.array([[7.0], [1.0]])
+    spreads, chances = P + variance * np.array([1, OUTLIER_FACTOR**2]), np.array([1 - share, share])
+    first = chances * np.exp(-0.5 * z[0] ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
+    w = first / first.sum()
+    means, variances = P / spreads * z[0], P - P**2 / spreads
+    mean = w @ means
+    merged = w @ (variances + (means - mean) ** 2)
+    spreads = merged + variance * np.array([1, OUTLIER_FACTOR**2])
+    second = chances * np.exp(-0.5 * (z[1] - mean) ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
+    one, score = np.ones((2, 1, 1)), np.empty((2, 1))
+    there = np.ones((2, 1), dtype=bool)
+    log_likelihood(np.zeros(1), np.array([[P]]), one, 0 * one, one, z, np.ones((2, 1)), there, 0.0, share, 1.0, score)
+    assert_rounded(score[:, 0], np.log([first.sum(), second.sum()]), operations=30)
+
+
+# ---- sonar -----------------------------------------------------------------------------------------------------------
+
+
+def textbook(case, number, columns):
+    """The density of a track's plots after the third, by a Kalman filter on both coordinates together, started from the
+    first two plots with a wide covariance."""
+    spec, member = case.spec, case.spec.filters[number]
+    r, b, T, size = columns["range_m"], columns["bearing_rad"], np.diff(columns["t_s"]), member.degree + 1
+    sigma = np.array([spec.sensor.sigma_range_m, spec.sensor.sigma_bearing_rad])
+    if spec.frame == "polar":
+        z, R = np.stack([r, b], axis=1), np.tile(np.diag(sigma**2), (len(r), 1, 1))
+        scale = np.array([1, spec.target.initial_range_m**-2.0])
+    else:
+        x, y, (xx, xy, yy) = conversion.convert_plainly(r, b, *sigma)
+        z, R = np.stack([x, y], axis=1), np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
+        scale = np.ones(2)
+    H = np.kron(np.eye(2), np.eye(size)[:1])
+    state = np.zeros(2 * size)
+    state[::size], state[1::size] = z[0], (z[1] - z[0]) / T[0]
+    P = np.kron(np.diag(np.diag(R[0])), np.diag([0.0, *(1e3 * T[0] ** -np.arange(1.0, size)) ** 2]))
+    P += H.T @ R[0] @ H
+    densities = []
+    for k in range(1, len(r)):
+        F = np.kron(np.eye(2), transition(T[k - 1], size))
+        D = member.manoeuvre_variance or 0.0
+        P = F @ P @ F.T + np.kron(np.diag(scale), manoeuvre_covariance(D, T[k - 1], size))
+        state, S = F @ state, H @ P @ H.T + R[k]
+        densities.append(normal.logpdf(z[k], H @ state, S))
+        K = P @ H.T @ np.linalg.inv(S)
+        state, P = state + K @ (z[k] - H @ state), P - K @ S @ K.T
+    return sum(densities[2:])
+
+
+@pytest.mark.parametrize("frame", ["polar", "cartesian"])
+@pytest.mark.parametrize("name", ["growing", "kalman q", "growing 2"])
+def test_the_sonar_likelihood_is_that_of_a_textbook_filter(frame, name):
+    case = loaded("sonar_smoothing", f"frame={frame}")
+    columns = recording("sonar_smoothing")
+    (number,) = (i for i, one in enumerate(case.spec.filters) if one.name == name)
+    one = likelihood(case, name, columns)
+    # The first plots leave a millionth of the wide variances, and of that what a polynomial through them does.
+    degree = case.spec.filters[number].degree
+    condition = 1e3**2 * polynomial_condition(range(degree + 1), degree)
+    assert_rounded(float(one(one.stated)), textbook(case, number, columns), condition=condition, operations=10)
+
+
+def test_errors_of_a_sonar_that_last_have_the_density_of_their_correlations():
+    """By the joint normal density of all plots given the first, without a filter: of a straight course, at uneven
+    times; less that of the plots that find the state."""
+    case, columns = loaded("sonar_smoothing"), recording("sonar_smoothing")
+    rng, rho = np.random.default_rng(1), 0.7
+    chosen = np.sort(rng.choice(len(columns["t_s"]), 12, replace=False))
+    columns = {name: column[chosen] for name, column in columns.items()}
+    one = likelihood(case, "growing", columns)
+    t = columns["t_s"] - columns["t_s"][0]
+    usual, expected, size = np.median(np.diff(t)), 0.0, 0.0
+
+    def density(x, P):
+        return -0.5 * (np.linalg.slogdet(2 * np.pi * P)[1] + x @ np.linalg.solve(P, x))
+
+    for z, sigma in zip((columns["range_m"], columns["bearing_rad"]), one.stated, strict=True):
+        off, rate = z[1:] - z[0] - (z[1] - z[0]) / t[1] * t[1:], sigma * 1e3 / usual
+        lasting = rho ** (np.abs(t[1:, None] - t[1:]) / usual) - rho ** (t[1:, None] / usual) - rho ** (t[1:] / usual)
+        spread = sigma**2 * (lasting + 1) + rate**2 * np.outer(t[1:], t[1:])
+        expected += density(off, spread) - density(off[:2], spread[:2, :2])
+        size += density_size(off, spread)
+    assert_rounded(one(one.stated, correlation=rho), expected, size, operations=len(t))
+    timed = fit.CorrelatedLikelihood(one)
+    assert_rounded(timed(np.append(one.stated, -usual / np.log(rho))), expected, size, operations=len(t))
+    assert timed(np.append(one.stated, 0.0)) == one(one.stated)
+
+
+@pytest.mark.parametrize("frame", ["polar", "cartesian"])
+def test_a_sonar_without_errors_of_range_has_a_likelihood(frame):
+    """A fit asks whether an error can be zero; the rates before the first plot are as unknown then."""
+    one = likelihood(loaded("sonar_smoothing", f"frame={frame}"), "kalman q", recording("sonar_smoothing"))
+    assert np.isfinite(one(np.array([0.0, *one.stated[1:]])))
+
+
+@pytest.mark.parametrize(
+    ("key", "true"), [("sensor.sigma_range_m", 75.0), ("sensor.sigma_bearing_rad", 0.04), (None, None)]
+)
+def test_a_wrong_error_of_the_sonar_is_named_and_fitted(key, true):
+    case = loaded("sonar_smoothing", "frame=cartesian", "scans=80")
+    wrong = [f"{key}={true}"] if key else []
+    columns = recording("sonar_smoothing", "frame=cartesian", "scans=80", *wrong)
+    one = likelihood(case, "growing", columns)
+    found = advice.find_errors(one)
+    assert [finding.name for finding in found] == ([key] if key else [])
+    if key:
+        (fitted,) = (each for each in fit.fit_keys(one).keys if each.key == key)
+        assert fitted.lo < true < fitted.hi
+        assert fitted.hi / fitted.lo < 1.6
+
+
+def test_a_course_without_manoeuvres_does_not_tell_their_variance():
+    case = loaded("sonar_smoothing")
+    *_, manoeuvre = fit.fit_keys(likelihood(case, "kalman q", recording("sonar_smoothing"))).keys
+    assert (manoeuvre.key, manoeuvre.lo, manoeuvre.identifiable) == ("filters.4.manoeuvre_variance", 0.0, False)
+
+
+# ---- multimodel ------------------------------------------------------------------------------------------------------
+
+
+def models_over(options, dt):
+    """F and Q (9, 9) of each model over an interval."""
+    found = []
+    for model in options.models:
+        moves, accelerates = {"still": (0, 0), "uniform": (1, 0), "accelerated": (1, 1)}[model.motion]
+        F = np.array([[1, moves * dt, accelerates * dt**2 / 2], [0, moves, accelerates * dt], [0, 0, accelerates]])
+        G = np.array([dt**2 / 2, moves * dt, accelerates]) * model.sigma_acceleration_mps2
+        found.append((np.kron(np.eye(3), F), np.kron(np.eye(3), np.outer(G, G))))
+    return found
+
+
+def local_plots(spec, columns):
+    """Plots in the local axes, and their covariances."""
+    seen = np.stack([columns[name] for name in ("range_m", "elevation_rad", "azimuth_rad")], axis=1)
+    turn = frames.rotation(spec.sensor.antenna_azimuth_rad, spec.sensor.antenna_elevation_rad)
+    z = frames.to_local(frames.from_biconical(seen), turn, spec.sensor.antenna_height_m)
+    return z, frames.plot_covariance(seen, np.array(spec.sensor.sigma), turn)
+
+
+def density_rounding(case, columns):
+    """Relative rounding of a multimodel likelihood: κ of a plot's covariance, times 200 operations of a row."""
+    return rounding(scaled_condition(local_plots(case.spec, columns)[1]).max(), 200)
+
+
+def interacting(case, options, columns, T, share=0.0):
+    """IMM of the book over a track (one model: a Kalman filter), with outliers merged by moments; T: over the scan."""
+    spec, t = case.spec, columns["t_s"]
+    z, R = local_plots(spec, columns)
+    a, b, g = start_weights(t[:3], spec.start_acceleration_mps2).reshape(3, 3)
+    x = np.concatenate([[a @ z[:3, i], b @ z[:3, i], 0.0] for i in range(3)])
+    lifts = [np.kron(np.eye(3), np.array([[a[k]], [b[k]], [0.0]])) for k in range(3)]
+    P = sum(lift @ R[k] @ lift.T for k, lift in enumerate(lifts)) + np.kron(np.eye(3), np.outer(g, g))
+    M, H = len(options.models), np.kron(np.eye(3), np.array([[1.0, 0, 0]]))
+    bank, p, total = [(x, P)] * M, np.full(M, 1 / M), 0.0
+    for k in range(3, len(t)):
+        c = T @ p
+        scores, parts = np.zeros((M, 2)), []
+        for i, (F, Q) in enumerate(models_over(options, t[k] - t[k - 1])):
+            mean, P = merged(T[i] * p / c[i], bank)
+            mean, P = F @ mean, F @ P @ F.T + Q
+            parts.append([])
+            for wild, noise in enumerate((R[k], OUTLIER_FACTOR**2 * R[k])):
+                S = H @ P @ H.T + noise
+                scores[i, wild] = normal.logpdf(z[k], H @ mean, S) + np.log((1 - share, share or 1e-300)[wild])
+                K = P @ H.T @ np.linalg.inv(S)
+                parts[-1].append((mean + K @ (z[k] - H @ mean), P - K @ S @ K.T))
+        scores += np.log(c)[:, None]
+        density = logsumexp(scores)
+        total += density
+        p = np.exp(logsumexp(scores, axis=1) - density)
+        bank = [merged(np.exp(scores[i] - logsumexp(scores[i])), parts[i]) for i in range(M)]
+    return total
+
+
+def merged(weights, hypotheses):
+    mean = sum(w * x for w, (x, _) in zip(weights, hypotheses, strict=True))
+    return mean, sum(w * (P + np.outer(x - mean, x - mean)) for w, (x, P) in zip(weights, hypotheses, strict=True))
+
+
+PAIR = (
+    "filters=[{name: two, family: imm, merge: moment, models: [{motion: uniform, sigma_acceleration_mps2: 5}, "
+    "{motion: accelerated, sigma_acceleration_mps2: 30}], transition: [[0.9, 0.1], [0.1, 0.9]], "
+    "transition_interval_s: 1}, {name: one, family: kalman, models: [{motion: uniform, sigma_acceleration_mps2: 20}]}, "
+    "{name: pairs, family: gpb2, merge: moment, models: [{motion: uniform, sigma_acceleration_mps2: 20}, "
+    "{motion: uniform, sigma_acceleration_mps2: 20}], transition: [[0.9, 0.1], [0.1, 0.9]], transition_interval_s: 1}]"
+)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(share):
+    case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
+    for name, T in (("two", np.array([[0.9, 0.1], [0.1, 0.9]])), ("one", np.ones((1, 1)))):
+        one = likelihood(case, name, columns)
+        (options,) = (each for each in case.spec.filters if each.name == name)
+        expected = interacting(case, options, columns, T, share)
+        assert one(one.stated, share) == pytest.approx(expected, rel=density_rounding(case, columns))
+
+
+def test_the_multimodel_likelihood_does_not_leap():
+    """Along a key, where the filter's own rule of merges, which chooses, makes it leap by units."""
+    case = loaded("multimodel_1hz")
+    one = likelihood(case, "MMA2-122", *(recording("multimodel_1hz", "scans=60", number=i) for i in range(5)))
+    grid = [np.array([2.7948 * (1 + step), 0.00183, 0.001705, 0.0]) for step in np.linspace(-0.02, 0.02, 17)]
+    smooth, leaping = (
+        np.abs(np.diff([of(values) for values in grid], n=2)).max()
+        for of in (one, lambda at: one.by_number(at)["plot"])
+    )
+    assert smooth < 0.02
+    assert leaping > 1
+
+
+def test_pairs_of_equal_models_are_one():
+    """GPB2, whose density is found in another way, of two models alike: the Kalman filter."""
+    case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
+    one, pairs = (likelihood(case, name, columns) for name in ("one", "pairs"))
+    assert pairs(pairs.stated) == pytest.approx(one(one.stated), rel=density_rounding(case, columns))
+
+
+def test_the_multimodel_likelihood_is_best_of_the_filter_that_fits_and_at_the_true_error():
+    """The case that misled: the advice named the second best filter."""
+    case, columns = loaded("multimodel_1hz"), recording("multimodel_1hz", "sensor.sigma_azimuth_deg=0.3")
+    known = [likelihood(case, member.name, columns) for member in case.spec.filters]
+    assert advice.compare_filters(known).best == "MMA2-122"
+    best, gains = known[0], {}
+    for i, key in enumerate(best.keys):
+        for factor in (1 / 3, 3.0):
+            values = best.stated.copy()
+            values[i] *= factor
+            gains[key, factor] = best(values) - best(best.stated)
+    assert max(gains, key=gains.get) == ("sensor.sigma_azimuth_rad", 3.0)
+    assert gains["sensor.sigma_azimuth_rad", 3.0] > 100
+
+
+# ---- ambiguous Doppler -----------------------------------------------------------------------------------------------
+
+
+def test_the_density_of_a_folded_velocity_sums_over_the_folds():
+    """Two plots by hand: the second range, then the second velocity under the fold that each hypothesis takes."""
+    case = loaded("ambiguous_rls4", "radar.repetition_rate_hz=20000")  # a span of 300 m/s: few folds
+    sigma_r, sigma_v, T, D = 50.0, 1.0, 10.0, 300.0
+    prior, q = case.spec.prior, 1e-3
+    columns = {"t_s": np.array([0, T]), "range_m": np.array([1e5, 1.02e5]), "velocity_mps": np.array([120.0, 130.0])}
+    folds = 120.0 + D * np.arange(-20, 21)
+    weights = np.exp(-0.5 * folds**2 / (S := prior.sigma_velocity_mps**2 + sigma_v**2)) / np.sqrt(2 * np.pi * S)
+    F, P = transition(T), np.diag([sigma_r**2, prior.sigma_velocity_mps**2, prior.sigma_acceleration_mps2**2])
+    gain = P[:, 1] / S
+    P = P - np.outer(gain, gain) * S
+    states = [F @ (np.array([1e5, 0, 0]) + gain * v) for v in folds]
+    P = F @ P @ F.T + manoeuvre_covariance(q, T)
+    ranges = np.array([normal.pdf(1.02e5, x[0], P[0, 0] + sigma_r**2) for x in states])
+    K = P[:, 0] / (P[0, 0] + sigma_r**2)
+    states, P = [x + K * (1.02e5 - x[0]) for x in states], P - np.outer(K, P[0])
+    velocities = [
+        sum(normal.pdf(130 + D * n, x[1], P[1, 1] + sigma_v**2) for n in np.arange(-20, 21)) for x in states
+    ]  # fmt: skip
+    one = likelihood(case, "memory", columns)
+    found = one.by_number(one.stated)
+    # After the first velocity the filter drops the folds that are so much less likely than the likeliest.
+    (options,) = (each for each in case.spec.filters if each.name == "memory")
+    kept = np.where(weights < options.prune_below * weights.max(), 0.0, weights)
+    # States are known to their rounding, e/S of which a density's logarithm changes by.
+    size = 1.02e5 * np.abs(1.02e5 - np.array([x[0] for x in states])).max() / sigma_r**2
+    assert_rounded(found["range_m"], np.log(kept @ ranges / kept.sum()), size, operations=10)
+    expected = np.log(weights.sum()) + np.log((kept * ranges) @ velocities / (kept @ ranges))
+    assert_rounded(found["velocity_mps"], expected, size, operations=10)
+
+
+def test_the_span_beside_a_velocity_counts_before_that_of_the_config():
+    case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")
+    other = loaded("ambiguous_rls4", "radar.repetition_rate_hz=2000")
+    told = columns | {"span_mps": np.full(len(columns["t_s"]), 15.0)}
+    for filter_name in ("memory", "no memory"):
+        plain, with_span = likelihood(case, filter_name, columns), likelihood(other, filter_name, told)
+        assert with_span(with_span.stated) == plain(plain.stated)
+        assert abs(likelihood(other, filter_name, columns)(plain.stated) - plain(plain.stated)) > 1  # e times as likely
+
+
+def test_a_velocity_whose_error_is_a_span_tells_nothing():
+    """It is as likely as any other, whatever the filter knew: one over the span; the ranges as without it."""
+    case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")
+    blind = columns | {"velocity_mps": np.full(len(columns["t_s"]), np.nan)}
+    one = likelihood(case, "memory", columns)
+    values = np.array([one.stated[0], 15.0, one.stated[2]])
+    found, without = one.by_number(values), likelihood(case, "memory", blind).by_number(values)
+    assert found["range_m"] == without["range_m"]
+    rows = len(columns["t_s"])
+    assert_rounded(found["velocity_mps"], -rows * np.log(15.0), operations=rows)
+
+
+@pytest.mark.parametrize("name", ["memory", "no memory", "nearest fold", "range only"])
+def test_missing_plots_count_as_nothing(name):
+    """Rows without a plot among those with one: as without these rows, where no manoeuvre parts two steps from one."""
+    case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")
+    there = np.arange(len(columns["t_s"])) % 3 != 1
+    some = columns | {key: np.where(there, columns[key], np.nan) for key in ("range_m", "velocity_mps")}
+    one, kept = (
+        likelihood(case, name, plots) for plots in (some, {key: column[there] for key, column in columns.items()})
+    )
+    values = np.append(one.stated[:-1], 0.0)
+    # Of a parabola through the plots; ten operations a row.
+    allowed = rounding(polynomial_condition(columns["t_s"]), 10 * len(columns["t_s"]))
+    assert one.by_number(values) == pytest.approx(kept.by_number(values), rel=allowed)
+
+
+def test_the_likeliest_hypotheses_are_kept_in_their_order():
+    from radarsim.studies.ambiguous_doppler.kernels.recorded_rows import likeliest
+
+    rng = np.random.default_rng(7)
+    for most, least in ((5, 0.0), (40, 1e-2), (1, 0.5), (100, 1e-6)):
+        w = np.round(-4 * rng.random(60), 1)
+        w -= w.max()
+        order = np.argsort(-w, kind="stable")
+        np.testing.assert_array_equal(likeliest(w, most, least), [i for i in order if np.exp(w[i]) >= least][:most])
+    np.testing.assert_array_equal(likeliest(np.full(4, np.nan), 3, 0.1), [0])
+
+
+def test_a_wrong_velocity_error_is_named_though_velocities_fold(monkeypatch):
+    monkeypatch.setattr(advice, "MAX_FINDINGS", 1)
+    case = loaded("ambiguous_rls4", "filters=[{name: memory, doppler: folded, manoeuvre_variance: 1.0e-7}]")
+    wrong = recording("ambiguous_rls4", "radar.sigma_velocity_mps=4")
+    assert advice.find_errors(likelihood(case, None, wrong))[0].name == "radar.sigma_velocity_mps"
+    assert advice.find_errors(likelihood(case, None, recording("ambiguous_rls4"))) == []
+
+
+def test_innovations_of_a_right_filter_over_folded_velocities():
+    """NIS of range and velocity over 20 realisations: 1 within Z standard errors."""
+    case = loaded("ambiguous_rls4", "filters=[{name: memory, doppler: folded, manoeuvre_variance: 0.0}]")
+    nis = []
+    for i in range(20):
+        made = recording_interface(case).tracker(case).feed(recording("ambiguous_rls4", "scans=25", number=i))
+        nis.append(made.nis[0, 5:])
+        assert np.nanmax(np.abs(made.residual[0, 5:, 1])) <= 7.5
+    nis = np.concatenate(nis)
+    for number in range(2):
+        values = nis[np.isfinite(nis[:, number]), number]
+        assert len(values) > 300
+        assert abs(values.mean() - 1) < Z * np.sqrt(2 / len(values))
+
+
+def test_an_angle_fitted_takes_the_place_of_the_one_in_degrees(tmp_path, monkeypatch):
+    """And a key of one filter among several that of this filter alone."""
+    from radarsim.api import configs
+
+    monkeypatch.chdir(tmp_path)
+    values = {"sensor.sigma_bearing_rad": 0.05, "filters.4.manoeuvre_variance": 0.25}
+    spec = configs.load(configs.new("mine", "sonar_smoothing", values=values)).cases[0].spec
+    assert (spec.sensor.sigma_bearing_rad, spec.sensor.sigma_range_m) == (0.05, 30)
+    assert [one.manoeuvre_variance for one in spec.filters[3:6]] == [None, 0.25, 0.0025]
