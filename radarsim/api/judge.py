@@ -97,7 +97,7 @@ def run_judged_experiment(
     command: str = "none: the filter was given in Python",
     **run_arguments: Any,
 ) -> "Result":
-    """The result of an experiment of `judge_on` with the warnings of its checks, written if `out` is given."""
+    """The result of an experiment with a judged filter and the warnings of its checks, written if `out` is given."""
     try:
         result = run.run(experiment, **run_arguments)
     except (DisagreementError, MeasureError) as error:  # raised again below

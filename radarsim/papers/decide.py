@@ -1,8 +1,8 @@
 """`radarsim run --decide`: as many realisations as it takes until each claim of the config is decided.
 
 It looks at declared numbers of realisations only, 2000·2^m, as a precision does, and each verdict accounts for all
-these looks (verdict_rule.LOOKS): were each look judged at 95 %, chance would refute up to a fifth of the claims that
-are true at a border."""
+these looks (`verdict_rule.MAX_LOOKS`): were each look judged at 95 %, chance would refute up to a fifth of the claims
+that are true at a border."""
 
 import tempfile
 from collections.abc import Sequence

@@ -82,7 +82,7 @@ def widen(lo: float, value: float, hi: float, factor: float) -> tuple[float, flo
 
 
 def widening_factor(parts: int) -> float:
-    """Factor on half-widths so that as many intervals hold at once, at all LOOKS, in 95 % of runs.
+    """Factor on half-widths so that as many intervals hold at once, at all `MAX_LOOKS` looks, in 95 % of runs.
 
     One factor at every look (Pocock, Biometrika 64, 1977, 191-199), by the union bound over looks and parts: whatever
     their correlation, at most 5 % of runs err. For one part the exact recursion over looks gives 4.0 %; a factor for

@@ -12,7 +12,7 @@ from radarsim.studies.registry import study
 
 
 def recording_interface(case: Case) -> RecordingInterface:
-    """The recorded-plots interface of a case's study, which `one_case` has checked for."""
+    """The recorded-plots interface of a case's study, which `single_case` has checked for."""
     interface = study(case.study).recording_interface()
     assert interface is not None
     return interface

@@ -154,8 +154,8 @@ def select_cases(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[l
 
 
 def select_cases_by_panel(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:
-    """The results of a figure with a panel for each of `by_panel`: at most twelve panels of at most eight cases. If
-    more, evenly spaced ones from the first to the last."""
+    """The results of a figure with a panel for each of `group_by_panel`: at most twelve panels of at most eight cases.
+    If more, evenly spaced ones from the first to the last."""
     named_results = [result for result in results if result.name in set(names)]
     groups = pick_evenly(list(group_by_panel(named_results).values()), MAX_PANELS)
     visible = [result for members in groups for result in pick_evenly(members, MAX_CASES)]

@@ -86,8 +86,8 @@ def standardised_errors(
     """Standard errors (rows,) by which the measured values of a column differ from the exact ones.
 
     name: that of the column's table; approximate_cases: those whose exact values are accurate to `ALMOST` only. 0 where
-    missing rare events may explain the difference, see above. NaN where no exact value is known, or fewer than `FEW`
-    realisations measured it."""
+    missing rare events may explain the difference, see above. NaN where no exact value is known, or fewer than
+    `MIN_REALISATIONS` realisations measured it."""
     table = tables_by_name[name]
     (value, low, high), exact = measured_values(table, column), table[column.exact].to_numpy(dtype=float)
     size, unseen = _size_and_unseen(table, name, column.value, value, exact, quantities)

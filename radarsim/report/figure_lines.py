@@ -69,7 +69,7 @@ def case_lines(
     """A line for each filter of each case of a panel: named by the filter if there is one case, else by the swept
     value.
 
-    rows by case, filter and component; columns as for `line`; filters as of `filters_of`: a filter has the same style
+    rows by case, filter and component; columns as for `line`; filters as of `all_filters`: a filter has the same style
     in all panels of a figure."""
     marks: list[Mark] = []
     for i, result in enumerate(members):

@@ -130,7 +130,7 @@ def key_symbol(result: CaseResult, key: str) -> str:
 
 
 def key_axis_label(result: CaseResult, key: str) -> str:
-    """The label of a key's axis: name, letter, unit; values on it are times `axis_factor`."""
+    """The label of a key's axis: name, letter, unit; values on it are times `key_axis_factor`."""
     key_text = key_label(result, key)
     return label_with_unit(
         " ".join(filter(None, (key_text.text, math_symbol(key_text.symbol)))), degrees_factor_and_unit(key_text.unit)[1]

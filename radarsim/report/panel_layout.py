@@ -158,7 +158,7 @@ def arrange_columns(figure: Figure) -> Figure:
 def with_keys(panel: Panel, members: Sequence[CaseResult], filters: Sequence[str], baseline: bool = True) -> Panel:
     """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends.
 
-    filters as for `lines_of`; baseline: whether to draw the baseline filter."""
+    filters as for `case_lines`; baseline: whether to draw the baseline filter."""
     if len(members) == 1:
         return panel
     visible_filters = {

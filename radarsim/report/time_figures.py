@@ -98,8 +98,8 @@ def _sigma_panel(
 def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: Component) -> Figure:
     """Relative gain of one component against time, a line for each case and filter.
 
-    One panel where no config is swept; else one for each of `by_panel`. gains is tables.groups(table, "case", "filter",
-    "component")."""
+    One panel where no config is swept; else one for each of `group_by_panel`. gains is tables.groups(table, "case",
+    "filter", "component")."""
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
         "Bands: 95 % intervals. Below zero: a loss.",

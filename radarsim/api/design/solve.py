@@ -177,7 +177,7 @@ def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], Non
 def roots(question: Question, curve: Curve) -> root_search.Roots:
     """The values at which the exact quantity reaches the target; searched roughly first if that is much cheaper.
 
-    Raises root_search.Undefined if the quantity has no value on the range."""
+    Raises root_search.UndefinedFunctionError if the quantity has no value on the range."""
 
     def difference(x: float) -> float:
         return curve.exactly(x) - question.equals

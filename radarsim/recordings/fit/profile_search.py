@@ -176,7 +176,7 @@ class LikelihoodSearch:
     def _climb_by_newton(
         self, point: np.ndarray, value: float, free: np.ndarray, tolerance: float, curvature: Curvature
     ) -> tuple[np.ndarray, float, bool]:
-        """As `_climbed`, by Newton steps alone: where they end, and whether that is the maximum."""
+        """As `_climb`, by Newton steps alone: where they end, and whether that is the maximum."""
         for _ in range(MAX_NEWTON_STEPS):
             point, value = self._set_zero(point, value, free)
             moving = free[point[free] > self.lowest[free]]
@@ -216,7 +216,7 @@ class LikelihoodSearch:
     def _climb_by_simplex(
         self, start: np.ndarray, free: np.ndarray, tolerance: float, max_evaluations: int
     ) -> tuple[np.ndarray, float]:
-        """As `_climbed`, by a simplex, until it stands still within `close` or has taken `most` likelihoods."""
+        """As `_climb`, by a simplex, until it stands still within `close` or has taken `most` likelihoods."""
         from scipy.optimize import minimize
 
         point = start.copy()

@@ -34,7 +34,7 @@ def missed_plots_bound(
     settles: int,
     immediate: Sequence[bool] = (),
 ) -> Bound:
-    """As `static`, over the realisations with an estimate; scan k gives its plots with the probability chance (K,).
+    """As `static_bound`, over the realisations with an estimate; chance (K,): the probability of plots at scan k.
 
     counts (K, C): whether the plots count for a component, which has an estimate from `needed` plots (C,) on, or, where
     `immediate` (C,), at any scan with a plot. `settles` scans that count for all components settle all parameters."""

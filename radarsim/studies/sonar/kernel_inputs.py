@@ -71,7 +71,7 @@ def draw_plots(
 
 
 def true_states(scene: Scene, deviation: np.ndarray, count: int, size: int) -> np.ndarray:
-    """True states (count, K, C size), with size components of each coordinate, by a deviation from `drawn_plots`.
+    """True states (count, K, C size), with size components of each coordinate, by a deviation from `draw_plots`.
 
     A read-only view if all realisations have the same states."""
     K, C, _ = scene.truth.shape

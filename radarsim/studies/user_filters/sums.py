@@ -37,7 +37,7 @@ PAIRED = 7  # sums over the realisations that both have: 1, e², e⁴, b², b⁴
 @dataclass(frozen=True)
 class UserFilterAxes(Axes):
     """Axes of user filters. baselines: those that the gains of the config's filters refer to as well; identities: what
-    the numbers of each depend on; judged_at: as in `Outside`."""
+    the numbers of each depend on; judged_at: as in `UserFilter`."""
 
     baselines: tuple[str, ...] = ()
     identities: tuple[str, ...] = ()

@@ -1,1 +1,1 @@
-"""P3's kernels that its three studies share."""
+"""P3's kernels that the three parts of the sonar share."""
