@@ -83,11 +83,11 @@ def main() -> None:
     many = GROUPS * WIDTH
     work, plots = aligned_zeros(400), aligned_zeros(GROUPS * scans * rows * WIDTH)
     a, b, u = (aligned_zeros(n * WIDTH) for n in (16 * normals, 16 * normals, 2))
-    seen = plan.known, plan.width
+    seen = plan.known_quantities, plan.width
     plan.draw(plan.keys, 0, GROUPS, *seen, plan.numbers, 1.0, work, a, b, u, plots)
     drawn = plots.reshape(GROUPS, scans, rows, WIDTH)
     z, true = (np.ascontiguousarray(drawn[:, :, n].transpose(1, 0, 2).reshape(scans, many)) for n in (1, 2))
-    own = np.ascontiguousarray(plan.known.reshape(scans, -1)[:, 1:5])
+    own = np.ascontiguousarray(plan.known_quantities.reshape(scans, -1)[:, 1:5])
     target, found = case.spec.target, np.zeros((scans, many))
     numbers = case.spec.observer.sigma_bearing_rad, target.range_m, target.sigma_range_m, target.sigma_velocity_mps
     loops = lambda: plain(z, own, case.spec.observer.scan_period_s, *numbers, found)  # noqa: E731

@@ -34,7 +34,7 @@ def shipped(paper: str) -> str:
             said = class_words(
                 found.kind, found.kind, of.interpretations.list_choices(filter(None, found.depends_on.split(", ")))
             )
-            rows.append((claim.id, claim.statement, said, f"{found.holds} of {found.of}"))
+            rows.append((claim.id, claim.statement, said, f"{found.holds_in} of {found.interpretation_count}"))
     parts = [
         f"{of.claims.paper}. {HERE.format(paper=paper)}",
         "## Claims over all interpretations",

@@ -101,7 +101,7 @@ def own_tables(study: str) -> str:
     parts = []
     for module in modules(study):
         parts += described(module)
-        for name, (function, _) in module.table.declared.items():
+        for name, (function, _) in module.table.makers.items():
             parts += [f"### `{name}.csv`", *described(function)]
     return "\n\n".join(filter(None, parts))
 

@@ -14,7 +14,7 @@ from radarsim.errors import ConfigError, argument
 
 MAX_THREADS, MAX_WIDTH_MM = 1024, 1000
 FORMATS = ("svg", "png", "pdf")  # of figure files
-EXECUTOR_MEMBERS = ("workers", "depth", "shortest_s", "longest_s", "submit", "finished", "cancel", "forget")
+EXECUTOR_MEMBERS = ("workers", "depth", "shortest_s", "longest_s", "submit", "take_outcomes", "cancel", "forget")
 
 
 def check_arguments(

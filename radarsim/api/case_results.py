@@ -15,17 +15,19 @@ def case_result(case: Case, work: CaseWork, collected: CollectedSums) -> CaseRes
     values = collected.values.view()
     values.flags.writeable = False  # tables and figures are made of them on demand
     count, seconds, results = collected.count, collected.kernel_seconds, []
-    unpacked = list(work.unpacked(values))
+    unpacked = list(work.unpack(values))
     for plan, plan_case, sums in zip(work.plans, (case, *case.companions), unpacked, strict=False):
         # Cases that differ in display names alone share their work.
         axes = plan.axes if work.case == case else study(case.study).relabelled(plan.axes, plan_case)
         results.append(
-            CaseResult(plan_case.name, plan_case.study, plan_case.spec, plan_case.swept, count, sums, axes, seconds)
+            CaseResult(
+                plan_case.name, plan_case.study, plan_case.spec, plan_case.swept_values, count, sums, axes, seconds
+            )
         )
-    result = replace(results[0], against=tuple(results[1:]))
-    if not case.outside:
+    result = replace(results[0], further_baselines=tuple(results[1:]))
+    if not case.user_filters:
         return result
     from radarsim.studies.user_filters import sums as user_filters_sums
 
     user_plan: Any = work.plans[-1]
-    return replace(result, outside=user_filters_sums.result(user_plan, result, unpacked[-1]))
+    return replace(result, user_filters=user_filters_sums.result(user_plan, result, unpacked[-1]))

@@ -42,7 +42,7 @@ class CaseWork:
         """The plans of the case, of each further baseline and of the user's filters; their sums are concatenated."""
         case_study = study(self.case.study)
         plans = (self.plan, *(case_study.prepare(companion) for companion in self.case.companions))
-        if not self.case.outside:
+        if not self.case.user_filters:
             return plans
         from radarsim.studies.user_filters import sums
 
@@ -69,16 +69,16 @@ class CaseWork:
         """Sums (size,) over realisations first … first + count - 1."""
         import numpy as np
 
-        study_plans = self.plans[:-1] if self.case.outside else self.plans
+        study_plans = self.plans[:-1] if self.case.user_filters else self.plans
         sums = [study(self.case.study).simulate(plan, first, count) for plan in study_plans]
-        if self.case.outside:
+        if self.case.user_filters:
             from radarsim.studies.user_filters import sums as user_filters_sums
 
             user_plan: Any = self.plans[-1]
             sums.append(user_filters_sums.simulate(user_plan, first, count))
         return sums[0] if len(sums) == 1 else np.concatenate(sums)
 
-    def unpacked(self, values: "np.ndarray") -> "Iterator[dict[str, np.ndarray]]":
+    def unpack(self, values: "np.ndarray") -> "Iterator[dict[str, np.ndarray]]":
         """The named sums of each plan, from the vector of all sums (size,)."""
         for plan in self.plans:
             yield plan.layout.unpack(values)

@@ -47,7 +47,7 @@ class ComparedRun:
     folder: Path
     record: dict[str, Any]
     experiment: Experiment | None = None
-    made: "Mapping[str, pd.DataFrame] | None" = None
+    tables: "Mapping[str, pd.DataFrame] | None" = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,7 +64,7 @@ class Comparison(Displayable):
     rows: tuple[dict[Hashable, Any], ...]
     last: tuple[dict[Hashable, Any], ...]
     told: tuple[tuple[str, str], ...]
-    drawn: Mapping[str, Figure] = field(default_factory=dict)
+    figures_by_name: Mapping[str, Figure] = field(default_factory=dict)
 
     @property
     def table(self) -> "pd.DataFrame":
@@ -73,7 +73,7 @@ class Comparison(Displayable):
 
     @property
     def _figures_by_name(self) -> Mapping[str, Figure]:
-        return self.drawn
+        return self.figures_by_name
 
     def _answer_lines(self) -> tuple[str, ...]:
         return self.sentences
@@ -154,7 +154,7 @@ def _compare_runs(runs: Sequence[ComparedRun]) -> "tuple[pd.DataFrame, Compariso
             (quantity.value, quantity.words)
             for quantity in comparison_sentences.summary_quantities(comparison_table, shared)
         ),
-        drawn={name: reworded(figure, translate) for name, figure in figures.items()},
+        figures_by_name={name: reworded(figure, translate) for name, figure in figures.items()},
     )
     return comparison_table, comparison
 
@@ -174,11 +174,11 @@ def _write_comparison(
     if formats:
         from radarsim.report.drawing.canvas import draw  # Matplotlib
 
-        drawings = [draw(figure, formats, width_mm) for figure in comparison.drawn.values()]
-        for name, drawing in zip(comparison.drawn, drawings, strict=True):
+        drawings = [draw(figure, formats, width_mm) for figure in comparison.figures_by_name.values()]
+        for name, drawing in zip(comparison.figures_by_name, drawings, strict=True):
             contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.files.items()}
-        if comparison.drawn:
-            contents["figures/captions.md"] = captions(comparison.drawn).encode()
+        if comparison.figures_by_name:
+            contents["figures/captions.md"] = captions(comparison.figures_by_name).encode()
     page = _page(runs, comparison.sentences, comparison.notes, warnings, drawings, comparison_table, contents)
     contents["compare.html"] = page.encode()
     contents["compare.json"] = provenance.to_json(_record(runs, contents))
@@ -214,7 +214,7 @@ def _run_of_result(result: Result) -> ComparedRun:
         "outputs": {},
     }
     record["cases"] = {case.name: {"done": case.count} for case in result.cases}
-    return ComparedRun(experiment.stem, Path(experiment.stem), record, made=result.tables)
+    return ComparedRun(experiment.stem, Path(experiment.stem), record, tables=result.tables)
 
 
 def _run_in_folder(path: Path) -> ComparedRun | None:
@@ -239,7 +239,7 @@ def _stored_run(source: str | os.PathLike[str], out: Path) -> ComparedRun:
 def _with_distinct_names(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
     """The runs with distinct names: to equal names their folder is added, or a number where they have none."""
     names = [run.label for run in runs]
-    longer_names = [run.label if run.made is not None else f"{run.label} in {run.folder.parent}" for run in runs]
+    longer_names = [run.label if run.tables is not None else f"{run.label} in {run.folder.parent}" for run in runs]
     longer_names = [
         f"{name} ({longer_names[: n + 1].count(name)})" if longer_names.count(name) > 1 else name
         for n, name in enumerate(longer_names)
@@ -256,7 +256,7 @@ def _sides(run: ComparedRun) -> list[Side]:
     table_names = {quantity.table for quantity in quantities}
     outputs = run.record["outputs"]
     read_table = (
-        run.made.get if run.made is not None else partial(stored_tables.read_table, run.folder, outputs=outputs)
+        run.tables.get if run.tables is not None else partial(stored_tables.read_table, run.folder, outputs=outputs)
     )
     tables = {name: rows for name in sorted(table_names) if (rows := read_table(name)) is not None}
     sides = []

@@ -167,7 +167,11 @@ def check(
         work, started = CaseWork(case), time.perf_counter()
         axes = work.plan.axes
         preparation_s += time.perf_counter() - started
-        labels = case.name, ", ".join((*axes.filters, *(user_filter.name for user_filter in case.outside))), len(axes.k)
+        labels = (
+            case.name,
+            ", ".join((*axes.filters, *(user_filter.name for user_filter in case.user_filters))),
+            len(axes.k),
+        )
         stored_inventory = partial(take_inventory, work, store=out, part=share or (1, 1))
         case_cost = None
         if precision is None:
@@ -194,14 +198,14 @@ def _untimed_cost(
     if seconds is None:
         return None
     stock = stored_inventory(work.case.realisations)
-    seconds *= (stock.asked - stock.stored) / work.case.realisations
-    return CaseCost(*labels, stock.asked, seconds, timed=False, stock=stock)
+    seconds *= (stock.requested - stock.stored) / work.case.realisations
+    return CaseCost(*labels, stock.requested, seconds, timed=False, stock=stock)
 
 
 def short_case_seconds(work: CaseWork, max_s: float) -> float | None:
     """Upper bound on one thread's seconds for all realisations of a case that is surely short, with sums that are small
     beside the interpreter; else None."""
-    if work.plan.axes.available.size > MAX_UNTIMED_ESTIMATES or work.case.outside:
+    if work.plan.axes.available.size > MAX_UNTIMED_ESTIMATES or work.case.user_filters:
         return None
     realisation_s = registry.study(work.case.study).seconds_at_most(work.plan)
     if realisation_s is None or realisation_s * work.case.realisations > max_s:
@@ -223,7 +227,7 @@ def measure_cost(
     realisation_s = seconds_each(work, case.realisations, pilot_s)
     need = None if precision is None else required_realisations(work, precision, realisation_s, quantity_name)
     stock = stored_inventory(case.realisations if need is None else last_look_count(need, case.realisations))
-    return CaseCost(*labels, stock.asked, realisation_s * (stock.asked - stock.stored), True, need, stock)
+    return CaseCost(*labels, stock.requested, realisation_s * (stock.requested - stock.stored), True, need, stock)
 
 
 def required_realisations(

@@ -32,11 +32,11 @@ class DopplerChart(Displayable):
     files: tuple[str, ...]
     sentences: tuple[str, ...]
     table: "pd.DataFrame"
-    drawn: Mapping[str, Figure]
+    figures_by_name: Mapping[str, Figure]
 
     @property
     def _figures_by_name(self) -> Mapping[str, Figure]:
-        return self.drawn
+        return self.figures_by_name
 
     def _answer_lines(self) -> tuple[str, ...]:
         return self.sentences
@@ -103,4 +103,4 @@ def reference_cases(study: str) -> list[Case]:
         experiment = load(study)
     except ConfigError:
         return []
-    return [case for case in experiment.cases if not case.swept and case.study == study]
+    return [case for case in experiment.cases if not case.swept_values and case.study == study]

@@ -70,7 +70,11 @@ def result(finished: "Result") -> dict[str, Any]:
 
 def cost(experiment: "Experiment", estimate: "CostEstimate") -> dict[str, Any]:
     """The cost of a run."""
-    return {"config": experiment.stem, "path": experiment.path, **asdict(estimate), "of": estimate.of.name}
+    document = {"config": experiment.stem, "path": experiment.path, **asdict(estimate), "of": estimate.of.name}
+    for case in document["cases"]:
+        if (stock := case["stock"]) is not None:  # the names of version 0.3
+            stock["asked"], stock["loose"] = stock.pop("requested"), stock.pop("has_loose_blocks")
+    return document
 
 
 def answer(solve_answer: "Answer") -> dict[str, Any]:

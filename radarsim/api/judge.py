@@ -82,7 +82,7 @@ def judge(
     experiment, warnings = add_user_filter(
         base_experiment, estimates, name, component_names, one_by_one, realisations, against=against, wanted=wanted
     )
-    if experiment.cases[0].outside[-1].in_order:
+    if experiment.cases[0].user_filters[-1].in_order:
         threads = 0
     run_arguments: dict[str, Any] = {"precision": precision, "of": of, "progress": progress, "threads": threads}
     return run_judged_experiment(experiment, warnings, out, figures, width_mm, **run_arguments)
@@ -103,7 +103,7 @@ def run_judged_experiment(
     except (DisagreementError, MeasureError) as error:  # raised again below
         result = cast("Result", error.result)
     filter_identities = {
-        user_filter.name: user_filter.identity for case in result.experiment.cases for user_filter in case.outside
+        user_filter.name: user_filter.identity for case in result.experiment.cases for user_filter in case.user_filters
     }
     result.facts |= {"command": command, "judged": filter_identities}
     result.facts["warnings"] = [*warnings, *result.facts["warnings"]]
@@ -137,12 +137,12 @@ def add_user_filter(
     _check_name(name)
     n, cases = arguments.whole_number(realisations), experiment.cases
     member = make_user_filter(estimates, name, components, one_by_one, experiment)
-    member.judged_at = judged_at
+    member.answer_at = judged_at
     available = len(member.arrays[0]) if isinstance(member, StoredEstimates) else None
     if available is not None and (n or 0) > available:
         raise ConfigError(f"{name}: there are estimates of {available} realisations, fewer than {n}")
     counts: dict[str, Any] = {"realisations": n or available} if n or available else {}
-    cases = tuple(replace(case, outside=(*case.outside, member), **counts) for case in cases)
+    cases = tuple(replace(case, user_filters=(*case.user_filters, member), **counts) for case in cases)
     stem = f"{experiment.stem}_{'_'.join(name.split())}"
     judged_experiment = replace(experiment, stem=stem, cases=cases, **counts)
     return judged_experiment, [

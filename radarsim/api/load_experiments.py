@@ -32,7 +32,7 @@ def user_code_lines(experiments: Sequence[Experiment]) -> list[str]:
         user_filter
         for experiment in experiments
         for case in experiment.cases
-        for user_filter in case.outside
+        for user_filter in case.user_filters
         if user_filter.written
     ]
     filters = {f"{user_filter.object_name} in {user_filter.file}": user_filter for user_filter in user_filters}

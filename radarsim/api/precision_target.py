@@ -19,21 +19,21 @@ class PrecisionTarget(NamedTuple):
     """A precision in per cent, its quantity, the table that holds it, and that of curves if errors are heavy-tailed."""
 
     percent: float
-    of: Quantity
+    quantity: Quantity
     table: "Table"
     curves: "Table | None"
 
 
 def heavy_tailed_table(work: CaseWork, quantity: Quantity) -> "Table | None":
     """The table of a case's curves where rare large errors may decide a quantity; None where they do not."""
-    if not quantity.squares or (work.plan.gaussian and not work.case.outside):
+    if not quantity.squares or (work.plan.gaussian and not work.case.user_filters):
         return None
     return _with_user_filters(work.case, "curves", study(work.case.study).curves)
 
 
 def _with_user_filters(case: Case, name: str, table: "Table") -> "Table":
     """A table of a study, with the rows of user filters where a case has any."""
-    if not case.outside:
+    if not case.user_filters:
         return table
     from radarsim.report.user_filters import tables
 

@@ -72,10 +72,10 @@ class WeightedProgress:
         self._progress, self._cases = progress, cases
         self._seconds: dict[Any, float] = {key: count for key, (_, count) in cases.items()}
         self._counts = dict.fromkeys(cases, (0, 0))  # realisations done, and how many of these were stored
-        is_unweighted = len(cases) < 2 or any(work.case.outside for work, _ in cases.values())
+        is_unweighted = len(cases) < 2 or any(work.case.user_filters for work, _ in cases.values())
         self._due = float("inf") if is_unweighted else time.monotonic() + PATIENCE_S
 
-    def of(self, key: Any) -> Progress:
+    def case_callback(self, key: Any) -> Progress:
         """The callback for the progress of one case."""
 
         def report(done: int, _: int, stored: int) -> None:
@@ -109,10 +109,10 @@ class WeightedProgress:
 class KindOfWork:
     """Work of one kind: expected seconds of a unit, the units ahead, the units done, and the seconds these took."""
 
-    expected: float
-    ahead: float = 0.0
-    done: float = 0.0
-    seconds: float = 0.0
+    expected_unit_s: float
+    units_ahead: float = 0.0
+    units_done: float = 0.0
+    seconds_done: float = 0.0
 
 
 class TimedProgress:
@@ -126,22 +126,26 @@ class TimedProgress:
 
     def add(self, kind: str, expected: float, count: float = 1.0) -> None:
         """Expect `count` more units of a kind, of `expected` seconds each; a negative count removes units."""
-        self._kinds.setdefault(kind, KindOfWork(expected)).ahead += count
+        self._kinds.setdefault(kind, KindOfWork(expected)).units_ahead += count
 
     @contextmanager
-    def doing(self, kind: str) -> Iterator[None]:
+    def measure_unit(self, kind: str) -> Iterator[None]:
         """Measure a unit of a kind."""
         started = time.monotonic()
         yield
-        self.did(kind, 1.0, time.monotonic() - started)
+        self.record_units(kind, 1.0, time.monotonic() - started)
 
-    def did(self, kind: str, count: float, seconds: float) -> None:
+    def record_units(self, kind: str, count: float, seconds: float) -> None:
         """Record that `count` units of a kind took `seconds`."""
         work = self._kinds[kind]
-        work.ahead, work.done, work.seconds = work.ahead - count, work.done + count, work.seconds + seconds
+        work.units_ahead, work.units_done, work.seconds_done = (
+            work.units_ahead - count,
+            work.units_done + count,
+            work.seconds_done + seconds,
+        )
         self._report()
 
-    def running(self, kind: str, expected: Callable[[], float]) -> Progress:
+    def run_callback(self, kind: str, expected: Callable[[], float]) -> Progress:
         """The progress callback of a run, whose units are its expected seconds; these are known after `estimate`."""
         last_time, computed_s, stored_s = time.monotonic(), 0.0, 0.0
 
@@ -157,7 +161,7 @@ class TimedProgress:
                 self.add(kind, 1.0, -realisation_s * done)
             else:
                 self.add(kind, 1.0, stored_s - realisation_s * stored)
-                self.did(kind, realisation_s * (done - stored) - computed_s, now - last_time)
+                self.record_units(kind, realisation_s * (done - stored) - computed_s, now - last_time)
             last_time, computed_s, stored_s = now, realisation_s * (done - stored), realisation_s * stored
 
         return report
@@ -173,10 +177,12 @@ class TimedProgress:
         Times are as measured; an expectation counts as TRUSTED_S of measurement, corrected by how much slower all kinds
         are than expected."""
         kinds = self._kinds.values()
-        slowdown = (TRUSTED_S + sum(work.seconds for work in kinds)) / (
-            TRUSTED_S + sum(work.expected * work.done for work in kinds)
+        slowdown = (TRUSTED_S + sum(work.seconds_done for work in kinds)) / (
+            TRUSTED_S + sum(work.expected_unit_s * work.units_done for work in kinds)
         )
         return sum(
-            work.ahead * (work.seconds + TRUSTED_S * slowdown) / (work.done + TRUSTED_S / work.expected)
+            work.units_ahead
+            * (work.seconds_done + TRUSTED_S * slowdown)
+            / (work.units_done + TRUSTED_S / work.expected_unit_s)
             for work in kinds
         )

@@ -53,7 +53,7 @@ def measured_tables(results: Sequence[CaseResult]) -> dict:
     tables_by_name = {
         name: study_tables[name] if name in study_tables else table(results) for name, table in shared.items()
     } | study_tables
-    if any(result.against for result in results):
+    if any(result.further_baselines for result in results):
         tables_by_name["gains"] = _against_all(results, lambda result: measured_tables([result])["gains"])
     return tables_by_name
 
@@ -62,7 +62,7 @@ def gains_table(case_study: Study) -> "Callable[[Sequence[CaseResult]], pd.DataF
     """The function that makes only the gains table of a study's results, against all their baselines."""
 
     def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
-        if any(result.against for result in results):
+        if any(result.further_baselines for result in results):
             return _against_all(results, lambda result: case_study.gains([result]))
         return case_study.gains(results)
 
@@ -71,7 +71,9 @@ def gains_table(case_study: Study) -> "Callable[[Sequence[CaseResult]], pd.DataF
 
 def _against_all(results: Sequence[CaseResult], gains: "Callable[[CaseResult], pd.DataFrame]") -> "pd.DataFrame":
     """The gains of each case against its first baseline, then against the others."""
-    baseline_results = [replace(against, against=()) for result in results for against in (result, *result.against)]
+    baseline_results = [
+        replace(against, further_baselines=()) for result in results for against in (result, *result.further_baselines)
+    ]
     return common.stack_tables([gains(result) for result in baseline_results])
 
 
@@ -79,7 +81,7 @@ def with_first_baseline(
     tables_by_name: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
 ) -> Mapping[str, "pd.DataFrame"]:
     """The tables with gains against the first baseline of each case only."""
-    if not any(result.against or result.outside for result in results):
+    if not any(result.further_baselines or result.user_filters for result in results):
         return tables_by_name
     return {**tables_by_name, "gains": common.gains_against_baselines(tables_by_name["gains"], results)}
 
@@ -97,7 +99,7 @@ class Answer(NamedTuple):
 def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
     """The answer of an experiment: on user filters, of its study, and gains against further baselines."""
     study_tables = with_first_baseline(tables.without_user_filters(tables_by_name, results), results)
-    further_baselines = [gain for result in results for gain in result.against]
+    further_baselines = [gain for result in results for gain in result.further_baselines]
     answer = [
         *user_filters_answer.answer(results, tables_by_name),
         *(
@@ -133,7 +135,7 @@ def config_names(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
     words: set[str] = set()
     for case in cases:
         words |= {case.name, case.name.partition(" ")[0]}
-        words.update(re.findall(r"'([^']+)'", f"{case.spec.model_dump()}{case.swept}"))
+        words.update(re.findall(r"'([^']+)'", f"{case.spec.model_dump()}{case.swept_values}"))
     return frozenset(name for word in words for name in (word, word.replace("_", " ")) if name)
 
 
@@ -162,7 +164,7 @@ def case_figures(
 ) -> dict[str, Figure]:
     """All figures of an experiment, described, by the stem of their file: the study's own, and of sweeps.
 
-    The config may select fewer: `Experiment.drawn`."""
+    The config may select fewer: `Experiment.selected_figures`."""
     case_study = study(results[0].study)
     figure_tables = _with_bands(tables_by_name)
     figures_by_name = _study_figures(results, tables.without_user_filters(figure_tables, results), experiment)
@@ -194,8 +196,8 @@ def _study_figures(
     """The figures of a study; those of gains against each further baseline get its number: `gain_r_2`."""
     case_study = study(results[0].study)
     figures_by_name = dict(case_study.figures(results, with_first_baseline(study_tables, results), experiment))
-    for n in range(max(len(result.against) for result in results)):
-        baseline_results = [result.against[n] for result in results if len(result.against) > n]
+    for n in range(max(len(result.further_baselines) for result in results)):
+        baseline_results = [result.further_baselines[n] for result in results if len(result.further_baselines) > n]
         gains = common.gains_against_baselines(study_tables["gains"], baseline_results)
         baseline_figures = case_study.figures(baseline_results, {**study_tables, "gains": gains}, experiment)
         figures_by_name |= {

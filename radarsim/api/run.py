@@ -94,8 +94,8 @@ def run(
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
     started, writing_s = time.perf_counter(), None
     filter_warnings = _filter_warnings(experiment)
-    if out is not None and isinstance(limit, stopping.TimeLimit) and limit.left >= MIN_MEASURED_LIMIT_S:
-        limit = limit.reserving(writing_s := writing_seconds(experiment, figures, width_mm))
+    if out is not None and isinstance(limit, stopping.TimeLimit) and limit.remaining_s >= MIN_MEASURED_LIMIT_S:
+        limit = limit.with_reserve(writing_s := writing_seconds(experiment, figures, width_mm))
     with open_executor(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else available_cores() if threads is None else int(threads)
         options = RunOptions(out, threads, stopping.AnyStop(stop, limit), pool)
@@ -117,7 +117,7 @@ def run(
     reached_precision = None if simulated.stopped or precision is None else (precision, of)
     repeat = repeat_command(experiment, simulated.done, overrides, reached_precision)
     result = make_result(experiment, simulated, facts, repeat)
-    run_warnings = (line for case in experiment.cases for member in case.outside for line in member.warnings())
+    run_warnings = (line for case in experiment.cases for member in case.user_filters for line in member.warnings())
     result.facts["warnings"] += dict.fromkeys((*filter_warnings, *run_warnings))
     if out is None:
         result.check()
@@ -132,7 +132,7 @@ def _filter_warnings(experiment: Experiment) -> list[str]:
         return []
     from radarsim.api.filter_checks import check_user_filter
 
-    user_filters = [(case, member) for case in experiment.cases for member in case.outside if member.written]
+    user_filters = [(case, member) for case in experiment.cases for member in case.user_filters if member.written]
     return list(dict.fromkeys(line for case, member in user_filters for line in check_user_filter(case, member)))
 
 

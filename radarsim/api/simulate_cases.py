@@ -112,7 +112,7 @@ def simulate(
             options = replace(options, out=stack.enter_context(tempfile.TemporaryDirectory(prefix="radarsim-")))
         for case, (key, work) in zip(experiment.cases, works, strict=True):
             if key not in collected_by_key:
-                collector = _collector(work, options, weighted_progress.of(key), collect)
+                collector = _collector(work, options, weighted_progress.case_callback(key), collect)
                 target = None
                 if precision is not None:
                     quantity = registry.quantity(quantity_name, case)
@@ -162,9 +162,9 @@ def _collect_case(
         # A run that is stopped before a look may hold fewer realisations without a gap than at the previous look.
         if best is None or looks[-1].count > best.count:
             best = looks[-1]
-            cell = widest_cell(case_result(case, work, best), target.table, target.of) if best.count else None
-            if cell is None and best.count and target.of != SIGMA:
-                raise ConfigError(unknown_quantity(case, target.of))
+            cell = widest_cell(case_result(case, work, best), target.table, target.quantity) if best.count else None
+            if cell is None and best.count and target.quantity != SIGMA:
+                raise ConfigError(unknown_quantity(case, target.quantity))
         if looks[-1].stopped or cell is None:
             break
         if cell.percent < target.percent and n >= minimum_realisations(case_result(case, work, best), target.curves):
@@ -195,7 +195,7 @@ def compute_shares(
     weighted_progress = WeightedProgress(progress, {key: (work, -(-key[1] // share[1])) for key, work in works.items()})
     shares: dict[str, ShareResult] = {}
     for key, work in works.items():
-        share_result = _collector(work, options, weighted_progress.of(key), compute_share)(key[1], share)
+        share_result = _collector(work, options, weighted_progress.case_callback(key), compute_share)(key[1], share)
         shares[work.case.name] = share_result
         if share_result.stopped:
             break

@@ -36,14 +36,16 @@ def store_gap_sentence(experiment: Experiment, out: str | os.PathLike[str]) -> s
         pieces = Store(out, work).pieces()
         if pieces and Total(case.realisations) not in pieces:
             stock = take_inventory(work, case.realisations, out)
-            if stock.loose and stock.missing:
+            if stock.has_loose_blocks and stock.missing:
                 incomplete.setdefault(work.identity, (work, stock))
     if not incomplete:
         return None
     (work, stock), *further_cases = incomplete.values()
     values: dict[str, Any] = {"config": experiment.stem, "case": work.case.name, "count": len(incomplete)}
+    inventories = [inventory for _, inventory in incomplete.values()]
     values |= {
-        name: sum(getattr(inventory, name) for _, inventory in incomplete.values()) for name in ("asked", "stored")
+        "asked": sum(inventory.requested for inventory in inventories),
+        "stored": sum(inventory.stored for inventory in inventories),
     }
     values["missing"] = missing_realisations(stock)
     sentence = tr("{config}: {stored:,} of {asked:,} realisations are stored; missing: {missing}", **values)
@@ -108,9 +110,9 @@ def missing_blocks_line(name: str, stock: Inventory, store: Store) -> str:
     out = store.path.parent.parent
     if not stock.stored:
         reasons = [*store.warnings, *(["those there are of other sources, as before an edit"] * store.superseded())]
-        return "; ".join([f"{name}: {stock.asked:,} realisations are not stored in {out}", *reasons])
+        return "; ".join([f"{name}: {stock.requested:,} realisations are not stored in {out}", *reasons])
     missing = missing_realisations(stock)
-    return f"{name}: {stock.stored:,} of {stock.asked:,} realisations are stored in {out}; missing: {missing}"
+    return f"{name}: {stock.stored:,} of {stock.requested:,} realisations are stored in {out}; missing: {missing}"
 
 
 def make_result(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], repeat: str) -> "Result":

@@ -126,8 +126,8 @@ def _selected_figures(
 ) -> dict[str, Figure]:
     """The figures that the config selects, after the first of user filters: the answer is about it."""
     all_figures = case_figures(results, tables_by_name, experiment)
-    first_figures = [*all_figures][:1] if any(result.outside for result in results) else []
-    names = dict.fromkeys([*first_figures, *experiment.drawn(all_figures)])
+    first_figures = [*all_figures][:1] if any(result.user_filters for result in results) else []
+    names = dict.fromkeys([*first_figures, *experiment.selected_figures(all_figures)])
     return {name: all_figures[name] for name in names}
 
 

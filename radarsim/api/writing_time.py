@@ -31,7 +31,7 @@ def writing_seconds(experiment: Experiment, figures: bool | str | Sequence[str],
         return MARGIN * tables_s
     from radarsim.report.drawing.canvas import draw
 
-    names = experiment.drawn(figures_by_name) or list(figures_by_name)
+    names = experiment.selected_figures(figures_by_name) or list(figures_by_name)
     started = time.perf_counter()
     for name in dict.fromkeys((names[0], names[-1])):
         draw(figures_by_name[name], formats, width_mm)

@@ -33,7 +33,7 @@ class QuantityCommand(click.Command):
     """A command with an option for each quantity that a study measures, shipped or installed."""
 
     @functools.cached_property
-    def asking(self) -> dict[str, click.Option]:
+    def quantity_options(self) -> dict[str, click.Option]:
         """Those options, by the quantity's name."""
         from radarsim.studies import registry
 
@@ -46,10 +46,10 @@ class QuantityCommand(click.Command):
         return {name: _option(by_study, len(by_study) == study_count) for name, by_study in studies_by_quantity.items()}
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        return [*super().get_params(ctx), *self.asking.values()]
+        return [*super().get_params(ctx), *self.quantity_options.values()]
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        for title, params in (("Quantities", self.asking.values()), ("Options", super().get_params(ctx))):
+        for title, params in (("Quantities", self.quantity_options.values()), ("Options", super().get_params(ctx))):
             with formatter.section(title):
                 options = [param for param in params if isinstance(param, click.Option)]
                 formatter.write_dl([record for option in options if (record := option.get_help_record(ctx))])

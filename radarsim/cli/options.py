@@ -55,15 +55,15 @@ class Positive(click.ParamType):
     """A finite number above zero, and up to `maximum`."""
 
     def __init__(self, name: str, maximum: float = math.inf):
-        self.name, self.most = name, maximum
+        self.name, self.maximum = name, maximum
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         try:
             number = float(value)
         except ValueError:
             number = math.nan
-        if not (0 < number <= self.most and math.isfinite(number)):
-            bound = f" and ≤ {self.most:g}" if math.isfinite(self.most) else ""
+        if not (0 < number <= self.maximum and math.isfinite(number)):
+            bound = f" and ≤ {self.maximum:g}" if math.isfinite(self.maximum) else ""
             self.fail(f"must be a number > 0{bound}, got {value!r}", param, ctx)
         return number
 

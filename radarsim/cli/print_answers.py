@@ -52,7 +52,7 @@ def print_tuning(tuning: "TuningResult") -> None:
             for case in tuning.cases
         ]
         columns = ["case", "stated", "tuned", "gain", *([] if tuning.exact else ["95 % of gain"])]
-        title = f"{tuning.quantity.said}, {tr(tuning.unit)}"
+        title = f"{tuning.quantity.translated_words}, {tr(tuning.unit)}"
         print_table(title, columns, rows, right=columns[1:], spare=())
     for note in tuning.notes:
         print_field("note", note)

@@ -188,7 +188,7 @@ def print_cost(experiment: "Experiment", outlook: "CostEstimate") -> None:
         (case.name, stock) for case in outlook.cases if (stock := case.stock) and stock.stored and stock.missing
     ]
     for name, stock in started_cases[:MAX_STARTED_CASES]:
-        values = {"stored": stock.stored, "asked": stock.asked, "missing": missing_realisations(stock)}
+        values = {"stored": stock.stored, "asked": stock.requested, "missing": missing_realisations(stock)}
         print_field(name, tr("{stored:,} of {asked:,} stored; missing: {missing}", **values))
     if len(started_cases) > MAX_STARTED_CASES:
         print_line(tr("and {cases} more stored in part", cases=case_count_text(len(started_cases) - MAX_STARTED_CASES)))

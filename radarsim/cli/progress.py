@@ -32,10 +32,10 @@ class Progress:
     are forbidden it begins with that report. The rate is that of computations since then: neither compilation nor
     stored results count."""
 
-    shares = True  # the share of a whole is known, and shown by a bar
+    shows_share = True  # the share of a whole is known, and shown by a bar
     first: Report = (0.0, 0, None)
     last: Report = first
-    whole = False  # nothing follows after the last report
+    includes_results = False  # nothing follows after the last report
 
     def __init__(self, title: str, quiet: bool = False):
         self.title, self.quiet = title, quiet
@@ -97,7 +97,7 @@ class Progress:
             text += tr("  the results follow")
         elif rate > 0:
             text += tr("  {left} left", left=clock((total - done) / rate))
-            text += "" if self.whole else tr(", then the results")
+            text += "" if self.includes_results else tr(", then the results")
         return text
 
     def _start_bar(self) -> "Bar":
@@ -105,7 +105,7 @@ class Progress:
         from rich.progress import Progress as Bar
 
         text_column = TextColumn("{task.fields[text]}")
-        columns = (TextColumn("{task.description}"), BarColumn(), text_column) if self.shares else (text_column,)
+        columns = (TextColumn("{task.description}"), BarColumn(), text_column) if self.shows_share else (text_column,)
         bar = Bar(*columns, console=rich_console(sys.stderr), transient=True, auto_refresh=not forbidden())
         self.task = bar.add_task(self.title, total=None, text=tr("begins"))
         bar.start()
@@ -121,7 +121,7 @@ class TimedProgress(Progress):
     """Progress in milliseconds, of those that all is expected to take, the results included. The share shown never goes
     back: where more is expected than before, it waits."""
 
-    whole = True
+    includes_results = True
     share = 0.0
 
     def rate(self, computed: int, total: int | None) -> float:
@@ -138,25 +138,31 @@ class TimedProgress(Progress):
 class CountedProgress(Progress):
     """Progress of work without a known end, on stderr if that is a terminal, once it has lasted most of a second."""
 
-    shares = False
-    before: Report = (0.0, 0, None)  # the report before the last; here they are those since which the time has doubled
+    shows_share = False
+    previous: Report = (
+        0.0,
+        0,
+        None,
+    )  # the report before the last; here they are those since which the time has doubled
 
     def __init__(self, title: str, unit: str):
         super().__init__(title)
-        self.what = tr(unit)
+        self.unit = tr(unit)
 
     def rate(self, computed: int, total: int | None) -> float:
         """How many are done in a second, on average since the first report: before it files are read, kernels made."""
         now = time.monotonic(), computed, total
         if not self.first[1]:
-            self.first = self.last = self.before = now
+            self.first = self.last = self.previous = now
         if now[0] - self.first[0] >= 2 * (self.last[0] - self.first[0]):
-            self.before, self.last = self.last, now
+            self.previous, self.last = self.last, now
         return _between(self.first, now)
 
     def _text(self, done: int, total: int | None, rate: float) -> str:
-        text = tr("{title}: {done:,} {what}, {rate:,.0f}/s", title=tr(self.title), done=done, what=self.what, rate=rate)
-        recent_rate = _between(self.before, (time.monotonic(), done, total))  # over the last half of the time, or more
+        text = tr("{title}: {done:,} {what}, {rate:,.0f}/s", title=tr(self.title), done=done, what=self.unit, rate=rate)
+        recent_rate = _between(
+            self.previous, (time.monotonic(), done, total)
+        )  # over the last half of the time, or more
         if total is None or not rate / STEADY_RATIO < recent_rate < rate * STEADY_RATIO:
             return text
         return text + "  " + tr("about {left} left", left=clock((total - done) / rate))

@@ -28,7 +28,7 @@ def _swept_choice(experiment: Experiment, command: str) -> str:
     """The same for the cases of a sweep."""
     values: dict[str, list] = {}
     for case in experiment.cases:
-        for key, value in case.swept:
+        for key, value in case.swept_values:
             values.setdefault(key, []).append(value)
     distinct = {
         key: list({swept_value_text(value): value for value in swept}.values()) for key, swept in values.items()

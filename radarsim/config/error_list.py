@@ -53,12 +53,12 @@ class ErrorList:
         source_index = self._sources.index(origin.source)
         self._lines.setdefault(": ".join(parts), (source_index, origin.line, origin.column, len(self._lines)))
 
-    def spoil(self, origin: Origin, path: KeyPath, message: str, got: object = ABSENT) -> None:
+    def mark_unusable(self, origin: Origin, path: KeyPath, message: str, got: object = ABSENT) -> None:
         """Add an error that makes the value at this place unusable: its other errors are not reported."""
         self.add(origin, path, message, got)
         self._spoiled.add((origin._replace(prefix=0), path[origin.prefix :]))
 
-    def spoiled(self, origin: Origin, path: KeyPath) -> bool:
+    def is_unusable(self, origin: Origin, path: KeyPath) -> bool:
         """Whether the value at this place is reported as unusable."""
         return (origin._replace(prefix=0), path[origin.prefix :]) in self._spoiled
 

@@ -40,7 +40,7 @@ class Draft:
     document: Document
     stem: str
     study: str
-    swept: tuple[tuple[str, object], ...]
+    swept_values: tuple[tuple[str, object], ...]
     realisations: int | None
     seed: int | None
 
@@ -88,11 +88,11 @@ class Expander:
     ):
         cached: ReadDocument = cache(read)
         self.path = path
-        self.read, self.faults, self.studies = cached, faults, studies
+        self.files_read, self.faults, self.studies = cached, faults, studies
         settings = list(settings)
         self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
         self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
-        self.expanded: dict[tuple[FilePath, ...], list[Draft]] = {}
+        self.open_configs: dict[tuple[FilePath, ...], list[Draft]] = {}
 
     def experiment(self, document: Document) -> Experiment | None:
         """The experiment that a config describes; None if errors were added."""
@@ -170,11 +170,11 @@ class Expander:
         for overlay in overlays:
             study_keys, study = self._carry_to_study(study_keys, study, overlay)
             study_keys = overlay_keys(
-                study_keys, self.studies.keys(study), overlay.without_keys(COMMON_KEYS), self.read, self.faults
+                study_keys, self.studies.keys(study), overlay.without_keys(COMMON_KEYS), self.files_read, self.faults
             )
         for setting in self.settings:
             study_keys = self._with_setting(study_keys, study, setting)
-        study_keys = inline_scenarios(study_keys, self.studies.keys(study), self.read, self.faults)
+        study_keys = inline_scenarios(study_keys, self.studies.keys(study), self.files_read, self.faults)
         stem = normalised_name(document.file.stem) if document.file else "config"
         return [Draft(study_keys, stem, study, (), common.realisations, common.seed)]
 
@@ -192,10 +192,12 @@ class Expander:
         if not self.studies.is_study(wanted_study):
             self._add_unknown_study(overlay, wanted_study)
             return document, study
-        data = self.studies.keys(wanted_study).carried(study, document.data)
+        data = self.studies.keys(wanted_study).convert_keys(study, document.data)
         if data is None:
             accepting = [
-                name for name in self.studies.usable_studies() if self.studies.keys(name).carried(study, {}) is not None
+                name
+                for name in self.studies.usable_studies()
+                if self.studies.keys(name).convert_keys(study, {}) is not None
             ]
             alternative = f", or one that takes over its keys: {', '.join(accepting)}" if accepting else ""
             message = f"must be that of the config, {study}{alternative}"
@@ -239,13 +241,13 @@ class Expander:
             self.faults.add(origin, path, "a config cannot include itself", name)
         elif len(chain) > MAX_INCLUDE_DEPTH:
             self.faults.add(origin, path, f"includes nested more than {MAX_INCLUDE_DEPTH} deep", name)
-        elif (cache_key := (file.resolve(), *(FilePath(overlay.source) for overlay in overlays))) in self.expanded:
-            return self.expanded[cache_key]
-        elif included := self.read(file, self.faults):
+        elif (cache_key := (file.resolve(), *(FilePath(overlay.source) for overlay in overlays))) in self.open_configs:
+            return self.open_configs[cache_key]
+        elif included := self.files_read(file, self.faults):
             _, drafts = self._expand(included, chain, overlays)
             if changes_included(included):
                 drafts = _rename_drafts(drafts, normalised_name(file.stem))
-            return self.expanded.setdefault(cache_key, drafts)
+            return self.open_configs.setdefault(cache_key, drafts)
         return []
 
     def _sweep_drafts(
@@ -299,7 +301,7 @@ class Expander:
     ) -> bool:
         """Whether another sweep sets some of these places; adds an error where one does."""
         for draft in drafts:
-            for other_key in (*(swept_key for swept_key, _ in draft.swept), *earlier_keys):
+            for other_key in (*(swept_key for swept_key, _ in draft.swept_values), *earlier_keys):
                 other_paths = self._paths_in(draft, other_key)
                 if any(paths_overlap(path, swept_path) for path in other_paths for swept_path in swept_paths):
                     self.faults.add(origin, ("sweep", key), f"sweeps what {other_key} sweeps as well")
@@ -329,13 +331,13 @@ class Expander:
         document = draft.document
         for setting in settings:
             document = self._with_setting(document, draft.study, setting)
-        swept = (*draft.swept, *((setting.key, setting.value) for setting in settings))
-        return replace(draft, document=document, swept=swept)
+        swept = (*draft.swept_values, *((setting.key, setting.value) for setting in settings))
+        return replace(draft, document=document, swept_values=swept)
 
     def _with_setting(self, document: Document, study: str, setting: Setting) -> Document:
         """A document with a setting; adds an error if its key has no place."""
         try:
-            return place_setting(document, self.studies.keys(study), setting, self.read, self.faults)
+            return place_setting(document, self.studies.keys(study), setting, self.files_read, self.faults)
         except NoSuchKey as error:
             self.faults.add(setting.origin, (), str(error))
             return document
@@ -343,7 +345,7 @@ class Expander:
     def _checked_case(self, draft: Draft) -> Case | None:
         """The checked case of a draft; None if errors were added."""
         model = self.studies.keys(draft.study)
-        document = inline_scenarios(draft.document, model, self.read, self.faults)
+        document = inline_scenarios(draft.document, model, self.files_read, self.faults)
         document = resolve_data_files(document, model, self.faults)
         document, outside = separate_code_filters(document, model, self.studies.filter_from_code, self.faults)
         document, against = self._split_baselines(document, model)
@@ -352,10 +354,18 @@ class Expander:
             self.faults.add(document.origin(()), ("realisations",), "required key is missing")
         if spec is None or draft.realisations is None:
             return None
-        name = " ".join([draft.stem, *(f"{key}={swept_value_text(value)}" for key, value in draft.swept)])
+        name = " ".join([draft.stem, *(f"{key}={swept_value_text(value)}" for key, value in draft.swept_values)])
         seed = 1 if draft.seed is None else draft.seed
         return Case(
-            name, draft.stem, draft.study, spec, draft.swept, draft.realisations, seed, against=against, outside=outside
+            name,
+            draft.stem,
+            draft.study,
+            spec,
+            draft.swept_values,
+            draft.realisations,
+            seed,
+            further_baselines=against,
+            user_filters=outside,
         )
 
     def _split_baselines(self, document: Document, model: type[StudyKeys]) -> tuple[Document, tuple[str, ...]]:

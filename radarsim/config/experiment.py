@@ -27,21 +27,23 @@ class Case:
     stem: str
     study: str
     spec: Any
-    swept: tuple[tuple[str, object], ...]
+    swept_values: tuple[tuple[str, object], ...]
     realisations: int
     seed: int
-    noise_of: Any = None
+    noise_keys: Any = None
     asked_from_k: int = 0
     roughly: bool = False
-    against: tuple[str, ...] = ()
-    outside: tuple[Any, ...] = ()
+    further_baselines: tuple[str, ...] = ()
+    user_filters: tuple[Any, ...] = ()
 
     def __post_init__(self) -> None:
-        bound = tuple(member.bound_to(self) for member in self.outside)  # what such a filter reads depends on the case
-        object.__setattr__(self, "outside", bound)
+        bound = tuple(
+            member.bound_to(self) for member in self.user_filters
+        )  # what such a filter reads depends on the case
+        object.__setattr__(self, "user_filters", bound)
 
     def __repr__(self) -> str:
-        filters = ", ".join(member.name for member in (*self.spec.members, *self.outside))
+        filters = ", ".join(member.name for member in (*self.spec.members, *self.user_filters))
         count = f"{self.realisations:,} realisation{'s' * (self.realisations != 1)}"
         return f"<case {self.name}: {count}, seed {self.seed}; filters {filters}>"
 
@@ -49,24 +51,31 @@ class Case:
     def companions(self) -> "tuple[Case, ...]":
         """The case with each further baseline in place of that of the spec."""
         return tuple(
-            replace(self, spec=self.spec.model_copy(update={"baseline": baseline}), against=(), outside=())
-            for baseline in self.against
+            replace(
+                self, spec=self.spec.model_copy(update={"baseline": baseline}), further_baselines=(), user_filters=()
+            )
+            for baseline in self.further_baselines
         )
 
     @property
     def keys(self) -> dict[str, Any]:
         """The keys as plain data, including names, and all baselines if there are several."""
         keys, members = all_keys(self.spec), self.spec.bare_keys
-        user_baselines = (user_filter.name for user_filter in self.outside if user_filter.baseline)
-        if further_baselines := [*self.against, *user_baselines]:
+        user_baselines = (user_filter.name for user_filter in self.user_filters if user_filter.baseline)
+        if further_baselines := [*self.further_baselines, *user_baselines]:
             keys["baseline"] = [*filter(None, [keys.get("baseline")]), *further_baselines]
-        if code_filters := [user_filter.written for user_filter in self.outside if user_filter.written]:
+        if code_filters := [user_filter.written for user_filter in self.user_filters if user_filter.written]:
             keys[members] = [*keys[members], *code_filters]
         return keys
 
     def resolved(self) -> dict[str, Any]:
         """The case as plain JSON-able data, names included."""
-        common = {"case": self.name, "swept": dict(self.swept), "realisations": self.realisations, "seed": self.seed}
+        common = {
+            "case": self.name,
+            "swept": dict(self.swept_values),
+            "realisations": self.realisations,
+            "seed": self.seed,
+        }
         return common | self.keys
 
 
@@ -101,13 +110,13 @@ class Experiment:
             "cases": [case.resolved() for case in self.cases],
         }
 
-    def shown_in(self, figure: str) -> tuple[Case, ...]:
+    def cases_in_figure(self, figure: str) -> tuple[Case, ...]:
         """The cases in a figure: all, unless the config selects some."""
         if figure not in self.figures:
             return self.cases
         return tuple(case for case in self.cases if any(matches_pattern(case.name, p) for p in self.figures[figure]))
 
-    def drawn(self, figures: Iterable[str]) -> list[str]:
+    def selected_figures(self, figures: Iterable[str]) -> list[str]:
         """The figures that the config selects, in its order; all if it selects none."""
         figure_names = list(figures)
         selected = [name for pattern in self.figures for name in figure_names if matches_pattern(name, pattern)]

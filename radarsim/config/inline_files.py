@@ -25,19 +25,19 @@ def inline_scenarios(
         if not is_wanted or not isinstance(stem, str):
             continue
         origin, path = document.origin((field,)), (field,)
-        if faults.spoiled(origin, path):
+        if faults.is_unusable(origin, path):
             continue
         file = scenario_file(stem, document.file) if is_stem(stem) else None
         if not is_stem(stem):
-            faults.spoil(origin, path, "must be the stem of a scenario, without folder or suffix", stem)
+            faults.mark_unusable(origin, path, "must be the stem of a scenario, without folder or suffix", stem)
         elif file is None:
             known_stems = available_stems("scenarios")
             hint = did_you_mean(stem, known_stems) or f"; there are: {', '.join(known_stems)}"
-            faults.spoil(origin, path, f"no such scenario{hint}", stem)
+            faults.mark_unusable(origin, path, f"no such scenario{hint}", stem)
         elif scenario := read(file, faults):
             document = document.graft_document(path, scenario)
         else:
-            faults.spoil(origin, path, "the scenario cannot be read", stem)
+            faults.mark_unusable(origin, path, "the scenario cannot be read", stem)
     return document
 
 
@@ -53,7 +53,7 @@ def resolve_data_files(document: Document, model: type[StudyKeys], faults: Error
         if file.is_file():
             document = document.with_data(path, str(file))
         else:
-            faults.spoil(origin, path, f"no such file: {quoted_value(str(file))}")
+            faults.mark_unusable(origin, path, f"no such file: {quoted_value(str(file))}")
     return document
 
 

@@ -60,11 +60,11 @@ Anything = Annotated[Any, pydantic.WithJsonSchema({})]
 class WholeNumber:
     """Marks a whole number between bounds, which may be written as 1e5: `scans: Annotated[int, Whole(3, 100)]`."""
 
-    least: int
-    most: int
+    minimum: int
+    maximum: int
 
     def __get_pydantic_core_schema__(self, source: object, handler: pydantic.GetCoreSchemaHandler) -> CoreSchema:
-        bounded = core_schema.int_schema(strict=True, ge=self.least, le=self.most)
+        bounded = core_schema.int_schema(strict=True, ge=self.minimum, le=self.maximum)
         return core_schema.no_info_before_validator_function(_to_whole, bounded)
 
 

@@ -50,6 +50,6 @@ class OnlyForMark:
 
     default: its value there, if it is not given; needed: whether it is required there. Elsewhere it is refused."""
 
-    where: Mapping[str, tuple[str, ...]]
+    allowed_values: Mapping[str, tuple[str, ...]]
     default: Any = None
-    needed: bool = False
+    is_required: bool = False

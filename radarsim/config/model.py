@@ -42,7 +42,7 @@ class Model(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """Raise ConfigError if a key is bound to values that no other key can have."""
         for name, mark in only_marks(cls).items():
-            for key_beside, values in mark.where.items():
+            for key_beside, values in mark.allowed_values.items():
                 error_start = f"{cls.__name__}.{name}: only: "
                 if key_beside not in cls.model_fields:
                     raise ConfigError(
@@ -82,17 +82,19 @@ class Model(BaseModel):
         value, mark = getattr(self, name), only_marks(type(self)).get(name)
         if value is not None or mark is None:
             return value
-        is_used = all(self._value_or_default(key) in values for key, values in mark.where.items())
+        is_used = all(self._value_or_default(key) in values for key, values in mark.allowed_values.items())
         return mark.default if is_used else None
 
     def _check_kind(self, name: str, mark: OnlyForMark) -> Iterator[CheckError]:
         """The error of a key that the given kind refuses, or requires."""
-        value, given_kinds = getattr(self, name), {key: self._value_or_default(key) for key in mark.where}
-        wrong_key = next((key for key, values in mark.where.items() if given_kinds[key] not in values), None)
+        value, given_kinds = getattr(self, name), {key: self._value_or_default(key) for key in mark.allowed_values}
+        wrong_key = next((key for key, values in mark.allowed_values.items() if given_kinds[key] not in values), None)
         if value is not None and wrong_key is not None:
             given_kind = "" if given_kinds[wrong_key] is None else f", not {given_kinds[wrong_key]}"
-            yield check_error(name, f"belongs to {wrong_key}: {' or '.join(mark.where[wrong_key])}{given_kind}")
-        elif value is None and wrong_key is None and mark.needed:
+            yield check_error(
+                name, f"belongs to {wrong_key}: {' or '.join(mark.allowed_values[wrong_key])}{given_kind}"
+            )
+        elif value is None and wrong_key is None and mark.is_required:
             yield check_error(name, "is needed by " + ", ".join(f"{key}: {kind}" for key, kind in given_kinds.items()))
 
     def misfits(self) -> Iterator[CheckError]:

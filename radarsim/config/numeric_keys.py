@@ -27,7 +27,7 @@ class NumericKey:
     value: float | None
     low: float
     high: float
-    whole: bool
+    is_whole: bool
 
 
 def numeric_keys(spec: StudyKeys) -> list[NumericKey]:
@@ -72,7 +72,7 @@ def _bounds(allowed: Any) -> tuple[float, float, bool]:
     low, high, is_whole = -math.inf, math.inf, False
     for part in annotation_parts(allowed):
         if isinstance(part, WholeNumber):
-            low, high, is_whole = max(low, part.least), min(high, part.most), True
+            low, high, is_whole = max(low, part.minimum), min(high, part.maximum), True
         low = max([low, *_limits_named(part, "gt", "ge")])
         high = min([high, *_limits_named(part, "lt", "le")])
     return low, high, is_whole
@@ -121,7 +121,7 @@ def _key_in_degrees(key: NumericKey, name: str) -> NumericKey:
     value = None if key.value is None else math.degrees(key.value)
     head = key.path.rpartition(".")[0]
     path = f"{head}.{name.rpartition('.')[2]}".removeprefix(".")
-    return NumericKey(path, value, math.degrees(key.low), math.degrees(key.high), key.whole)
+    return NumericKey(path, value, math.degrees(key.low), math.degrees(key.high), key.is_whole)
 
 
 def _unknown_key_message(name: str, spec: StudyKeys, known_names: list[str]) -> str:

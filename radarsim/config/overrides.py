@@ -56,7 +56,7 @@ def _override_texts(values: Mapping[Any, Any], prefix: str, faults: ErrorList) -
             yield from _override_texts(value, f"{key}.", faults)
             continue
         plain_value = from_python(value, (), origin := override_origin(key), faults)
-        if not faults.spoiled(origin, ()):
+        if not faults.is_unusable(origin, ()):
             yield f"{key}={_yaml_literal(plain_value)}"
 
 

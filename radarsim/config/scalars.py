@@ -36,7 +36,7 @@ def from_text(text: str) -> object:
 def from_python(value: object, path: KeyPath, origin: Origin, faults: ErrorList) -> object:
     """Convert a Python value as if it came from YAML; NumPy scalars and arrays become plain values."""
     if len(path) > DEEPEST:
-        faults.spoil(origin, path[:3], f"nested more than {DEEPEST} deep")
+        faults.mark_unusable(origin, path[:3], f"nested more than {DEEPEST} deep")
         return None
     if hasattr(value, "tolist") and not isinstance(value, type):
         value = value.tolist()
@@ -46,13 +46,13 @@ def from_python(value: object, path: KeyPath, origin: Origin, faults: ErrorList)
         case int() | float():
             return _finite_number(value, path, origin, faults)
         case None:
-            faults.spoil(origin, path, "has no value")
+            faults.mark_unusable(origin, path, "has no value")
             return None
         case Mapping():
             return {str(k): from_python(v, (*path, str(k)), origin, faults) for k, v in value.items()}
         case list() | tuple():
             return [from_python(v, (*path, i), origin, faults) for i, v in enumerate(value)]
-    faults.spoil(origin, path, "must be text, a number, true or false, a list or a mapping", value)
+    faults.mark_unusable(origin, path, "must be text, a number, true or false, a list or a mapping", value)
     return None
 
 
@@ -63,6 +63,6 @@ def _finite_number(value: float | int, path: KeyPath, origin: Origin, faults: Er
     except OverflowError:  # a whole number beyond the largest float
         finite = False
     if not finite:
-        faults.spoil(origin, path, "must be a finite number", value)
+        faults.mark_unusable(origin, path, "must be a finite number", value)
         return None
     return value

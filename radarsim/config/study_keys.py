@@ -29,7 +29,7 @@ class StudyKeys(Model):
     in_place_of: ClassVar[Mapping[str, str]] = {}
 
     @classmethod
-    def carried(cls, study: str, data: Mapping[str, Any]) -> dict[str, Any] | None:
+    def convert_keys(cls, study: str, data: Mapping[str, Any]) -> dict[str, Any] | None:
         """Convert the keys of another study's config, as read, to this study's: the same experiment as far as possible.
 
         Keys that this study lacks stay as they are, so that the check refuses them. None if it cannot convert."""

@@ -77,7 +77,7 @@ def _baseline_names(document: Document, filter_names: list[Any], faults: ErrorLi
     for name in baselines:
         if isinstance(name, str) and name not in filter_names:
             message = f"must be the name of a filter: {', '.join(map(str, filter_names))}"
-            faults.spoil(document.origin(("baseline",)), ("baseline",), message, name)
+            faults.mark_unusable(document.origin(("baseline",)), ("baseline",), message, name)
     return baselines
 
 

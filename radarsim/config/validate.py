@@ -141,7 +141,7 @@ class _PartialCheck:
 
     def _field(self, path: KeyPath, name: str, info: FieldInfo, model: type[Model]) -> Any:
         data = self.document.get(path)
-        if path in self.unusable_paths or self.faults.spoiled(self.document.origin(path), path):
+        if path in self.unusable_paths or self.faults.is_unusable(self.document.origin(path), path):
             raise InvalidFieldError
         if path not in self.paths_with_errors:
             return _field_adapter(model, name).validate_python(radians(data) if path[-1] != name else data)
@@ -191,7 +191,7 @@ def _add_fault(
 ) -> None:
     """Add an error in plain text at the place of its value."""
     kind, path, context = input_error.kind, input_error.path, input_error.context
-    if faults.spoiled(document.origin(path), path):
+    if faults.is_unusable(document.origin(path), path):
         return
     if kind == "extra_forbidden":
         holder = model_at(model, document.data, path[:-1])

@@ -49,7 +49,7 @@ def read_document(file: Path, faults: ErrorList) -> Document | None:
     if document is None:
         return None
     if not isinstance(document.data, dict):
-        if not faults.spoiled(document.origin(()), ()):
+        if not faults.is_unusable(document.origin(()), ()):
             faults.add(document.origin(()), (), "must be a mapping of keys", document.data)
         return None
     return Document(document.data, name, file, document.values, document.keys)
@@ -137,13 +137,13 @@ class _YamlReader:
             self.faults.add(origin, (), f"nested more than {DEEPEST} deep")
             raise _UnreadableError
         if isinstance(event, yaml.AliasEvent):
-            self.faults.spoil(origin, path, f"aliases (*{event.anchor}) are not read: write the value out")
+            self.faults.mark_unusable(origin, path, f"aliases (*{event.anchor}) are not read: write the value out")
             return None
         if event.anchor is not None:
             self.faults.add(origin, path, f"anchors (&{event.anchor}) are not read")
         assert isinstance(event, yaml.CollectionStartEvent | yaml.ScalarEvent)  # besides aliases there is nothing else
         if event.tag is not None:
-            self.faults.spoil(origin, path, f"tags ({event.tag}) are not read")
+            self.faults.mark_unusable(origin, path, f"tags ({event.tag}) are not read")
         if isinstance(event, yaml.SequenceStartEvent):
             return self._read_sequence(path)
         if isinstance(event, yaml.ScalarEvent):
@@ -188,8 +188,8 @@ class _YamlReader:
         try:
             value = from_text(event.value)
         except NotFinite:
-            self.faults.spoil(origin, path, "must be a finite number", event.value)
+            self.faults.mark_unusable(origin, path, "must be a finite number", event.value)
             return None
         if value is None:
-            self.faults.spoil(origin, path, "has no value")
+            self.faults.mark_unusable(origin, path, "has no value")
         return value

@@ -59,7 +59,7 @@ class Node:
         """First realisation and how many, for blocks of `block`."""
         return self.first * block, block << self.level
 
-    def above(self, highest: int) -> Iterator["Node"]:
+    def containing_nodes(self, highest: int) -> Iterator["Node"]:
         """The nodes that contain it, excluding itself, up to the given level."""
         for level in range(self.level + 1, highest + 1):
             yield Node(level, self.index >> (level - self.level))
@@ -85,7 +85,7 @@ class Partial:
         """First realisation and how many, for blocks of `block`."""
         return self.index * block, self.count
 
-    def above(self, highest: int) -> Iterator[Node]:
+    def containing_nodes(self, highest: int) -> Iterator[Node]:
         """The nodes that contain its block, up to the given level."""
         for level in range(highest + 1):
             yield Node(level, self.index >> level)
@@ -105,7 +105,7 @@ class Total:
         """First realisation and how many; the block does not matter."""
         return 0, self.count
 
-    def above(self, highest: int) -> Iterator[Node]:
+    def containing_nodes(self, highest: int) -> Iterator[Node]:
         """Nothing contains a total."""
         return iter(())
 
@@ -125,7 +125,7 @@ def maximal_nodes(nodes: Collection[Node], stop: int) -> list[Node]:
     """Those of the nodes that end by block `stop` and are not contained in another such node, from left to right."""
     inside = {node for node in nodes if node.stop <= stop}
     highest = max((node.level for node in inside), default=0)
-    top = (node for node in inside if not any(larger in inside for larger in node.above(highest)))
+    top = (node for node in inside if not any(larger in inside for larger in node.containing_nodes(highest)))
     return sorted(top, key=lambda node: node.first)
 
 

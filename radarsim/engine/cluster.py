@@ -224,7 +224,7 @@ class Cluster:
         self._tasks[key] = future, work, piece
         future.add_done_callback(self._done.put)
 
-    def finished(self, timeout_s: float) -> list[Outcome]:
+    def take_outcomes(self, timeout_s: float) -> list[Outcome]:
         """Outcomes since the last call, waiting at most timeout_s for the first. Raises ClusterError when the scheduler
         or all workers are gone, or a task cannot run there at all."""
         outcomes: list[Outcome] = []

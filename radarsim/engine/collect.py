@@ -33,7 +33,7 @@ def collect(
     finite, which are not stored; StoreError the file that cannot be written."""
     with limited(threads):
         run = Run(work, realisations, store, progress)
-        return run.finished(None if run.restored() else _compute_missing(run, threads, stop, executor))
+        return run.finish(None if run.restore() else _compute_missing(run, threads, stop, executor))
 
 
 def compute_share(
@@ -53,7 +53,7 @@ def compute_share(
     united by copying: `collect` then finds every block. The other arguments are those of `collect`."""
     with limited(threads):
         run = Share(work, realisations, part, store, progress)
-        return run.finished(None if run.restored() else _compute_missing(run, threads, stop, executor))
+        return run.finish(None if run.restore() else _compute_missing(run, threads, stop, executor))
 
 
 def _compute_missing(run: Dispatch, threads: int | None, stop: Stop | None, executor: Executor | None) -> str | None:
@@ -64,7 +64,7 @@ def _compute_missing(run: Dispatch, threads: int | None, stop: Stop | None, exec
     except StoreError:
         raise
     except BaseException:
-        run.keep(run.pieces())
+        run.store_pieces(run.pieces())
         raise
     finally:
         pool.forget()
@@ -76,4 +76,4 @@ def read_stored(work: Work, realisations: int, store: str | os.PathLike) -> Coll
     """The result of collect, if all of it is stored; else None. Computes and writes nothing, but sets damage aside.
     Every N that collect has returned, however it ended, can be read, also after larger runs."""
     run = Run(work, realisations, store, None)
-    return run.result(None) if run.restored() else None
+    return run.result(None) if run.restore() else None

@@ -83,9 +83,9 @@ class Dispatch:
         store: str | os.PathLike[str] | None,
         progress: Callable[[int, int, int], None] | None,
     ):
-        self.work, self.asked = work, realisations
-        self.full, self.rest = divmod(realisations, work.block)
-        self.first, self.stop = 0, self.full
+        self.work, self.requested = work, realisations
+        self.full_blocks, self.partial_size = divmod(realisations, work.block)
+        self.first, self.stop = 0, self.full_blocks
         self.forest = Forest(work.block, work.size)
         self.partial: Sums | None = None
         self.from_store = self.computed = 0
@@ -97,10 +97,10 @@ class Dispatch:
         self._fault: tuple[Node | Partial, Exception] | None = None  # the leftmost, and what it raised
 
     def _read_pieces(self, writer: StoreWriter) -> None:
-        self.forest = writer.store.forest(self.full)
+        self.forest = writer.store.forest(self.full_blocks)
         writer.note_stored(self.forest.nodes)
-        if self.rest:
-            self.partial = writer.store.read(Partial(self.full, self.rest))
+        if self.partial_size:
+            self.partial = writer.store.read(Partial(self.full_blocks, self.partial_size))
 
     def compute(self, executor: Executor, stop: Stop | None) -> str | None:
         """Dispatch what is missing and collect the outcomes; the reason, if stop gave one."""
@@ -118,7 +118,7 @@ class Dispatch:
                     waiting += 1
             if waiting == 0 or time.perf_counter() > give_up:
                 break
-            for outcome in executor.finished(POLL_S):
+            for outcome in executor.take_outcomes(POLL_S):
                 waiting -= 1
                 self._take(outcome, pace)
             self._report()
@@ -141,8 +141,8 @@ class Dispatch:
                 yield node
                 first = node.stop
                 blocks_left -= 1 << node.level
-        if self.rest and self.partial is None:
-            yield Partial(self.full, self.rest)
+        if self.partial_size and self.partial is None:
+            yield Partial(self.full_blocks, self.partial_size)
 
     def _take(self, outcome: Outcome, pace: Pace) -> None:
         self.kernel_seconds += outcome.seconds
@@ -163,7 +163,7 @@ class Dispatch:
     def _report(self, *, last: bool = False) -> None:
         now = time.perf_counter()
         if self._progress is not None and (last or now >= self._progress_due):
-            self._progress(self.from_store + self.computed, self.asked, self.from_store)
+            self._progress(self.from_store + self.computed, self.requested, self.from_store)
             self._progress_due = now + PROGRESS_S
 
     def pieces(self) -> dict[Piece, Sums]:
@@ -172,10 +172,10 @@ class Dispatch:
         for node, sums in self.forest.nodes.items():
             pieces[node] = sums
         if self.partial is not None:
-            pieces[Partial(self.full, self.rest)] = self.partial
+            pieces[Partial(self.full_blocks, self.partial_size)] = self.partial
         return pieces
 
-    def keep(self, pieces: Mapping[Piece, Sums]) -> None:
+    def store_pieces(self, pieces: Mapping[Piece, Sums]) -> None:
         """Put these into the store, if there is one."""
         if self._writer is not None:
             self._writer.finish(pieces)
@@ -187,7 +187,7 @@ class Dispatch:
             platforms = self._writer.store.platforms
             warnings = (*self._writer.store.warnings, *([mixture_warning(platforms)] if len(platforms) > 1 else []))
         seconds, stopped_by = time.perf_counter() - self.started, {"stopped": stopped, "warnings": warnings}
-        counts = {"asked": self.asked, "from_store": self.from_store, "computed": self.computed}
+        counts = {"asked": self.requested, "from_store": self.from_store, "computed": self.computed}
         return counts | {"seconds": seconds, "kernel_seconds": self.kernel_seconds} | stopped_by
 
 
@@ -196,34 +196,34 @@ class Run(Dispatch):
 
     total: Sums | None = None
 
-    def restored(self) -> bool:
+    def restore(self) -> bool:
         """Read stored pieces; whether these are all."""
         if self._writer is None:
             return False
-        self.total = self._writer.store.read(Total(self.asked))
+        self.total = self._writer.store.read(Total(self.requested))
         if self.total is None:
             self._read_pieces(self._writer)
         sums_read = [self.total] if self.total is not None else self.pieces().values()
         self.from_store = sum(sums.count for sums in sums_read)
-        return self.from_store == self.asked
+        return self.from_store == self.requested
 
-    def finished(self, stopped: str | None) -> CollectedSums:
+    def finish(self, stopped: str | None) -> CollectedSums:
         """The result, once it and all its pieces are stored."""
         result = self.result(stopped)
         if self.total is None:
             pieces = self.pieces()
             if result.count:
                 pieces[Total(result.count)] = Sums(result.count, result.values)
-            self.keep(pieces)
+            self.store_pieces(pieces)
         self._report(last=True)
         return result
 
     def result(self, stopped: str | None) -> CollectedSums:
         """The sums of the finished blocks from realisation 0 on without a gap."""
         sums = self.total or self.forest.total()
-        if self.total is None and self.partial is not None and sums.count == self.full * self.work.block:
-            sums = add_sums(sums, self.partial, 0) if self.full else self.partial
-        short = stopped if sums.count < self.asked else None
+        if self.total is None and self.partial is not None and sums.count == self.full_blocks * self.work.block:
+            sums = add_sums(sums, self.partial, 0) if self.full_blocks else self.partial
+        short = stopped if sums.count < self.requested else None
         return CollectedSums(
             count=sums.count, values=sums.values, superseded=self._superseded, **self._progressed(short)
         )
@@ -244,24 +244,24 @@ class Share(Dispatch):
         self._writer: StoreWriter = StoreWriter(Store(store, work))
         if not self._writer.store.trusted:
             raise StoreError(*self._writer.store.warnings)
-        self.first, self.stop, self.rest = share_of(realisations, work.block, part)
-        self.asked = (self.stop - self.first) * work.block + self.rest
+        self.first, self.stop, self.partial_size = share_of(realisations, work.block, part)
+        self.requested = (self.stop - self.first) * work.block + self.partial_size
 
-    def restored(self) -> bool:
+    def restore(self) -> bool:
         """Read stored pieces; whether these are all of the share."""
         self._read_pieces(self._writer)
         self.from_store = self.done()
-        return self.from_store == self.asked
+        return self.from_store == self.requested
 
     def done(self) -> int:
         """Finished realisations of the share."""
         missing = sum(stop - first for first, stop in self.missing()) * self.work.block
-        return self.asked - missing - (self.rest if self.partial is None else 0)
+        return self.requested - missing - (self.partial_size if self.partial is None else 0)
 
-    def finished(self, stopped: str | None) -> ShareResult:
+    def finish(self, stopped: str | None) -> ShareResult:
         """The result, once it is stored; without a block an empty directory, to be copied too."""
         self._writer.store.make_folder()
-        self.keep(self.pieces())
+        self.store_pieces(self.pieces())
         self._report(last=True)
         done = self.done()
-        return ShareResult(done=done, **self._progressed(stopped if done < self.asked else None))
+        return ShareResult(done=done, **self._progressed(stopped if done < self.requested else None))

@@ -34,7 +34,7 @@ class Executor(Protocol):
     def submit(self, work: Work, piece: Node | Partial) -> None:
         """Submit a task; returns at once."""
 
-    def finished(self, timeout_s: float) -> list[Outcome]:
+    def take_outcomes(self, timeout_s: float) -> list[Outcome]:
         """Outcomes since the last call, waiting at most timeout_s for the first."""
 
     def cancel(self) -> int:
@@ -86,7 +86,7 @@ class Threads:
         """Submit a task; returns at once."""
         self._tasks.put((self._outcomes, work, piece))
 
-    def finished(self, timeout_s: float) -> list[Outcome]:
+    def take_outcomes(self, timeout_s: float) -> list[Outcome]:
         """Outcomes since the last call, waiting at most timeout_s for the first."""
         outcomes = []
         try:
@@ -129,7 +129,7 @@ class Serial:
         """Keep a task until the next call of finished."""
         self._tasks.append((work, piece))
 
-    def finished(self, timeout_s: float) -> list[Outcome]:
+    def take_outcomes(self, timeout_s: float) -> list[Outcome]:
         """Run the oldest task; the timeout has no effect."""
         return [run_task(*self._tasks.popleft())] if self._tasks else []
 

@@ -58,13 +58,13 @@ class CaseResult(Generic[A_co]):
     name: str
     study: str
     spec: Any
-    swept: tuple[tuple[str, Any], ...]
+    swept_values: tuple[tuple[str, Any], ...]
     count: int
     sums: Mapping[str, np.ndarray]
     axes: A_co
     seconds: float = 0.0
-    against: "tuple[CaseResult[A_co], ...]" = ()
-    outside: "CaseResult[Axes] | None" = None
+    further_baselines: "tuple[CaseResult[A_co], ...]" = ()
+    user_filters: "CaseResult[Axes] | None" = None
 
     def __repr__(self) -> str:
         filters = ", ".join(self.axes.filters)

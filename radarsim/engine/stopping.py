@@ -23,20 +23,20 @@ class TimeLimit:
 
     def __init__(self, seconds: float, begun: float | None = None, less: float = 0.0) -> None:
         self.seconds = seconds
-        self.begun = time.monotonic() if begun is None else begun
-        self._end = self.begun + seconds - less
+        self.start_s = time.monotonic() if begun is None else begun
+        self._end = self.start_s + seconds - less
 
     def __call__(self) -> str | None:
         return f"time limit of {self.seconds:g} s" if time.monotonic() >= self._end else None
 
     @property
-    def left(self) -> float:
+    def remaining_s(self) -> float:
         """Seconds until then, at least 0."""
         return max(0.0, self._end - time.monotonic())
 
-    def reserving(self, seconds: float) -> "TimeLimit":
+    def with_reserve(self, seconds: float) -> "TimeLimit":
         """The limit reduced by so many seconds, by at most half of the rest."""
-        return TimeLimit(self.seconds, self.begun, min(seconds, 0.5 * self.left))
+        return TimeLimit(self.seconds, self.start_s, min(seconds, 0.5 * self.remaining_s))
 
 
 class AnyStop:
@@ -70,20 +70,20 @@ class Signals:
     numbers = (signal.SIGINT, signal.SIGTERM)
 
     def __init__(self) -> None:
-        self.received: int | None = None
+        self.received_signal: int | None = None
 
     def __call__(self) -> str | None:
-        return None if self.received is None else f"signal {self.received}"
+        return None if self.received_signal is None else f"signal {self.received_signal}"
 
     def raise_if_received(self) -> None:
         """Interrupted, if a signal came."""
-        if self.received is not None:
-            raise Interruption(self.received)
+        if self.received_signal is not None:
+            raise Interruption(self.received_signal)
 
-    inside = False  # whether one is entered
+    is_entered = False  # whether one is entered
 
     def __enter__(self) -> "Signals":
-        Signals.inside = True
+        Signals.is_entered = True
         self._alone = forbidden()
         if self._alone:
             self._before = {number: signal.signal(number, self._handle) for number in (*self.numbers, signal.SIGALRM)}
@@ -97,7 +97,7 @@ class Signals:
         return self
 
     def __exit__(self, *_: object) -> None:
-        Signals.inside = False
+        Signals.is_entered = False
         for number, handler in self._before.items():
             signal.signal(number, handler)
         if self._alone:
@@ -109,15 +109,15 @@ class Signals:
         os.close(self._pipe)
 
     def _handle(self, number: int, frame: object) -> None:
-        if self.received is not None:
-            self._end(self.received, 0 if number == signal.SIGALRM else number)
-        self.received = number
+        if self.received_signal is not None:
+            self._end(self.received_signal, 0 if number == signal.SIGALRM else number)
+        self.received_signal = number
         signal.setitimer(signal.ITIMER_REAL, self.limit_s)
 
     def _watch(self) -> None:
-        self.received = self._next(None)
-        if self.received is not None and (second := self._next(self.limit_s)) is not None:
-            self._end(self.received, second)
+        self.received_signal = self._next(None)
+        if self.received_signal is not None and (second := self._next(self.limit_s)) is not None:
+            self._end(self.received_signal, second)
 
     @staticmethod
     def _end(first: int, second: int) -> NoReturn:
@@ -145,7 +145,7 @@ def _note_signal(number: int, frame: object) -> None:
 
 def _reset_in_fork() -> None:
     """A process that somebody's code forks is ended by its signals, of which this one does not learn."""
-    if Signals.inside:
+    if Signals.is_entered:
         signal.set_wakeup_fd(-1)
         for number in Signals.numbers:
             signal.signal(number, signal.SIG_DFL)

@@ -28,7 +28,7 @@ class Entry:
         return self.context, self.id
 
     @property
-    def done(self) -> bool:
+    def is_translated(self) -> bool:
         """Whether it is translated, in all its forms."""
         return bool(self.translations) and all(self.translations.values())
 
@@ -72,7 +72,7 @@ def _entry(block: Iterable[tuple[int, str]]) -> Entry | None:
 
 def compile_catalogue(catalogue_entries: Iterable[Entry]) -> io.BytesIO:
     """The translated entries as a compiled catalogue (GNU gettext manual, "The Format of GNU MO Files")."""
-    pairs = sorted(_pair(entry) for entry in catalogue_entries if entry.done)
+    pairs = sorted(_pair(entry) for entry in catalogue_entries if entry.is_translated)
     ids, translated = [identifier for identifier, _ in pairs], [translation for _, translation in pairs]
     tables, content = b"", b""
     start = 28 + 16 * len(pairs)

@@ -146,7 +146,7 @@ def _top_package(frame: FrameType) -> str:
 
 @cache
 def _translated_keys(code: str, package: str) -> frozenset[tuple[str, str]]:
-    return frozenset(entry.key for entry in messages(code, package) if entry.done)
+    return frozenset(entry.key for entry in messages(code, package) if entry.is_translated)
 
 
 def join_names(names: Sequence[str]) -> str:

@@ -71,7 +71,7 @@ class Claim:
         return not (self.extension or self.reported)
 
     @property
-    def how(self) -> dict[str, bool]:
+    def judging_options(self) -> dict[str, bool]:
         """Its judging options, as arguments of `claim_outcome`."""
         return {"unstated": bool(self.unstated), "joint": self.joint, "internal": self.internal}
 

@@ -28,9 +28,9 @@ class ClaimOutcome:
     needed: realisations that would decide it, if undecided; None: no number would."""
 
     kind: str
-    held: int
-    failed: int
-    of: int
+    numbers_held: int
+    numbers_failed: int
+    number_count: int
     miss: float
     needed: int | None = None
     depends_on: tuple[str, ...] = ()
@@ -58,7 +58,7 @@ def claim_outcome(
     give every number; where each is reproduced in some variant and no variant gives all, the print contradicts itself.
     internal: both sides are printed; where they differ, the print contradicts itself."""
     asserted = [part for part in parts if part.asserted] or list(parts)
-    sampled_parts = sum(part.sampled and not part.void for part in asserted)
+    sampled_parts = sum(part.is_sampled and not part.is_void for part in asserted)
     if joint:
         return _joint_outcome(asserted, sampled_parts)
     numbers = _parts_by_number(asserted)
@@ -72,9 +72,9 @@ def claim_outcome(
     undecided = [part for name, variants in numbers.items() if verdicts[name] == UNDECIDED for part in variants]
     return ClaimOutcome(
         kind,
-        held=sum(verdict in (CONFIRMED, IMMATERIAL) for verdict in verdicts.values()),
-        failed=sum(verdict in (REFUTED, CONTRADICTORY) for verdict in verdicts.values()),
-        of=sum(verdict != VOID for verdict in verdicts.values()),
+        numbers_held=sum(verdict in (CONFIRMED, IMMATERIAL) for verdict in verdicts.values()),
+        numbers_failed=sum(verdict in (REFUTED, CONTRADICTORY) for verdict in verdicts.values()),
+        number_count=sum(verdict != VOID for verdict in verdicts.values()),
         miss=max(misses, default=math.nan),
         needed=largest_needed(needed_realisations(part, sampled_parts) for part in undecided)
         if kind == UNDECIDED

@@ -176,8 +176,8 @@ def _claim_rows(claim: Claim, paper: str, papers: _PaperEvidence, of_config: boo
     judged_parts = [
         (measured_part, measured_part.judged) for measured_part in measured_parts if measured_part.judged is not None
     ]
-    outcome = claim_outcome([judged for _, judged in judged_parts], **claim.how) if judged_parts else None
-    sampled_parts = sum(judged.sampled and not judged.void and judged.asserted for _, judged in judged_parts)
+    outcome = claim_outcome([judged for _, judged in judged_parts], **claim.judging_options) if judged_parts else None
+    sampled_parts = sum(judged.is_sampled and not judged.is_void and judged.asserted for _, judged in judged_parts)
     asserted = [
         measured_part for measured_part in measured_parts if measured_part.part.asserted
     ] or measured_parts  # other parts decide nothing
@@ -241,7 +241,7 @@ def exact_value(part: Part, evidence: Evidence, measured: Estimate) -> float:
 def disagreement_message(part: Part, judged: JudgedPart) -> str:
     """A message where a part has an exact value of its own, further off than chance explains; else nothing. All other
     values follow from tables, which `agreement` compares with their exact columns."""
-    if part.exact is None or not judged.known or judged.n < MIN_REALISATIONS:
+    if part.exact is None or not judged.is_known_exactly or judged.n < MIN_REALISATIONS:
         return ""
     slack = max(1e-9 * abs(judged.exact), ROUNDING * judged.margin)
     distance = standard_errors(Estimate(judged.measured, judged.lo, judged.hi), judged.exact)

@@ -211,7 +211,7 @@ class Evidence:
 
     def _lacking(self, result: CaseResult, filter_name: str, component: str, *base: str) -> MissingEvidence:
         """Which name an existing case lacks; if it has all names, that it has no such curve."""
-        filters = *result.axes.filters, *(result.outside.axes.filters if result.outside else ())
+        filters = *result.axes.filters, *(result.user_filters.axes.filters if result.user_filters else ())
         components = tuple(name for name, _ in result.axes.components)
         for kind, name, existing in (("filter", filter_name, filters), ("component", component, components)):
             if name not in existing:

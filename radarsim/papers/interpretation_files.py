@@ -25,7 +25,7 @@ def write_files(verdicts: InterpretationVerdicts, figures: bool, forecast: Timed
     for name, figure in figures_by_name.items():
         from radarsim.report.drawing.canvas import save  # Matplotlib
 
-        with forecast.doing("figure"):
+        with forecast.measure_unit("figure"):
             contents[f"{name}.svg"] = save(figure, ("svg",))["svg"]
     atomic_files.replace_all(verdicts.folder, contents)
     return tuple(sorted(contents))
@@ -120,7 +120,7 @@ def _interpretation_document(verdict: InterpretationVerdict) -> dict[str, Any]:
     return {
         "interpretation": verdict.name,
         "kind": verdict.kind,
-        "choices": dict(verdict.interpretation.taken),
+        "choices": dict(verdict.interpretation.alternatives),
         "verdict": verdict.outcome.kind if verdict.outcome else None,
         "miss": verdict.outcome.miss if verdict.outcome else None,
         "reason": verdict.why or None,

@@ -122,7 +122,7 @@ class InterpretationRuns:
             verdicts = []
             for interpretation in self._paper.interpretations.for_claim(claim.id):
                 has_run = (claim.id, interpretation) in self._run_of
-                with nullcontext() if has_run else forecast.doing(f"verdict of {claim.id}"):
+                with nullcontext() if has_run else forecast.measure_unit(f"verdict of {claim.id}"):
                     verdicts.append(self._verdict(claim, interpretation))
             claims.append(ClaimVerdicts(self._paper.interpretations, claim, tuple(verdicts)))
         return claims
@@ -177,7 +177,7 @@ class InterpretationRuns:
     ) -> None:
         """Run or continue the cases of a key, and judge what they show; judged_only: for these claims and
         interpretations."""
-        progress = forecast.running(self._forecast_name(key), partial(self._expected_seconds, key))
+        progress = forecast.run_callback(self._forecast_name(key), partial(self._expected_seconds, key))
         try:
             simulated = self._run(key, pairs, options, progress)
         except ConfigError:
@@ -189,7 +189,7 @@ class InterpretationRuns:
             raise
         finally:
             del self._pending[key]
-        with forecast.doing(f"judging of {key[0]}"):
+        with forecast.measure_unit(f"judging of {key[0]}"):
             results = self._changed_results(pairs, simulated)
             for subject in (
                 subject

@@ -67,7 +67,7 @@ class Choice:
     def __getitem__(self, name: str) -> Alternative:
         return next(alternative for alternative in self.alternatives if alternative.name == name)
 
-    def bears_on(self, claim: str) -> bool:
+    def affects(self, claim: str) -> bool:
         """Whether this choice may change the verdict on a claim."""
         return not self.claims or claim in self.claims
 
@@ -76,10 +76,10 @@ class Choice:
 class Interpretation:
     """One alternative of each choice of a paper, by the choice's key, in the order of the choices."""
 
-    taken: tuple[tuple[str, str], ...]
+    alternatives: tuple[tuple[str, str], ...]
 
     def __getitem__(self, key: str) -> str:
-        return dict(self.taken)[key]
+        return dict(self.alternatives)[key]
 
 
 class PaperInterpretations(ABC):
@@ -94,13 +94,13 @@ class PaperInterpretations(ABC):
 
     def leaves_open(self, claim: Claim) -> bool:
         """Whether the paper leaves anything open that affects a claim of its own."""
-        return not claim.extension and any(choice.bears_on(claim.id) for choice in self.choices)
+        return not claim.extension and any(choice.affects(claim.id) for choice in self.choices)
 
-    def declared(self) -> Sequence[Interpretation]:
+    def declared_interpretations(self) -> Sequence[Interpretation]:
         """The interpretations to judge, the default first: all combinations of E and U, and each N alone."""
-        return list(dict.fromkeys([*self.combined(self.choices), *self.against_print()]))
+        return list(dict.fromkeys([*self.combinations(self.choices), *self.against_print()]))
 
-    def combined(self, choices: Iterable[Choice]) -> Iterator[Interpretation]:
+    def combinations(self, choices: Iterable[Choice]) -> Iterator[Interpretation]:
         """All combinations of the E and U alternatives of these choices, all others at their default."""
         varied = list(choices)
         allowed = [
@@ -123,21 +123,21 @@ class PaperInterpretations(ABC):
 
     def for_claim(self, claim: str) -> list[Interpretation]:
         """The declared interpretations that differ for a claim: choices that do not affect it stay at their default."""
-        bears = [choice.bears_on(claim) for choice in self.choices]
+        bears = [choice.affects(claim) for choice in self.choices]
         firsts: dict[tuple[tuple[str, str], ...], Interpretation] = {}
         for interpretation in self._declared:
-            firsts.setdefault(tuple(itertools.compress(interpretation.taken, bears)), interpretation)
+            firsts.setdefault(tuple(itertools.compress(interpretation.alternatives, bears)), interpretation)
         return [self.restricted_to(interpretation, claim) for interpretation in firsts.values()]
 
     @cached_property
     def _declared(self) -> Sequence[Interpretation]:
-        return self.declared()
+        return self.declared_interpretations()
 
     def restricted_to(self, interpretation: Interpretation, claim: str) -> Interpretation:
         """An interpretation with the choices that do not affect a claim at their default."""
-        pairs = zip(interpretation.taken, self.choices, strict=True)
+        pairs = zip(interpretation.alternatives, self.choices, strict=True)
         return Interpretation(
-            tuple((key, name if choice.bears_on(claim) else choice.default) for (key, name), choice in pairs)
+            tuple((key, name if choice.affects(claim) else choice.default) for (key, name), choice in pairs)
         )
 
     def kind(self, interpretation: Interpretation) -> str:

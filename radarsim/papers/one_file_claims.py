@@ -94,7 +94,7 @@ def _faults_of_claims(
 def _faults_of_choices(claims: Sequence[Claim], choices: Sequence[Choice], shipped: ShippedCases) -> Iterator[str]:
     """Alternatives whose settings the cases of their claims cannot have."""
     for choice in choices:
-        configs = dict.fromkeys(claim.config for claim in claims if choice.bears_on(claim.id))
+        configs = dict.fromkeys(claim.config for claim in claims if choice.affects(claim.id))
         specs = [case.spec for config in configs for case in shipped(config) or ()]
         for alternative in choice.alternatives:
             if why := next(filter(None, (_setting_fault(spec, alternative.sets) for spec in specs)), ""):
@@ -116,7 +116,7 @@ def _faults_of_measure(measure: MeasureCall, cases: Sequence[Any], components: S
     for argument in ("filter", "over", "component"):
         kind = "component" if argument == "component" else "filter"
         for case in named_cases if argument in measure.arguments else ():
-            filters = [member.name for member in (*case.spec.filters, *case.outside)]
+            filters = [member.name for member in (*case.spec.filters, *case.user_filters)]
             allowed = components if kind == "component" else filters
             if (name := measure.arguments[argument]) not in allowed:
                 yield f"no {kind} {name!r}; there are {', '.join(allowed)}"

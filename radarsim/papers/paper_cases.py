@@ -28,8 +28,8 @@ class CaseKeys:
 
     fixed: dict
     members: dict[str, list]
-    named: dict[str, object]
-    outside: dict[str, str]
+    named_members: dict[str, object]
+    user_filters: dict[str, str]
 
 
 def case_keys(case: CaseResult | Case, may_grow: Sequence[str], may_shorten: Sequence[str] = ()) -> CaseKeys:
@@ -48,8 +48,8 @@ def case_keys(case: CaseResult | Case, may_grow: Sequence[str], may_shorten: Seq
 def _user_filters(case: CaseResult | Case) -> dict[str, str]:
     """What filters from outside depend on, by their names."""
     if isinstance(case, Case):
-        return {member.name: member.identity for member in case.outside}
-    axes: Any = case.outside and case.outside.axes
+        return {member.name: member.identity for member in case.user_filters}
+    axes: Any = case.user_filters and case.user_filters.axes
     return dict(zip(axes.filters, axes.identities, strict=True)) if axes else {}
 
 
@@ -61,8 +61,8 @@ def paper_members(
     shipped: the cases of the claim's config."""
     members: dict[str, set[int]] | None = None
     for paper_case in paper_cases:
-        is_same = is_equal(case.fixed, paper_case.fixed) and is_equal(case.named, paper_case.named)
-        if not is_same or not paper_case.outside.items() <= case.outside.items():
+        is_same = is_equal(case.fixed, paper_case.fixed) and is_equal(case.named_members, paper_case.named_members)
+        if not is_same or not paper_case.user_filters.items() <= case.user_filters.items():
             continue
         indices = {key: _member_indices(paper_case.members[key], case.members[key]) for key in may_grow}
         if all(len(indices[key]) == len(paper_case.members[key]) for key in may_grow):
@@ -88,10 +88,12 @@ def _member_differences(case: CaseKeys, paper_case: CaseKeys, may_grow: Sequence
         missing = len(paper_case.members[key]) - len(_member_indices(paper_case.members[key], case.members[key]))
         if missing:
             lines.append(f"{missing} of the paper's {len(paper_case.members[key])} {key} changed or missing")
-    if changed_filters := [name for name, identity in paper_case.outside.items() if case.outside.get(name) != identity]:
+    if changed_filters := [
+        name for name, identity in paper_case.user_filters.items() if case.user_filters.get(name) != identity
+    ]:
         lines.append(f"filter {', '.join(changed_filters)} missing, or of other code")
-    if not is_equal(case.named, paper_case.named):
-        lines.append(f"{', '.join(paper_case.named)} differs from the paper's")
+    if not is_equal(case.named_members, paper_case.named_members):
+        lines.append(f"{', '.join(paper_case.named_members)} differs from the paper's")
     return lines
 
 

@@ -47,7 +47,7 @@ NOTHING_IS_RUN = term(
 
 def verdict_lines(result: "Result") -> list[tuple[str, str]]:
     """The claims of a run by their class over all interpretations, with those that differ as shipped."""
-    if any(case.outside for case in result.cases):  # the paper's claims are none of a user filter
+    if any(case.user_filters for case in result.cases):  # the paper's claims are none of a user filter
         return []
     by_class, as_shipped = claims_by_class(result), claims_by_class(result, "as_shipped")
     lines = []

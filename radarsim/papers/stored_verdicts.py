@@ -72,13 +72,13 @@ def stored_interpretations(out: Path) -> list[dict[str, Any]]:
 
 def stored_classes(out: Path | None) -> list[VerdictClass]:
     """The classes of claims judged under `out`. Raises StoreError for a damaged file."""
-    return _rows(_existing_file(out, CLASSES), set(CLASS_FILE_COLUMNS), VerdictClass.of_row) if out else []
+    return _rows(_existing_file(out, CLASSES), set(CLASS_FILE_COLUMNS), VerdictClass.from_row) if out else []
 
 
 @cache
 def shipped_classes() -> tuple[VerdictClass, ...]:
     """The classes that radarsim ships."""
-    return tuple(_rows(SHIPPED_CLASSES, set(CLASS_FILE_COLUMNS), VerdictClass.of_row))
+    return tuple(_rows(SHIPPED_CLASSES, set(CLASS_FILE_COLUMNS), VerdictClass.from_row))
 
 
 def known_classes(papers: Iterable[tuple[PaperInterpretations, PaperClaims]], out: Path | None) -> KnownClasses:
@@ -86,7 +86,9 @@ def known_classes(papers: Iterable[tuple[PaperInterpretations, PaperClaims]], ou
     not known.
 
     A class from other words, numbers or choices than the claim has now does not count."""
-    classes = {(verdict.claim, verdict.declared): verdict for verdict in (*shipped_classes(), *stored_classes(out))}
+    classes = {
+        (verdict.claim, verdict.declaration_digest): verdict for verdict in (*shipped_classes(), *stored_classes(out))
+    }
     return {
         claim.id: classes.get((claim.id, declaration_digest(interpretations, claim)))
         for interpretations, paper in papers

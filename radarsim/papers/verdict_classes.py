@@ -32,20 +32,28 @@ class VerdictClass:
 
     claim: str
     kind: str
-    holds: int
-    of: int
+    holds_in: int
+    interpretation_count: int
     depends_on: str
     needed: float
-    declared: str
+    declaration_digest: str
 
     def as_row(self) -> dict[str, Any]:
         """The row of classes.csv."""
         needed = "" if math.isnan(self.needed) else int(self.needed)
-        values = (self.claim, self.kind, self.holds, self.of, self.depends_on, needed, self.declared)
+        values = (
+            self.claim,
+            self.kind,
+            self.holds_in,
+            self.interpretation_count,
+            self.depends_on,
+            needed,
+            self.declaration_digest,
+        )
         return dict(zip(CLASS_FILE_COLUMNS, values, strict=True))
 
     @classmethod
-    def of_row(cls, row: Mapping[str, Any]) -> "VerdictClass":
+    def from_row(cls, row: Mapping[str, Any]) -> "VerdictClass":
         """From a row of classes.csv. Raises ValueError or LookupError for an invalid one."""
         if row["class"] not in CLASSES:
             raise ValueError(row["class"])
@@ -71,9 +79,9 @@ def declaration_digest(interpretations: PaperInterpretations, claim: Claim) -> s
     choice_declarations = [
         [choice.key, choice.contradicts, *([alternative.name, alternative.kind] for alternative in choice.alternatives)]
         for choice in interpretations.choices
-        if choice.bears_on(claim.id)
+        if choice.affects(claim.id)
     ]
-    return digest([part_declarations, claim.how, choice_declarations])[:16]
+    return digest([part_declarations, claim.judging_options, choice_declarations])[:16]
 
 
 def verdict_class(verdicts: ClaimVerdicts) -> VerdictClass | None:
@@ -111,8 +119,8 @@ def _class_columns(row: Mapping[str, Any], classes: KnownClasses) -> dict[str, A
     needed = {} if as_shipped == UNDECIDED else {"needed": overall.needed}
     columns_of_class = {
         "class": overall.kind,
-        "holds": overall.holds,
-        "of": overall.of,
+        "holds": overall.holds_in,
+        "of": overall.interpretation_count,
         "depends_on": overall.depends_on,
     }
     return columns_of_class | needed | {"overall": class_words(overall.kind, as_shipped, overall.depends_on)}

@@ -56,24 +56,24 @@ class JudgedPart:
     asserted: bool = True
 
     @property
-    def known(self) -> bool:
+    def is_known_exactly(self) -> bool:
         """Whether the exact value is known; it then decides."""
         return not math.isnan(self.exact)
 
     @property
     def value(self) -> float:
         """The judged value: the exact one, or the measured one."""
-        return self.exact if self.known else self.measured
+        return self.exact if self.is_known_exactly else self.measured
 
     @property
-    def void(self) -> bool:
+    def is_void(self) -> bool:
         """Whether a perfect estimator would fail: then the part tests nothing."""
         return not math.isnan(self.ceiling) and _miss_of_value(self.ceiling, self) > 1
 
     @property
-    def sampled(self) -> bool:
+    def is_sampled(self) -> bool:
         """Whether it has a sampling error."""
-        return not self.known and self.lo != self.hi
+        return not self.is_known_exactly and self.lo != self.hi
 
 
 def widen(lo: float, value: float, hi: float, factor: float) -> tuple[float, float]:
@@ -92,7 +92,7 @@ def widening_factor(parts: int) -> float:
 
 def judged_interval(part: JudgedPart, parts: int = 1) -> tuple[float, float]:
     """The judged interval: the exact value twice, or the 95 % interval widened for so many parts."""
-    if part.known:
+    if part.is_known_exactly:
         return part.exact, part.exact
     if part.lo == part.hi:
         return part.lo, part.hi
@@ -114,7 +114,7 @@ def _miss_of_value(value: float, part: JudgedPart) -> float:
 def part_verdict(part: JudgedPart, parts: int = 1) -> str:
     """The verdict on one part of a claim that has so many parts with a sampling error."""
     lo, hi = judged_interval(part, parts)
-    if part.void:
+    if part.is_void:
         return VOID
     if not lo <= hi:
         return UNDECIDED
@@ -152,7 +152,7 @@ def needed_realisations(part: JudgedPart, parts: int = 1) -> int | None:
     if part_verdict(part, parts) != UNDECIDED:
         return 0
     lo, hi = judged_interval(part, parts)
-    if part.known or not part.n or not (math.isfinite(lo) and math.isfinite(hi) and lo < hi):
+    if part.is_known_exactly or not part.n or not (math.isfinite(lo) and math.isfinite(hi) and lo < hi):
         return None
     numbers = [
         number

@@ -59,7 +59,7 @@ class InterpretationVerdict:
     def as_outcome(self) -> InterpretationOutcome:
         """The input of the rule."""
         outcome = self.outcome.kind if self.outcome else ""
-        return InterpretationOutcome(self.name, self.kind, dict(self.interpretation.taken), outcome)
+        return InterpretationOutcome(self.name, self.kind, dict(self.interpretation.alternatives), outcome)
 
 
 def judge_claim(
@@ -78,7 +78,7 @@ def judge_claim(
         if name == DEFAULT or not isinstance(error.__cause__, UnknownScans):  # an interpretation may have fewer scans
             raise
         return InterpretationVerdict(claim, interpretation, name, kind, why=error.__cause__.why)
-    outcome = claim_outcome([judged for _, judged in parts], **claim.how)
+    outcome = claim_outcome([judged for _, judged in parts], **claim.judging_options)
     return InterpretationVerdict(claim, interpretation, name, kind, parts, outcome)
 
 
@@ -211,7 +211,7 @@ def verdict_rows(
     """Rows of interpretations.csv: one for each part; a single one with the reason where it was not judged.
 
     overall_outcome: that over all interpretations, whose class is in each row."""
-    choices = dict(verdict.interpretation.taken)
+    choices = dict(verdict.interpretation.alternatives)
     row: dict[str, Any] = dict.fromkeys(columns, "") | {
         "claim": verdict.claim.id,
         "interpretation": verdict.name,
@@ -221,7 +221,7 @@ def verdict_rows(
     row["over"] = overall_outcome.kind if overall_outcome else ""
     if verdict.outcome is None:
         return [row | {"verdict": "not possible", "reason": verdict.why}]
-    sampled_parts = sum(judged.sampled for _, judged in verdict.parts)
+    sampled_parts = sum(judged.is_sampled for _, judged in verdict.parts)
     return [
         row
         | {
@@ -250,7 +250,7 @@ def worst_distance(verdict: InterpretationVerdict) -> tuple[float, float, float]
     """How far the worst part is from the words, in margins, with the ends of its interval.
 
     Negative inside: the distance to the nearest end."""
-    distances = [_distance(judged) for _, judged in verdict.parts if judged.asserted and not judged.void]
+    distances = [_distance(judged) for _, judged in verdict.parts if judged.asserted and not judged.is_void]
     return max(distances, default=(math.nan,) * 3, key=lambda ends: ends[0])
 
 

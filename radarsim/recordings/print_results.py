@@ -91,15 +91,19 @@ def print_fit(fitted: "Fit") -> None:
     if fitted.outliers is not None:
         lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * fitted.outliers, "#.2g")))
     settings = " ".join(f"--set {key}={value:g}" for key, value in fit.fitted_settings(fitted).items())
-    if fitted.beside is not None:
+    if fitted.further_explanation is not None:
         lines.append(
             labelled_line(
-                "", tr("the intervals are not valid: {what}", what=sentences.explanation_text(*fitted.beside[:2]))
+                "",
+                tr(
+                    "the intervals are not valid: {what}",
+                    what=sentences.explanation_text(*fitted.further_explanation[:2]),
+                ),
             )
         )
     if fitted.plain is not None:
         words = tr("plain: of errors that are normal and independent")
-        if fitted.plain.beside is not None:
+        if fitted.plain.further_explanation is not None:
             words = tr("{words}; the plots contradict that, so those intervals are too narrow", words=words)
         lines.append(labelled_line("", words))
     ratio_text = sentences.likelihood_ratio_text(fitted.gain)

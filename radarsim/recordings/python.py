@@ -165,7 +165,7 @@ class RegistrationResult(Displayable):
         self.biases, self.aircraft = (
             pd.DataFrame(result.registration_document(registration)[name]) for name in ("biases", "aircraft")
         )
-        self.sigma_range_m, self.sigma_bearing_rad = registration.adjusted.sigma
+        self.sigma_range_m, self.sigma_bearing_rad = registration.adjustment.sigma
         self.plots, self.matched = registration.plots, registration.matched
 
     def _answer_lines(self) -> Sequence[str]:

@@ -62,7 +62,8 @@ def group_by_panel(results: Sequence[CaseResult], max_lines: float = MAX_LINES) 
     groups: dict[tuple[str, str, str], list[CaseResult]] = {}
     for result in results:
         swept_text = ", ".join(
-            f"{key_symbol(result, key)} = {value_with_unit(result, key, value)}" for key, value in result.swept[:-1]
+            f"{key_symbol(result, key)} = {value_with_unit(result, key, value)}"
+            for key, value in result.swept_values[:-1]
         )
         device_name = config_device(result) if has_several_families or not swept_text else ""
         groups.setdefault((config_stem(result), device_name, swept_text), []).append(result)
@@ -123,7 +124,7 @@ def distinct_case_names(results: Sequence[CaseResult]) -> list[str]:
     has_several_devices = len(group_by_config(results)) > 1
     names = [
         plain_case_label(result)
-        if has_several_devices or not result.swept
+        if has_several_devices or not result.swept_values
         else without_markup(swept_description(result))
         for result in results
     ]
@@ -138,12 +139,12 @@ def cases_left_out_remark(all_results: Sequence[CaseResult], shown_results: Sequ
 
 def unswept_cases(results: Sequence[CaseResult]) -> list[CaseResult]:
     """The cases without swept keys, if any; else all."""
-    return [result for result in results if not result.swept] or list(results)
+    return [result for result in results if not result.swept_values] or list(results)
 
 
 def cases_for_figure(experiment: Experiment, figure: str) -> list[str]:
     """The cases that a config names for a figure."""
-    return [case.name for case in experiment.shown_in(figure)]
+    return [case.name for case in experiment.cases_in_figure(figure)]
 
 
 def select_cases(results: Sequence[CaseResult], names: Sequence[str]) -> tuple[list[CaseResult], str]:

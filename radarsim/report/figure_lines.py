@@ -81,8 +81,8 @@ def case_lines(
             if len(members) == 1:
                 marks.append(line_from_rows(case_rows, columns, escape_dollars(f), style, escape_dollars(f)))
             else:
-                key, value = result.swept[-1] if result.swept else ("", config_device(result))
-                values = [dict(member.swept).get(key) for member in members]
+                key, value = result.swept_values[-1] if result.swept_values else ("", config_device(result))
+                values = [dict(member.swept_values).get(key) for member in members]
                 text = (
                     _shown_value(result, key, shorten_mapping(result, key, value, values))
                     if key

@@ -74,13 +74,13 @@ def config_device(result: CaseResult) -> str:
 
 def swept_description(result: CaseResult, without: Iterable[str] = ()) -> str:
     """The swept keys of a case in short, but for some: "D_M = 10⁻³", "σ_V = 5 m/s"."""
-    pairs = [(key, value) for key, value in result.swept if key not in set(without)]
+    pairs = [(key, value) for key, value in result.swept_values if key not in set(without)]
     return ", ".join(f"{key_symbol(result, key)} = {value_with_unit(result, key, value)}" for key, value in pairs)
 
 
 def shared_keys(results: Sequence[CaseResult]) -> set[str]:
     """The swept keys that have one value in all of several cases."""
-    values = [dict(result.swept) for result in results]
+    values = [dict(result.swept_values) for result in results]
     if len(values) < 2:
         return set()
     return {key for key, value in values[0].items() if all(case_values.get(key) == value for case_values in values)}

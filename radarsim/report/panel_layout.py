@@ -166,7 +166,7 @@ def with_keys(panel: Panel, members: Sequence[CaseResult], filters: Sequence[str
     }
     dashes = tuple((escape_dollars(f), Style(0, n, n)) for n, f in enumerate(filters) if f in visible_filters)
     dashes = dashes if len(dashes) > 1 else ()
-    title = key_title(members[0]) if members[0].swept else ""
+    title = key_title(members[0]) if members[0].swept_values else ""
     if sum(isinstance(mark, Line) for mark in panel.marks) > MAX_LINES_NAMED_AT_ENDS:
         return _by_colour(panel, dashes, title)
     return replace(panel, keys=dashes, line_title=title)
@@ -174,7 +174,7 @@ def with_keys(panel: Panel, members: Sequence[CaseResult], filters: Sequence[str
 
 def key_title(result: CaseResult) -> str:
     """The title of a legend of the last swept key's values: its letter or name, and its unit."""
-    key = result.swept[-1][0]
+    key = result.swept_values[-1][0]
     return label_with_unit(key_symbol(result, key), degrees_factor_and_unit(key_label(result, key).unit)[1])
 
 

@@ -111,7 +111,7 @@ def widest_cell(result: CaseResult, table: Table, quantity: Quantity = SIGMA) ->
     row = rows.iloc[first]
     component, k = str(row.get(quantity.per, "")), int(row.get("k", 0))
     below = float(hi[first]) if value[first] == 0 and math.isinf(percent[first]) else None
-    against = str(row.get("baseline", "")) if result.against else ""
+    against = str(row.get("baseline", "")) if result.further_baselines else ""
     names = str(row["case"]), str(row["filter"]), component
     return WidestInterval(float(percent.max()), *names, k, result.count, quantity, below, against)
 
@@ -151,9 +151,9 @@ def needed_realisations(
 def scale_sums(result: CaseResult, n: int) -> CaseResult:
     """A case with its sums scaled to n realisations."""
     sums = {name: sums * (n / result.count) for name, sums in result.sums.items()}
-    outside = None if result.outside is None else scale_sums(result.outside, n)
-    against = tuple(scale_sums(baseline, n) for baseline in result.against)
-    return replace(result, count=n, sums=sums, against=against, outside=outside)
+    outside = None if result.user_filters is None else scale_sums(result.user_filters, n)
+    against = tuple(scale_sums(baseline, n) for baseline in result.further_baselines)
+    return replace(result, count=n, sums=sums, further_baselines=against, user_filters=outside)
 
 
 def with_gaussian_sums(result: CaseResult) -> CaseResult:

@@ -35,7 +35,7 @@ class SamplingWeights(NamedTuple):
     """How realisations were drawn: all, how many from the original law, Σw and Σw²; numbers, or one for each row."""
 
     n: int
-    plain: float | np.ndarray
+    plain_count: float | np.ndarray
     weight: float | np.ndarray
     squared: float | np.ndarray
 
@@ -51,7 +51,7 @@ class EventWeights(NamedTuple):
 
 def event_rate(event: EventWeights, sampling: SamplingWeights) -> statistics.Estimate:
     """The probability of the event with its interval, from the weights."""
-    return statistics.weighted_rate(event.weight, event.squared, sampling.n, sampling.plain)
+    return statistics.weighted_rate(event.weight, event.squared, sampling.n, sampling.plain_count)
 
 
 def complement(probability: statistics.Estimate) -> statistics.Estimate:
@@ -96,7 +96,7 @@ def rate_columns(
         "events": events.number.astype(np.int64),
         "n_eff": effective,
         "variance_factor": factor,
-        "plain": np.full(size, sampling.plain).astype(np.int64),
+        "plain": np.full(size, sampling.plain_count).astype(np.int64),
         "mean_weight": np.full(size, mean),
         "mean_weight_se": np.full(size, spread),
         "note": weight_notes(sampling, events),

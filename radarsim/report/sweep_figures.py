@@ -46,10 +46,10 @@ def group_swept_cases(results: Sequence[CaseResult]) -> dict[tuple[str, tuple[st
     """Swept cases by their config and the keys that they differ in."""
     groups: dict = {}
     for result in results:
-        if result.swept:
-            groups.setdefault((key_labels.config_stem(result), tuple(key for key, _ in result.swept)), []).append(
-                result
-            )
+        if result.swept_values:
+            groups.setdefault(
+                (key_labels.config_stem(result), tuple(key for key, _ in result.swept_values)), []
+            ).append(result)
     return {key: members for key, members in groups.items() if len(members) > 1}
 
 
@@ -120,11 +120,11 @@ def _line_panel(
     """Lines over numbers; over anything else points, ordered by the leading σ of the first filter."""
     filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
     factor, unit = key_labels.degrees_factor_and_unit(component[1])
-    x, axis = axis_positions(members[0], key, [dict(result.swept)[key] for result in members])
+    x, axis = axis_positions(members[0], key, [dict(result.swept_values)[key] for result in members])
     if axis.ticks:
         leading = members[0].axes.components[0][0]
         members = sorted(members, key=lambda result: final_sigma(result, filters[0], leading, curves)[0])
-        _, axis = axis_positions(members[0], key, [dict(result.swept)[key] for result in members])
+        _, axis = axis_positions(members[0], key, [dict(result.swept_values)[key] for result in members])
     order = np.argsort(x)
     marks = []
     for i, f in enumerate(filters):
@@ -150,10 +150,10 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     """σ of the first component at the last scan over two keys: a map for each filter."""
     component, unit = members[0].axes.components[0]
     members = [result for result in members if component in dict(result.axes.components)]
-    varying = [key for key in keys if len({_hashable(dict(r.swept)[key]) for r in members}) > 1]
+    varying = [key for key in keys if len({_hashable(dict(r.swept_values)[key]) for r in members}) > 1]
     if len(varying) < 2:  # the component is of one value of a key alone
         return line_figure(name, varying[0], [members], curves) if varying else None
-    values = [list(dict.fromkeys(_hashable(dict(r.swept)[key]) for r in members)) for key in keys]
+    values = [list(dict.fromkeys(_hashable(dict(r.swept_values)[key]) for r in members)) for key in keys]
     ranked = [sorted(v, key=lambda value: (isinstance(value, str), value)) for v in values]
     (x, _), (y, _) = (axis_positions(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
     across, up = (_map_axis(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
@@ -162,7 +162,7 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     for f in filters[:MOST_PANELS]:
         grid = np.full((len(y), len(x)), np.nan)
         for result in members:
-            column, row = (ranked[i].index(_hashable(dict(result.swept)[key])) for i, key in enumerate(keys))
+            column, row = (ranked[i].index(_hashable(dict(result.swept_values)[key])) for i, key in enumerate(keys))
             grid[row, column] = final_sigma(result, f, component, curves)[0]
         if np.isfinite(grid).any():
             label = key_labels.label_with_unit(

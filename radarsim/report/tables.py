@@ -75,30 +75,30 @@ class TableMakers:
     the column `unit`; further lines are indented. `exact_NAME` needs no line."""
 
     def __init__(self) -> None:
-        self.declared: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bool] | None]] = {}
+        self.makers: dict[str, tuple[Callable[[Any], Any], Callable[[Any], bool] | None]] = {}
 
     def __call__(self, name: str, applies: Callable[[Any], bool] = lambda result: True) -> Callable[[Maker], Maker]:
         """Declares the table of a name, made separately for each of the cases that `applies` is true for."""
         return self._declare(name, applies)
 
-    def whole(self, name: str) -> Callable[[Maker], Maker]:
+    def add_of_all_cases(self, name: str) -> Callable[[Maker], Maker]:
         """Declares the table of a name, made of all cases at once; absent where the function returns None."""
         return self._declare(name, None)
 
     def _declare(self, name: str, applies: Callable[[Any], bool] | None) -> Callable[[Maker], Maker]:
         def declare(make: Maker) -> Maker:
-            self.declared[name] = make, applies
+            self.makers[name] = make, applies
             return make
 
         return declare
 
-    def made(self, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
+    def make(self, results: Sequence[CaseResult]) -> "dict[str, pd.DataFrame]":
         """All of them, with the rows of all cases."""
         tables = {
             name: make(results)
             if applies is None
             else join_columns(make(result) for result in results if applies(result))
-            for name, (make, applies) in self.declared.items()
+            for name, (make, applies) in self.makers.items()
         }
         return {name: table for name, table in tables.items() if table is not None}
 

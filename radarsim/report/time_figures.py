@@ -110,7 +110,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     y = Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=component.symbol))
     title = tr("Gain in σ of the {quantity}", quantity=component.words)
     has_several_gains = any(len(result.axes.filters) > 2 for result in results)
-    if any(result.swept for result in results) or (has_several_gains and len(results) > 1):
+    if any(result.swept_values for result in results) or (has_several_gains and len(results) > 1):
         panels, filters = [], all_filters(results)
         for panel_title, members in group_by_panel(results).items():
             if lines := case_lines(members, gains, component.name, GAIN, filters):

@@ -16,7 +16,7 @@ from radarsim.studies.sources import sources_digest
 
 def identity(case: Case) -> str:
     """What a case's numbers depend on, 64 hexadecimal digits."""
-    sources = digest([sources_digest(case), *(user_filter.identity for user_filter in case.outside)])
+    sources = digest([sources_digest(case), *(user_filter.identity for user_filter in case.user_filters)])
     return request_digest(case)[:REQUEST_DIGITS] + sources[:REQUEST_DIGITS]
 
 
@@ -24,7 +24,7 @@ def request_digest(case: Case) -> str:
     """SHA-256 of what is computed, whatever computes it."""
     from radarsim.kernels import random  # the compiler, which takes half a second, is not loaded for `radarsim list`
 
-    request: dict[str, object] = {} if case.noise_of is None else {"noise_of": world_keys(case.noise_of)}
+    request: dict[str, object] = {} if case.noise_keys is None else {"noise_of": world_keys(case.noise_keys)}
     request |= {
         "study": case.study,
         "model": study(case.study).model,
@@ -32,12 +32,12 @@ def request_digest(case: Case) -> str:
         "seed": case.seed,
         "random_layout": random.LAYOUT,
     }
-    if case.against:
+    if case.further_baselines:
         names = [member.name for member in case.spec.members]
-        request["against"] = [names.index(name) for name in case.against]
-    if case.outside:
+        request["against"] = [names.index(name) for name in case.further_baselines]
+    if case.user_filters:
         request["user_filters"] = [
             {key: value for key, value in (user_filter.written or {}).items() if key != "name"}
-            for user_filter in case.outside
+            for user_filter in case.user_filters
         ]
     return digest(request)

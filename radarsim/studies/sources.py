@@ -55,7 +55,7 @@ def _first_modules(case: Case) -> tuple[str, ...]:
     """The modules from which the imports are followed."""
     members = getattr(case.spec, case.spec.bare_keys, ())
     kinds = {base.__module__ for member in members for base in type(member).__mro__ if issubclass(base, Model)}
-    return (*ENGINE, *study(case.study).computing_modules(case.spec, bool(case.outside)), *sorted(kinds))
+    return (*ENGINE, *study(case.study).computing_modules(case.spec, bool(case.user_filters)), *sorted(kinds))
 
 
 @cache

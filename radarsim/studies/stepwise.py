@@ -99,7 +99,7 @@ class Plan:
     axes: Axes
     keys: np.ndarray
     detection: float
-    known: np.ndarray
+    known_quantities: np.ndarray
     width: int
     draw: Callable[..., None]
     numbers: np.ndarray
@@ -369,7 +369,7 @@ class StepStudy(OneFile):
                 member.kernel(
                     groups,
                     used,
-                    plan.known,
+                    plan.known_quantities,
                     plan.width,
                     member.numbers,
                     plots,
@@ -462,7 +462,7 @@ class StepStudy(OneFile):
         from radarsim.kernels.lanes import WIDTH
 
         scans, rows, numbers = plan.axes.k.size, plan.shape[1], len(self.measured)
-        known_quantities = plan.known.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)].T
+        known_quantities = plan.known_quantities.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)].T
         size = max(1, MAX_ROWS // (scans * rows))
 
         def draw(first: int, count: int) -> SimulatedPlots:
@@ -513,7 +513,7 @@ def draw_plots(plan: Plan, first: int, groups: int) -> np.ndarray:
     state, rows, pairs = plan.shape
     room = [aligned_zeros(n * WIDTH) for n in (state, STRIP * pairs, STRIP * pairs, 2)]
     plots = aligned_zeros(groups * plan.axes.k.size * rows * WIDTH)
-    plan.draw(plan.keys, first, groups, plan.known, plan.width, plan.numbers, plan.detection, *room, plots)
+    plan.draw(plan.keys, first, groups, plan.known_quantities, plan.width, plan.numbers, plan.detection, *room, plots)
     return plots
 
 

@@ -36,7 +36,7 @@ class Work:
     block = 4096
 
     def __init__(self, clock, each, outside=()):
-        self.clock, self.each, self.case = clock, each, SimpleNamespace(outside=outside)
+        self.clock, self.each, self.case = clock, each, SimpleNamespace(user_filters=outside)
         self.called = 0
 
     def simulate(self, _first, count):
@@ -53,7 +53,7 @@ def over(clock, works, n, stored=0):
     for i, work in enumerate(works):
         for tenth in range(11):
             held = min(tenth, stored)
-            weighed.of(i)(n * tenth // 10, n, n * held // 10)
+            weighed.case_callback(i)(n * tenth // 10, n, n * held // 10)
             if tenth < 10:
                 clock.now += work.each * n / 10 * (tenth >= stored)
     return seen
@@ -109,12 +109,12 @@ def foretold(clock, kinds, expected, slower, stored):
     for kind, _seconds in runs:
         one.add(f"after {kind}", 0.1)
     for i, (kind, seconds) in enumerate(runs):
-        report = one.running(kind, lambda seconds=seconds: expected(seconds))
+        report = one.run_callback(kind, lambda seconds=seconds: expected(seconds))
         for tenth in range(1, 11):
             clock.now += 0.0 if i in stored else seconds / 10
             report(tenth, 10, tenth if i in stored else 0)
         left.remove((kind, seconds))
-        with one.doing(f"after {kind}"):
+        with one.measure_unit(f"after {kind}"):
             clock.now += 0.1 * slower
     started, ended = 100.0, clock.now
     return [(done / 1000, at - started, (whole - done) / 1000, ended - at) for at, done, whole, _held in seen]
@@ -142,7 +142,7 @@ def test_what_falls_away_is_not_ahead(clock):
     seen = []
     one = TimedProgress(lambda *of: seen.append(of), lambda: one.add("run", 1.0, 30.0))
     for _ in range(3):
-        report = one.running("run", lambda: 10.0)
+        report = one.run_callback("run", lambda: 10.0)
         clock.now += 5
         report(5, 10, 0)
         report(1, 1, 1)
@@ -152,9 +152,9 @@ def test_what_falls_away_is_not_ahead(clock):
 def test_nobody_looks(clock):
     """Nothing is measured ahead where nothing is shown."""
     one = TimedProgress(None, lambda: pytest.fail("asked for"))
-    one.running("run", lambda: 0.0)(5, 10, 0)
+    one.run_callback("run", lambda: 0.0)(5, 10, 0)
     one.add("figure", 0.1)
-    with one.doing("figure"):
+    with one.measure_unit("figure"):
         clock.now += 1
 
 

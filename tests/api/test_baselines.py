@@ -128,7 +128,7 @@ def test_any_means_of_computing_gives_the_same_bytes_and_the_record_reads_back(t
     made = [(tmp_path / name / "two" / "gains.csv").read_bytes() for name in ("whole", "parts")]
     assert made[0] == made[1]
     case = stored_case(json.loads((tmp_path / "whole/two/run.json").read_text()), "two")
-    assert (case.spec.baseline, case.against) == ("r+Vr", ("r",))
+    assert (case.spec.baseline, case.further_baselines) == ("r+Vr", ("r",))
     assert identity(case) == identity(whole.experiment.cases[0])
 
 
@@ -172,7 +172,7 @@ def test_faults(tmp_path, monkeypatch, baseline, line):
 def test_a_gains_precision_says_against_which(both):
     (case,) = both.cases
     table = gains_table(study("range_doppler"))
-    found, alone = widest_cell(case, table, GAIN), widest_cell(replace(case, against=()), table, GAIN)
+    found, alone = widest_cell(case, table, GAIN), widest_cell(replace(case, further_baselines=()), table, GAIN)
     assert found is not None
     assert found.against in ("r+Vr", "r")
     assert f"filter {found.filter!r} against {found.against!r}, component " in str(found)

@@ -50,7 +50,7 @@ def test_the_table_has_a_column_a_choice_and_a_row_a_part(first):
     )
     rows = table(out)
     paper = open_papers()["P1"]
-    open_claims = [one for one in paper.claims.claims if any(c.bears_on(one.id) for c in paper.interpretations.choices)]
+    open_claims = [one for one in paper.claims.claims if any(c.affects(one.id) for c in paper.interpretations.choices)]
     assert {row["claim"] for row in rows} == {one.id for one in open_claims}
     for claim in open_claims:
         own = [row for row in rows if row["claim"] == claim.id]
@@ -312,7 +312,7 @@ def test_exact_values_decide_under_a_interpretation_as_in_a_run(ran, tmp_path):
     one."""
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Near()))
     (over,) = judge_requests([wanted], out=tmp_path, realisations=60, figures=False).papers[0].claims
-    assert all(judged.known and judged.n == 60 for one in over.verdicts for _, judged in one.parts)
+    assert all(judged.is_known_exactly and judged.n == 60 for one in over.verdicts for _, judged in one.parts)
     assert over.outcome.kind != UNDECIDED
     measured = {judged.exact for one in over.verdicts for _, judged in one.parts}
     assert len(measured) == sum(len(one.parts) for one in over.verdicts)  # each case has its own
@@ -354,14 +354,17 @@ def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     before = few.papers[0].claims[0]
     assert before.outcome.kind == UNDECIDED
     assert before.undecided
-    assert not few.left
+    assert not few.remaining_s
     little = judge_requests([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
     assert little.papers[0].claims[0].outcome == before.outcome  # the most is what it began with
-    assert f"P1.8 not yet decided under {len(before.undecided)} interpretations at 60 realisations; " in little.left[0]
+    assert (
+        f"P1.8 not yet decided under {len(before.undecided)} interpretations at 60 realisations; "
+        in little.remaining_s[0]
+    )
     decided = judge_requests([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
     (over,) = decided.papers[0].claims
     assert over.outcome.kind != UNDECIDED
-    assert not decided.left
+    assert not decided.remaining_s
     counts = {judged.n for one in over.verdicts for _, judged in one.parts}
     assert counts - {60} <= {2000 * 2**m for m in range(6)}
     open_ = {one.interpretation for one in before.undecided}

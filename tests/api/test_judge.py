@@ -723,7 +723,7 @@ def test_nees_of_a_right_covariance_covers_one():
         member = judge.make_user_filter(
             (truth + noise, np.broadcast_to(P, (*truth.shape, 3))), "mine", (), False, experiment
         )
-        case = replace(experiment.cases[0], outside=(member,), realisations=400)
+        case = replace(experiment.cases[0], user_filters=(member,), realisations=400)
         work = CaseWork(case)
         found = case_results.case_result(case, work, collect(work, 400, threads=0))
         rows = common.join_columns([tables.nees_columns(found)])

@@ -94,7 +94,7 @@ def test_where_there_is_no_root_the_limit_is_the_turn(turn, sign):
     assert found.roots == ()
     # The square of the distance is lost beside 0.25.
     assert found.nearest == pytest.approx(turn, rel=math.sqrt(rounding(0.25, 4)))
-    assert_rounded(found.at_nearest, sign * 0.25, operations=4)
+    assert_rounded(found.nearest_value, sign * 0.25, operations=4)
 
 
 def test_where_there_is_no_root_the_limit_may_be_an_end():
@@ -152,4 +152,4 @@ def test_a_change_of_sign_across_a_gap_is_no_root():
     found = root_search.find_roots(lambda x: math.nan if -0.001 < x < 0.001 else x / abs(x) * (1 + x * x), over)
     assert found.roots == ()
     nearest = 0.001 + 3 / 24 / 2**10  # a step, halved ten times
-    assert abs(found.at_nearest) == pytest.approx(1, rel=0, abs=nearest**2)
+    assert abs(found.nearest_value) == pytest.approx(1, rel=0, abs=nearest**2)

@@ -225,7 +225,7 @@ def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_hol
     exact = solve("rls2", key, quantity, equals, overrides=overrides, between=between).value
     for seed in range(seeds):
         cases = Cases("rls2", (*overrides, f"seed={seed}"))
-        at_root = Curve(cases, key, check_quantity(quantity, cases.base), 1, None, 400).simulated(exact, 400)
+        at_root = Curve(cases, key, check_quantity(quantity, cases.base), 1, None, 400).simulate(exact, 400)
         found = solve(
             *("rls2", key, quantity, equals),
             **{"overrides": cases.overrides, "between": between, "sampled": True, "realisations": 400, "threads": 1},
@@ -257,7 +257,7 @@ def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
     assert found.lo <= exact.value <= found.hi
     cases = Cases("rls2", tuple(MOVED["overrides"]))
     more = Curve(cases, "radar.scan_period_s", check_quantity(SEEN, cases.base), 1, None, 800)
-    assert found.attained == more.simulated(found.value, 800).value
+    assert found.attained == more.simulate(found.value, 800).value
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_a_key_that_leaves_the_scans_is_paired(key, quantity):
     cases = Cases("rls2", ("duration_s=140",))
     curve = Curve(cases, key, check_quantity(quantity, cases.base), 1, None, 100)
     for value in (6, 7, 8):
-        curve.simulated(value, 100)
+        curve.simulate(value, 100)
     assert len(curve.scans) == 1
 
 
@@ -483,11 +483,11 @@ def test_a_root_among_many_patterns_is_that_of_all_of_them_side_by_side():
     found = solve("rls2", "radar.sigma_velocity_mps", QuantityName("gain", None, "r"), 15, **late)
     assert (found.exact, found.notes, found.lo) == (True, (), found.value)
     made = designed_case.design_case(
-        Cases("rls2", tuple(late["overrides"])).at("radar.sigma_velocity_mps", found.value)
+        Cases("rls2", tuple(late["overrides"])).case_with_value("radar.sigma_velocity_mps", found.value)
     )
     own = missed_plot_means.designs(made)
     mixed = [missed_plot_patterns.mixture(one, made.plots, made.x, made.dt, 1 << 17, own) for one in own]
-    gain = 100 * (1 - np.sqrt(mixed[1].beside[0, -1, 0] / mixed[0].beside[1, -1, 0]))
+    gain = 100 * (1 - np.sqrt(mixed[1].companion_moment[0, -1, 0] / mixed[0].companion_moment[1, -1, 0]))
     assert abs(gain - 15) <= root_search.NEAR_ROOT_WIDTH * abs(found.slope * found.value)
 
 
@@ -522,14 +522,14 @@ def test_an_interval_that_rests_on_heavy_tails_says_so():
 @pytest.mark.slow
 def test_a_pilot_that_is_far_off_hides_no_root(monkeypatch):
     """Where the first look with few realisations crosses the target elsewhere, all of them are asked everywhere."""
-    plain = Curve.simulated
+    plain = Curve.simulate
 
     def misled(self, value, realisations):
         found = plain(self, value, realisations)
         shift = 40 if realisations < self.realisations and value is not None else 0
         return type(found)(*(part + shift for part in found))
 
-    monkeypatch.setattr(Curve, "simulated", misled)
+    monkeypatch.setattr(Curve, "simulate", misled)
     found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 45, sampled=True, realisations=1000, between=(4, 40))
     exact = solve("rls2", "radar.sigma_velocity_mps", GAIN, 45, between=(4, 40))
     assert abs(found.value - exact.value) < Z * (found.hi - found.lo) / (2 * Z95)
@@ -550,7 +550,7 @@ def test_sampled_it_is_said_where_the_quantity_jumps_over_the_target(monkeypatch
     monkeypatch.setattr(
         Curve, "_sampled", lambda self, case, n: (Estimate(*(case.spec.radar.sigma_velocity_mps > 15) * np.ones(3)), 0)
     )
-    monkeypatch.setattr(Curve, "noted", lambda self, value: ())
+    monkeypatch.setattr(Curve, "interval_notes", lambda self, value: ())
     found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 0.4, sampled=True, realisations=100, between=(4, 40))
     assert found.value == pytest.approx(15, rel=root_search.EXACT_WIDTH)
     assert found.notes == ("the quantity jumps over the target there",)

@@ -389,7 +389,7 @@ def test_a_key_without_effect_is_called_so():
     assert tune("rls2", "sigma r", filter="r").inert == ()
     some = tune("rls2", "sigma Vr at k 2", filter="r+Vr", free=["manoeuvre_variance", "initial_scans=2:4"])
     assert some.inert == ("filters.1.manoeuvre_variance",)
-    assert f"{some.inert[0]} has no effect on {some.quantity.said}" in some.notes
+    assert f"{some.inert[0]} has no effect on {some.quantity.translated_words}" in some.notes
     sampled = tune("rls2", "sigma r at k 1", filter="r", sampled=True, realisations=64)
     assert sampled.inert == (key,)
 

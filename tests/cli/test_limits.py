@@ -167,14 +167,14 @@ def test_a_limit_leaves_time_for_tables_and_figures(monkeypatch):
     limit = stopping.TimeLimit(60.0)
     for reserve, end in ((10.0, 150.0), (45.0, 130.0)):
         clock[0] = 100.0
-        kept = limit.reserving(reserve)
+        kept = limit.with_reserve(reserve)
         clock[0] = end - 0.1
         assert kept() is None
         clock[0] = end + 0.1
         assert kept() == "time limit of 60 s"
     clock[0] = 170.0
-    assert limit.left == 0.0
-    assert limit.reserving(5.0)() == "time limit of 60 s"
+    assert limit.remaining_s == 0.0
+    assert limit.with_reserve(5.0)() == "time limit of 60 s"
 
 
 @pytest.mark.parametrize(("figures", "overrides"), [(True, []), (False, []), (True, ["figures=[]"])])

@@ -41,7 +41,7 @@ def test_sweep_makes_every_combination_the_last_key_fastest(house):
         "own manoeuvre_variance=1e-5 scans=20",
     ]
     last = experiment.cases[-1]
-    assert last.swept == (("manoeuvre_variance", 1e-5), ("scans", 20.0))
+    assert last.swept_values == (("manoeuvre_variance", 1e-5), ("scans", 20.0))
     assert [f.manoeuvre_variance for f in last.spec.filters] == [1e-5, 1e-5]
     assert last.spec.scans == 20
     assert (last.stem, last.realisations, last.seed) == ("own", 1000, 7)
@@ -221,7 +221,7 @@ def test_a_mapping_of_overrides_is_what_its_texts_say(folder):
     assert case.spec.filters[0].manoeuvre_variance.over == "worst"
     assert case.spec.filters[1].manoeuvre_variance == 1e-7
     assert case.spec.target.coefficients == (1e5, -250)
-    assert (case.spec.baseline, case.against) == ("1e3", ("r+Vr",))
+    assert (case.spec.baseline, case.further_baselines) == ("1e3", ("r+Vr",))
 
 
 def test_an_override_of_a_swept_key_would_be_lost(command_line, folder, said):
@@ -337,14 +337,14 @@ def test_figures_name_their_cases(folder):
     folder("configs/f.yaml", "include: [a, swept]\nfigures: {sigma_r: [a], gain_r: ['swept * scans=?', 'a']}\n")
     experiment = load("f")
     assert experiment.figures == {"sigma_r": ("a",), "gain_r": ("swept * scans=?", "a")}
-    assert [case.name for case in experiment.shown_in("sigma_r")] == ["a"]
-    assert [case.name for case in experiment.shown_in("gain_r")] == [
+    assert [case.name for case in experiment.cases_in_figure("sigma_r")] == ["a"]
+    assert [case.name for case in experiment.cases_in_figure("gain_r")] == [
         "a",
         "swept filters.0.observes=[range] scans=9",
         "swept filters.0.observes=[range,velocity] scans=9",
     ]
-    assert experiment.shown_in("sigma_Vr") == experiment.cases
-    assert experiment.drawn(["gain_Vr", "gain_r", "sigma_r"]) == ["sigma_r", "gain_r"]
+    assert experiment.cases_in_figure("sigma_Vr") == experiment.cases
+    assert experiment.selected_figures(["gain_Vr", "gain_r", "sigma_r"]) == ["sigma_r", "gain_r"]
 
 
 @pytest.mark.parametrize(
@@ -358,8 +358,8 @@ def test_figures_name_their_cases(folder):
 def test_named_figures_are_drawn_in_their_order_with_all_cases(folder, named, drawn):
     folder("configs/f.yaml", f"include: [a]\nfigures: {named}\n")
     experiment = load("f")
-    assert experiment.drawn(["gain_r", "gain_Vr", "sigma_r", "sigma_Vr", "claims"]) == drawn
-    assert experiment.shown_in("sigma_r") == experiment.cases
+    assert experiment.selected_figures(["gain_r", "gain_Vr", "sigma_r", "sigma_Vr", "claims"]) == drawn
+    assert experiment.cases_in_figure("sigma_r") == experiment.cases
 
 
 def test_brackets_in_patterns_are_brackets():

@@ -18,7 +18,7 @@ def test_keys_can_be_set_to_their_own_values(stem):
     """What is found is what `--set` understands; only an item of a list that the config gives in degrees, or not at
     all, has no place there."""
     case = load(stem).cases[0]
-    swept = {key for key, _ in case.swept}
+    swept = {key for key, _ in case.swept_values}
     given = [key for key in numeric_keys.numeric_keys(case.spec) if key.value is not None and key.path not in swept]
     places, refused = [], []
     for key in given:
@@ -36,7 +36,7 @@ def test_the_keys_of_a_radar():
     keys = {key.path: key for key in numeric_keys.numeric_keys(load("rls2").cases[0].spec)}
     assert keys["radar.sigma_range_m"] == numeric_keys.NumericKey("radar.sigma_range_m", 250.0, 0, math.inf, False)
     assert keys["target.coefficients.2"].value == 4.0
-    assert (keys["filters.1.initial_scans"].low, keys["filters.1.initial_scans"].whole) == (2, True)
+    assert (keys["filters.1.initial_scans"].low, keys["filters.1.initial_scans"].is_whole) == (2, True)
     assert not any(path.startswith("radar.band") for path in keys)
 
 

@@ -87,7 +87,9 @@ def test_the_page_of_interpretations_has_every_class_and_choice(paper, tmp_path)
     made = interpretations.markdown(paper, tmp_path)
     for one in shipped_classes():
         if one.claim.startswith(f"{paper}."):
-            assert re.search(rf"^\| {re.escape(one.claim)} \| .* \| {one.holds} of {one.of} \|$", made, re.M), one.claim
+            assert re.search(
+                rf"^\| {re.escape(one.claim)} \| .* \| {one.holds_in} of {one.interpretation_count} \|$", made, re.M
+            ), one.claim
     choices = interpretations.open_papers()[paper].interpretations.choices
     assert [f"### `{choice.key}`: {choice.asks}" for choice in choices] == re.findall("^### .*$", made, re.M)
     whole = tmp_path / "interpretations" / f"{paper}.md"

@@ -142,7 +142,7 @@ def declared():
     for study in registry.SHIPPED:
         for module in tables.modules(study):
             found[study, None] |= own_names(module)
-            for name, (function, _) in module.table.declared.items():
+            for name, (function, _) in module.table.makers.items():
                 found[study, name] |= own_names(function)
     return found
 

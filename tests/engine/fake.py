@@ -114,7 +114,7 @@ def main() -> None:
             work, asked.realisations, store=asked.store, threads=asked.threads, progress=progress, stop=signals
         )
         say(result.count, hashlib.sha256(result.values.tobytes()).hexdigest(), *result.warnings)
-        sys.exit(128 + signals.received if signals.received else 0)
+        sys.exit(128 + signals.received_signal if signals.received_signal else 0)
 
 
 if __name__ == "__main__":

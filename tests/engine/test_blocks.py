@@ -44,12 +44,12 @@ def test_the_widest_node_is_aligned_and_cannot_grow(first, blocks, highest):
 @given(st.integers(0, 12), st.integers(0, 1000))
 def test_what_is_above_contains(level, index):
     node = Node(level, index)
-    for above in node.above(20):
+    for above in node.containing_nodes(20):
         assert above.first <= node.first < node.stop <= above.stop
-    assert len(list(node.above(20))) == 20 - level
-    assert Node(3, 5) in set(Partial(40, 7).above(8))
-    assert Partial(40, 7).above(8).__next__() == Node(0, 40)
-    assert list(Total(40).above(8)) == []
+    assert len(list(node.containing_nodes(20))) == 20 - level
+    assert Node(3, 5) in set(Partial(40, 7).containing_nodes(8))
+    assert Partial(40, 7).containing_nodes(8).__next__() == Node(0, 40)
+    assert list(Total(40).containing_nodes(8)) == []
 
 
 @st.composite

@@ -34,7 +34,7 @@ class Shuffled(Serial):
         self._random.shuffle(waiting)
         self._tasks.clear()
         self._tasks.extend(waiting)
-        return [outcome for _ in range(3) for outcome in Serial.finished(self, timeout_s)]
+        return [outcome for _ in range(3) for outcome in Serial.take_outcomes(self, timeout_s)]
 
 
 @pytest.mark.parametrize("realisations", [1, 15, 16, 17, 32, 999, 10_000])

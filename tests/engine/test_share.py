@@ -25,9 +25,9 @@ def test_shares_tile_the_blocks_and_the_last_has_the_cut_one(realisations, of):
     shares = [Share(WORK, realisations, (number, of), "unwritten", None) for number in range(1, of + 1)]
     assert [one.first for one in shares] == [0, *(one.stop for one in shares[:-1])]
     assert shares[-1].stop == realisations // 16
-    assert [one.rest for one in shares] == [0] * (of - 1) + [realisations % 16]
-    assert sum(one.asked for one in shares) == realisations
-    sizes = [one.stop - one.first + (one.rest > 0) for one in shares]
+    assert [one.partial_size for one in shares] == [0] * (of - 1) + [realisations % 16]
+    assert sum(one.requested for one in shares) == realisations
+    sizes = [one.stop - one.first + (one.partial_size > 0) for one in shares]
     assert max(sizes) - min(sizes) <= 1
 
 
@@ -95,13 +95,13 @@ def test_what_is_missing_is_named_by_realisations_and_shares(tmp_path_factory, r
         compute_share(WORK, realisations, (number, of), store=root, threads=0)
     found = take_inventory(WORK, realisations, root)
     parts = {number: take_inventory(WORK, realisations, root, (number, of)) for number in numbers}
-    assert found.asked == realisations == sum(part.asked for part in parts.values())
+    assert found.requested == realisations == sum(part.requested for part in parts.values())
     assert found.stored == sum(part.stored for part in parts.values())
     for number, part in parts.items():
-        assert part.stored == (0 if number in absent else part.asked)
+        assert part.stored == (0 if number in absent else part.requested)
     missing = [i for first, last in found.missing for i in range(first, last + 1)]
     assert missing == [i for part in parts.values() for first, last in part.missing for i in range(first, last + 1)]
-    assert found.loose is (found.stored > 0)
+    assert found.has_loose_blocks is (found.stored > 0)
     if found.shares is not None:  # 3 and 4 of 4 are 2 of 2
         fewer, total = found.shares
         assert total <= of
@@ -115,16 +115,16 @@ def test_a_share_that_lacks_is_named(tmp_path):
         for number in {1, 2, 3} - absent:
             compute_share(WORK, N, (number, 3), store=root, threads=0)
         found = take_inventory(WORK, N, root)
-        assert (found.shares, found.loose) == (shares, True)
+        assert (found.shares, found.has_loose_blocks) == (shares, True)
         assert collect(WORK, N, store=root, threads=0).computed == N - found.stored
-        assert take_inventory(WORK, N, root) == Inventory(N, N, (), None, loose=False)
+        assert take_inventory(WORK, N, root) == Inventory(N, N, (), None, has_loose_blocks=False)
 
 
 def test_of_a_run_that_ended_nothing_is_loose(tmp_path):
     collect(WORK, 1000, store=tmp_path, threads=0)
     larger = take_inventory(WORK, N, tmp_path)
-    assert (larger.stored, larger.missing, larger.loose) == (992, ((992, N - 1),), False)
-    assert take_inventory(WORK, N, None) == Inventory(N, 0, ((0, N - 1),), None, loose=False)
+    assert (larger.stored, larger.missing, larger.has_loose_blocks) == (992, ((992, N - 1),), False)
+    assert take_inventory(WORK, N, None) == Inventory(N, 0, ((0, N - 1),), None, has_loose_blocks=False)
     assert take_inventory(WORK, N, tmp_path / "nowhere") == take_inventory(WORK, N, None)
     assert take_inventory(WORK, 1000, tmp_path).missing == ()
 

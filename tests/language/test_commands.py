@@ -166,7 +166,7 @@ def test_what_solve_announces():
             12.3,
         )
         near = tr(exact_but_for(load("rls2", ["radar.detection_probability=0.9", "scans=22"]).cases[0]))
-        quantity = MeasuredQuantity(SIGMA, "r", "Vr", at_s=60.0).said
+        quantity = MeasuredQuantity(SIGMA, "r", "Vr", at_s=60.0).translated_words
     assert said == ["вычисляется q примерно при 7 значениях k: около 12 с"]
     assert near.startswith("среднее")
     assert untranslated(near, set()) == []

@@ -112,7 +112,12 @@ def check(stem: str, realisations: int, folder) -> None:
 def own_names(result):
     """What the config calls things."""
     for case in result.cases:
-        yield from (case.name, case.spec.device or "", *case.axes.filters, *(str(value) for _, value in case.swept))
+        yield from (
+            case.name,
+            case.spec.device or "",
+            *case.axes.filters,
+            *(str(value) for _, value in case.swept_values),
+        )
         yield from (name for name, _ in case.axes.components)
         yield from (one.name for one in getattr(case.spec, "detectors", ()))
         yield from typed(case.spec.model_dump())

@@ -517,7 +517,7 @@ def test_outliers_are_allowed_for_where_there_are_some_alone():
     rng, config = np.random.default_rng(41), loaded()
     for share, tracks, count, least, most in ((0, 1, 200, 0, 2), (0.04, 1, 100, 90, 100), (0.04, 3, 50, 48, 50)):
         drawn = ([recording(rng, share=share) for _ in range(tracks)] for _ in range(count))
-        found = [fit.fit_keys(likelihood(*one, config=config)).beside for one in drawn]
+        found = [fit.fit_keys(likelihood(*one, config=config)).further_explanation for one in drawn]
         switched = sum(one is not None and one.name == OUTLIERS and one.gain > fit.PLAIN_GAIN for one in found)
         assert least <= switched <= most, switched
 
@@ -555,7 +555,8 @@ def test_a_fit_notices_errors_that_last_in_95_of_100():
     rng, config = np.random.default_rng(31), loaded()
     for correlation, least in ((0.6, 95), (0.0, 93)):
         found = [
-            fit.fit_keys(likelihood(recording(rng, correlation=correlation), config=config)).beside for _ in range(100)
+            fit.fit_keys(likelihood(recording(rng, correlation=correlation), config=config)).further_explanation
+            for _ in range(100)
         ]
         right = [one[0] == CORRELATION if correlation and one else (one is None) == (not correlation) for one in found]
         assert sum(right) >= least, sum(right)

@@ -252,7 +252,7 @@ def test_two_recordings(tmp_path, of_day, sites):
     files = recordings(tmp_path, of_day=of_day)
     one = register.register_radar(*imported(tmp_path, files, sites))
     assert (one.plots, one.matched, one.by) == (480, 480, {"address": 480})
-    for bias, true in zip(one.adjusted.biases, SOME, strict=True):
+    for bias, true in zip(one.adjustment.biases, SOME, strict=True):
         assert bias.lo < true < bias.hi
         assert bias.hi - bias.lo < 1.2 * (abs(true) + (bias.key == "range_scale") * 1e-3)
     command = next(
@@ -260,13 +260,13 @@ def test_two_recordings(tmp_path, of_day, sites):
     )
     options = command.rstrip("`").split(" --bias ")[1:]
     assert options == [*(f"{key}={value:.4g}" for key, value in (
-        ("range_m", one.adjusted.biases[0].value),
-        ("range_scale", one.adjusted.biases[1].value),
-        ("bearing_deg", math.degrees(one.adjusted.biases[2].value)),
-        ("time_s", one.adjusted.biases[3].value),
+        ("range_m", one.adjustment.biases[0].value),
+        ("range_scale", one.adjustment.biases[1].value),
+        ("bearing_deg", math.degrees(one.adjustment.biases[2].value)),
+        ("time_s", one.adjustment.biases[3].value),
     ))]  # fmt: skip
     again = register.register_radar(*imported(tmp_path, files, sites, parse_biases(options)))
-    for bias, before in zip(again.adjusted.biases, one.adjusted.biases, strict=True):
+    for bias, before in zip(again.adjustment.biases, one.adjustment.biases, strict=True):
         assert abs(bias.value) < 0.5e-3 * abs(before.value)  # four digits are in the option
     assert sentences.registration_lines(again)[-1] == "no bias differs from 0"
 
@@ -275,7 +275,7 @@ def test_an_aircraft_whose_own_clock_is_wrong_is_named(tmp_path):
     one = register.register_radar(*imported(tmp_path, recordings(tmp_path, late=3)))
     (line,) = [line for line in sentences.registration_lines(one) if "alone" in line]
     assert line.startswith("4ca103 alone is −2")
-    assert one.adjusted.biases[3].lo < SOME[3] < one.adjusted.biases[3].hi
+    assert one.adjustment.biases[3].lo < SOME[3] < one.adjustment.biases[3].hi
 
 
 def test_the_command_and_python_say_the_same(tmp_path):
@@ -293,7 +293,7 @@ def test_the_command_and_python_say_the_same(tmp_path):
 
 def test_few_aircraft_say_what_their_intervals_lack(tmp_path):
     one = register.register_radar(*imported(tmp_path, recordings(tmp_path, count=2)))
-    assert one.adjusted.clusters == 20
+    assert one.adjustment.clusters == 20
     assert any(
         line.startswith("errors common to a whole flight are not in the intervals")
         for line in sentences.registration_lines(one)
@@ -433,7 +433,7 @@ def test_a_radar_that_knows_codes_alone(tmp_path):
     assert one.plots == 480
     assert 440 < one.matched <= 480
     assert len(one.aircraft) == 8
-    for bias, true in zip(one.adjusted.biases, SOME, strict=True):
+    for bias, true in zip(one.adjustment.biases, SOME, strict=True):
         assert bias.lo < true < bias.hi
 
 
@@ -465,5 +465,5 @@ def test_an_aircraft_that_is_another_is_left_out_and_named(tmp_path):
     one = register.register_radar(*imported(tmp_path, (radar, adsb)))
     assert one.matched == 360
     assert sorted(line.split(",")[0] for line in one.left) == ["the plots of 4ca101", "the plots of 4ca106"]
-    for bias, true in zip(one.adjusted.biases, SOME, strict=True):
+    for bias, true in zip(one.adjustment.biases, SOME, strict=True):
         assert bias.lo < true < bias.hi

@@ -47,7 +47,7 @@ def config(stem, variance=1e-3, **changes):
 
 def covariances(case):
     """Exact second moments (F, K, 3, 3) of the errors."""
-    made, found = range_doppler.prepare(case).made, []
+    made, found = range_doppler.prepare(case).design, []
     for one in made.filters:
         lasting, S = error_recursion(one, made.plots, made.x, made.dt)
         found.append(S + lasting[:, :, :1] * lasting[:, None, :, 0])
@@ -68,7 +68,7 @@ def expected(case, name=None, count=100_000):
     S = covariances(case)
     cross = count * np.stack([S[..., 0, 1], S[..., 0, 2], S[..., 1, 2]], axis=-1)
     sums = {"error": error, "paired": paired, "cross": cross}
-    return CaseResult(name or case.name, case.study, case.spec, case.swept, count, sums, axes)
+    return CaseResult(name or case.name, case.study, case.spec, case.swept_values, count, sums, axes)
 
 
 def made_radar(stem, variance=1e-3, name=None, count=100_000, **changes):

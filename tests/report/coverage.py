@@ -186,7 +186,7 @@ def _of_run(run: int, made: dict[str, pd.DataFrame], whole: dict[str, pd.DataFra
 def _tables(experiment: Experiment, works: list[CaseWork], sums: list[np.ndarray], n: int) -> dict[str, pd.DataFrame]:
     """The tables, marked as if no exact value stood in them: it counts what the rule does where none is known."""
     results = [
-        CaseResult(case.name, case.study, case.spec, case.swept, n, work.plan.layout.unpack(own), work.plan.axes)
+        CaseResult(case.name, case.study, case.spec, case.swept_values, n, work.plan.layout.unpack(own), work.plan.axes)
         for case, work, own in zip(experiment.cases, works, sums, strict=True)
     ]
     declared = registry.study(experiment.study).quantities()

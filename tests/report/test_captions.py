@@ -35,7 +35,9 @@ def test_paragraphs_of_an_answer_close_their_brackets(config):
 @pytest.mark.parametrize("config", CONFIGS)
 def test_answers_and_figures_of_every_config_fit_a_page(config):
     result = check_answer(config, 200)
-    drawn = result.experiment.drawn(result_content.case_figures(result.cases, result._tables, result.experiment))
+    drawn = result.experiment.selected_figures(
+        result_content.case_figures(result.cases, result._tables, result.experiment)
+    )
     assert 1 <= len(drawn) <= 8  # a page that is read
     named = result.experiment.figures
     assert len(drawn) >= 0.5 * len(named)  # of so few realisations some have nothing to show

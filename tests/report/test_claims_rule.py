@@ -99,7 +99,7 @@ def test_what_the_truth_cannot_pass_is_void():
     assert part_verdict(replace(share, ceiling=0.995)) == REFUTED
     assert claim_outcome([share]).kind == UNJUDGEABLE
     assert claim_outcome([share, NUMBER]).kind == CONFIRMED
-    assert claim_outcome([share, NUMBER]).of == 1
+    assert claim_outcome([share, NUMBER]).number_count == 1
 
 
 def test_one_immaterial_part_in_fifty_refutes_nothing():
@@ -145,7 +145,7 @@ def test_realisations_are_said_to_two_digits_and_never_fewer():
 def test_variants_of_a_number_one_suffices():
     right, wrong = at(NUMBER, 25, number="T", variant="a"), at(NUMBER, 50, number="T", variant="b")
     assert claim_outcome([right, wrong]).kind == CONFIRMED
-    assert claim_outcome([right, wrong]).of == 1
+    assert claim_outcome([right, wrong]).number_count == 1
     assert claim_outcome([wrong]).kind == REFUTED
     assert claim_outcome([replace(right, against_print=True), wrong]).kind == CONTRADICTORY
     assert claim_outcome([replace(wrong, against_print=True), right]).kind == CONFIRMED

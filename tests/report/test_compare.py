@@ -113,17 +113,17 @@ def test_cases_answer_to_one_another_by_their_swept_values():
 
     first, second = of("a", "a q=1", "a q=2"), of("b", "b q=2", "b q=3")
     found, alone = pairs.pairs([first, second])
-    assert [(pair.side.case, pair.against.case) for pair in found] == [("b q=2", "a q=2")]
+    assert [(pair.side.case, pair.reference.case) for pair in found] == [("b q=2", "a q=2")]
     assert alone == ["b q=3: no such case in a"]
     found, alone = pairs.pairs([of("mine", "mine"), first])
-    assert [pair.against.case for pair in found] == ["mine", "mine"]
+    assert [pair.reference.case for pair in found] == ["mine", "mine"]
     assert not alone
 
 
 def test_figures_have_all_sides_on_common_axes_and_sentences_the_exact_change(errors):
     pair = pairs.Pair(side("b", errors, ["base", "one"], noise="m"), side("a", errors, ["base", "one"]))
     made = table.comparison_table([pair])
-    drawn = figures.figures([pair.against, pair.side], made)
+    drawn = figures.figures([pair.reference, pair.side], made)
     values, apart = drawn["sigma_r"].panels
     assert [mark.name for mark in values.marks] == ["a, base", "a, one", "b, base", "b, one"]
     assert len([mark for mark in apart.marks if isinstance(mark, Line)]) == 2

@@ -403,7 +403,7 @@ def test_any_name_can_be_drawn(name, expected_radar):
     ]
     results = [expected_radar("rls2", filters=filters, radar={"name": name})]
     made = {"curves": tables.curves(results), "gains": tables.gains(results), **range_doppler.tables(results)}
-    shown = SimpleNamespace(stem="mine", shown_in=lambda figure: [SimpleNamespace(name=results[0].name)])
+    shown = SimpleNamespace(stem="mine", cases_in_figure=lambda figure: [SimpleNamespace(name=results[0].name)])
     drawn = range_doppler_figures.figures(results, made, shown)
     for figure in (drawn["sigma_r"], drawn["gain_r"]):
         saved = drawing_canvas.save(figure, ("svg",))["svg"].decode()
@@ -419,7 +419,7 @@ def test_numbers_for_people():
 
 
 def test_angles_given_in_radians_are_shown_in_degrees():
-    result = SimpleNamespace(spec=None, swept=(("target.turn.rate_radps", 0.00873),))
+    result = SimpleNamespace(spec=None, swept_values=(("target.turn.rate_radps", 0.00873),))
     assert key_labels.swept_description(result).endswith("= 0.5°/s")
     assert key_labels.key_axis_label(result, "target.turn.rate_radps").endswith(", °/s")
     x, axis = sweep_figures.axis_positions(result, "target.turn.rate_radps", [0.0, 0.01745])
@@ -521,7 +521,7 @@ def test_losses_far_below_are_cut_and_the_caption_says_so():
 
     result = SimpleNamespace(
         name="a",
-        swept=(),
+        swept_values=(),
         count=100,
         spec=SimpleNamespace(device="A"),
         axes=SimpleNamespace(filters=("r", "v"), baseline=0),

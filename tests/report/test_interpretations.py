@@ -85,7 +85,7 @@ def over(of, one):
 
 def test_interpretations_of_a_claim_leave_out_what_does_not_bear_on_it():
     of = Small()
-    assert len(of.declared()) == 5  # two by two of E and U, and one against the print
+    assert len(of.declared_interpretations()) == 5  # two by two of E and U, and one against the print
     assert len(of.for_claim("P9.1")) == 5
     assert len(of.for_claim("P9.2")) == 3
     assert all(one["form"] == "round" for one in of.for_claim("P9.2"))

@@ -144,9 +144,9 @@ def test_lists_and_long_names_at_an_axis_and_in_titles():
     assert key_labels.format_value((1000.0, 1200.0)) == "1000, 1200"
     result = run.run("ambiguous_turns", realisations=8, figures=False)
     first, second = result.cases[:2]
-    key = first.swept[0][0]
+    key = first.swept_values[0][0]
     assert key_labels.swept_description(first) == "$F_r$ = 1000, 1200 Hz"
-    _, axis = sweep_figures.axis_positions(first, key, [dict(one.swept)[key] for one in (first, second)])
+    _, axis = sweep_figures.axis_positions(first, key, [dict(one.swept_values)[key] for one in (first, second)])
     assert [words for _, words in axis.ticks] == ["1000, 1200", "1000, 1200,\n1400"]
     _, axis = sweep_figures.axis_positions(first, key, ["aeroballistic_gentle", "weaving"])
     assert [words for _, words in axis.ticks] == ["aeroballistic\ngentle", "weaving"]
@@ -160,12 +160,14 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     result = run.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
     assert [key_labels.shorten_mapping(result, "target", one, targets) for one in targets] == words
     whole = "distance of closest approach 15000 m, speed 280 m/s, range at the first plot 40000 m"
-    assert key_labels.swept_description(replace(result, swept=(("target", past),))) == f"target = fly by, {whole}"
+    assert (
+        key_labels.swept_description(replace(result, swept_values=(("target", past),))) == f"target = fly by, {whole}"
+    )
     x, axis = sweep_figures.axis_positions(result, "target", targets)
     assert x.tolist() == [0, 1, 2]
     assert [" ".join(shown.split()) for _, shown in axis.ticks] == words
     lines = figure_lines.case_lines(
-        [replace(result, name=f"rls2 {n}", swept=(("target", one),)) for n, one in enumerate(targets)],
+        [replace(result, name=f"rls2 {n}", swept_values=(("target", one),)) for n, one in enumerate(targets)],
         {(f"rls2 {n}", "r", "r"): tables.frame({"x": [n], "y": [n]}) for n in range(3)},
         *("r", ("x", "y"), ["r"]),
     )

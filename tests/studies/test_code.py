@@ -699,9 +699,9 @@ def test_its_keys_are_set_swept_and_included_by_its_name(place):
         "  - {name: mine, python: ../my_filter.py:Mine}\n"
     )
     (case,) = load("sub/all.yaml").cases
-    assert case.outside[0].file == str(place / "my_filter.py")
+    assert case.user_filters[0].file == str(place / "my_filter.py")
     Path("both.yaml").write_text("include: [mine, rls1]\n")
-    assert [len(case.outside) for case in load("both.yaml").cases] == [1, 0]
+    assert [len(case.user_filters) for case in load("both.yaml").cases] == [1, 0]
     assert load(swept.resolved["cases"][0] | {"study": "range_doppler"} and json.loads(json.dumps(keys_of(swept))))
     (carried,) = load(
         "mine.yaml",
@@ -711,7 +711,7 @@ def test_its_keys_are_set_swept_and_included_by_its_name(place):
             "prior={sigma_velocity_mps: 100, sigma_acceleration_mps2: 5}",
         ],
     ).cases
-    assert [one.name for one in carried.outside] == ["mine"]
+    assert [one.name for one in carried.user_filters] == ["mine"]
 
 
 def keys_of(experiment):

@@ -50,9 +50,9 @@ def test_of_the_very_prior_the_kalman_filter_is_on_it_at_every_scan():
     axes, floor = of_case("ambiguous_rls2", "filters.0.manoeuvre_variance=0", "filters.1.manoeuvre_variance=0")
     assert floor.kind == floors_bound.POSTERIOR
     for f in range(2):
-        assert known(floor, f).reached
+        assert known(floor, f).is_attained
         assert known(floor, f).sigma == pytest.approx(axes.exact_sigma[f], rel=EXACT)
-    assert not known(floor, list(axes.filters).index("memory")).reached
+    assert not known(floor, list(axes.filters).index("memory")).is_attained
 
 
 def test_of_a_polynomial_least_squares_is_on_it():
@@ -218,7 +218,7 @@ def test_fewer_patterns_and_less_information_are_lower_bounds(monkeypatch, most)
         summed_up = 1 + rounding(operations=1 << 11)  # patterns that are the same
         assert (few.sigma[there] <= all_of.sigma[there] * summed_up).all()
         assert (few.sigma[-1] < all_of.sigma[-1]).all()
-        assert not all_of.reached
+        assert not all_of.is_attained
     if most == 1:
         assert REDUCTION in few.patterns
 

@@ -133,7 +133,7 @@ def made():
     for case in (case_of(study, 0.1), case_of(study)):
         plan = study.prepare(case)
         sums = plan.layout.unpack(study.simulate(plan, 0, N))
-        results.append(CaseResult(case.name, "walk", case.spec, case.swept, N, sums, plan.axes))
+        results.append(CaseResult(case.name, "walk", case.spec, case.swept_values, N, sums, plan.axes))
     every = study.tables(results) | {"curves": tables.curves(results), "gains": tables.gains(results)}
     return study, results, every
 
@@ -172,7 +172,7 @@ def test_question_answer_and_figures(made):
     answer = answer_texts(study, results, every)
     assert answer[2].startswith("σ_w = 2 m: σ of the position after 78 s: slow ")
     assert answer[3].startswith("σ_w = 2 m: Gain against slow there: quick ")
-    other = [replace(one, name=name, swept=()) for one, name in zip(results, ("walk", "stroll"), strict=True)]
+    other = [replace(one, name=name, swept_values=()) for one, name in zip(results, ("walk", "stroll"), strict=True)]
     tables_of = {name: table.replace({one.name: own.name for one, own in zip(results, other, strict=True)})
                  for name, table in every.items()}  # fmt: skip
     heads = [sentence.partition(": ")[0] for sentence in answer_texts(study, other, tables_of)]
@@ -256,7 +256,7 @@ def test_what_is_missing_is_one_line(name):
 
 def test_a_time_between_plots_is_a_time():
     Wrong = type("Wrong", (Walk,), {"scan_period": "sensor.about", "__module__": __name__})
-    Wrong.parts = {"sensor": type("Odd", (Sensor,), {"about": property(lambda self: "often")}), "target": Target}
+    Wrong.components = {"sensor": type("Odd", (Sensor,), {"about": property(lambda self: "often")}), "target": Target}
     with pytest.raises(ConfigError, match=r"scan_period: sensor\.about must be a time > 0, s; got 'often'"):
         Wrong().scan_period_s(SimpleNamespace(sensor=SimpleNamespace(about="often")))
 

@@ -110,7 +110,7 @@ def case_of(study, names=("kalman", "halves"), **sensor):
     spec = study.keys().model_validate(
         {"sensor": sensor, "filters": [{"name": n, "kind": n} for n in names], "scans": SCANS}
     )
-    return SimpleNamespace(spec=spec, seed=5, study="walk", noise_of=None)
+    return SimpleNamespace(spec=spec, seed=5, study="walk", noise_keys=None)
 
 
 def added(study, case, count, step=512):

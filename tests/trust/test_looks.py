@@ -244,10 +244,16 @@ class Synthetic:
         self.plan = SimpleNamespace(gaussian=gaussian, axes=axes, layout=layout)
         self.plans = (self.plan,)
         self.case = SimpleNamespace(
-            name="case", realisations=most, study="synthetic", spec=None, swept={}, companions=(), outside=()
+            name="case",
+            realisations=most,
+            study="synthetic",
+            spec=None,
+            swept_values={},
+            companions=(),
+            user_filters=(),
         )
 
-    def unpacked(self, values):
+    def unpack(self, values):
         return (self.plan.layout.unpack(values),)
 
     def run(self, rng, monkeypatch, percent, of="sigma", tables=None):

@@ -42,7 +42,7 @@ class QuantityName(NamedTuple):
 class MeasuredQuantity:
     """A quantity that a case measures; the other fields are those of `QuantityName`."""
 
-    of: Quantity
+    definition: Quantity
     filter: str | None = None
     component: str | None = None
     at_s: float | None = None
@@ -51,16 +51,16 @@ class MeasuredQuantity:
     @property
     def words(self) -> str:
         """`gain of r+Vr in r at 60 s`."""
-        component_words = f" in {self.of.place(self.component)}" if self.component else ""
+        component_words = f" in {self.definition.place(self.component)}" if self.component else ""
         time_words = f" at {self.at_s:g} s" if self.at_s is not None else ""
         time_words = f" at k = {self.at_k}" if self.at_k is not None else time_words
-        return f"{self.of.words} of {self.filter}{component_words}{time_words}"
+        return f"{self.definition.words} of {self.filter}{component_words}{time_words}"
 
     @property
-    def said(self) -> str:
+    def translated_words(self) -> str:
         """The quantity, filter and time as `words` gives them, in the current language."""
-        fields = {"kind": term(self.of.words), "filter": self.filter}
-        fields["component"] = self.of.place(self.component or "", tr)
+        fields = {"kind": term(self.definition.words), "filter": self.filter}
+        fields["component"] = self.definition.place(self.component or "", tr)
         subject = (
             tr("{kind} of {filter} in {component}", **fields) if self.component else tr("{kind} of {filter}", **fields)
         )
@@ -111,7 +111,7 @@ def check_name(name: str, names: Sequence[str], item: str = "filter") -> None:
 def resolve_scan(quantity: MeasuredQuantity, axes: Axes) -> MeasuredQuantity:
     """Fill in the filter of a quantity if there is only one. Raises ConfigError for unknown names."""
     filter_names, filter_name = list(axes.filters), quantity.filter
-    is_planned_gain = quantity.of.paired and is_planned(quantity.of)
+    is_planned_gain = quantity.definition.paired and is_planned(quantity.definition)
     if filter_name is None:
         candidates = [name for i, name in enumerate(filter_names) if not is_planned_gain or i != axes.baseline]
         if len(candidates) != 1:
@@ -119,11 +119,11 @@ def resolve_scan(quantity: MeasuredQuantity, axes: Axes) -> MeasuredQuantity:
         filter_name = candidates[0]
     check_name(filter_name, filter_names)
     if is_planned_gain and filter_name == filter_names[axes.baseline]:
-        words = quantity.of.words
+        words = quantity.definition.words
         raise ConfigError(
             f"filter {filter_name!r} is the baseline, against which {words}s are: its {words} is 0 % at any value"
         )
-    if quantity.component is not None and is_planned(quantity.of):
+    if quantity.component is not None and is_planned(quantity.definition):
         check_name(quantity.component, [name for name, _ in axes.components], "component")
     return replace(quantity, filter=filter_name)
 
@@ -132,7 +132,7 @@ def unit(quantity: MeasuredQuantity, axes: Axes) -> str:
     """The unit of a quantity."""
     from radarsim.report import wording
 
-    return wording.unit(quantity.of.shown_unit(dict(axes.components).get(str(quantity.component), "")))
+    return wording.unit(quantity.definition.shown_unit(dict(axes.components).get(str(quantity.component), "")))
 
 
 def shorten_case(quantity: MeasuredQuantity, case: Case) -> Case:
@@ -155,16 +155,16 @@ def is_planned(definition: Quantity) -> bool:
 
 def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
     """The exact value from the labels of a case's plan; NaN where it is known only by sampling."""
-    if not is_planned(quantity.of) or not registry.study(case.study).exact_errors:
+    if not is_planned(quantity.definition) or not registry.study(case.study).exact_errors:
         return np.nan
     f = axes.filters.index(str(quantity.filter))
     c = [name for name, _ in axes.components].index(str(quantity.component))
     available = axes.available[f, :, c]
-    if quantity.of.paired:
+    if quantity.definition.paired:
         if f == axes.baseline:
             return np.nan
         available = available & axes.available[axes.baseline, :, c]
-    exact_values = np.asarray(getattr(axes, PLANNED[quantity.of.table, quantity.of.value]), dtype=float)
+    exact_values = np.asarray(getattr(axes, PLANNED[quantity.definition.table, quantity.definition.value]), dtype=float)
     values = np.where(available, exact_values[f, :, c], np.nan)
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
     return float(estimate_at(quantity, Series(k, t_s, Estimate(values, values, values))).value)
@@ -172,14 +172,14 @@ def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
 
 def sampled_value(quantity: MeasuredQuantity, result: CaseResult) -> tuple[Estimate, float]:
     """The value with its 95 % interval from a case's tables; and the exact value if the table has one, else NaN."""
-    table = quantity_table(quantity.of, result)
+    table = quantity_table(quantity.definition, result)
     table = table[table["filter"] == quantity.filter]
     if not len(table):
         return UNKNOWN_ESTIMATE, np.nan
-    measured = _series_by_component(quantity.of, table)
-    exact_series = _series_by_component(quantity.of, table, exact_only=True)
+    measured = _series_by_component(quantity.definition, table)
+    exact_series = _series_by_component(quantity.definition, table, exact_only=True)
     name = quantity.component or ""
-    check_name(name, list(measured), quantity.of.per)
+    check_name(name, list(measured), quantity.definition.per)
     return estimate_at(quantity, measured[name]), float(estimate_at(quantity, exact_series[name]).value)
 
 
@@ -219,15 +219,15 @@ def interval_note(quantity: MeasuredQuantity, result: CaseResult) -> str:
     """The note that tables put on an interval without an exact value: why it is too narrow, or empty."""
     from radarsim.report import interval_notes
 
-    study, table_name = registry.study(result.study), quantity.of.table
-    tables = {"curves": study.curves([result]), table_name: quantity_table(quantity.of, result)}
+    study, table_name = registry.study(result.study), quantity.definition.table
+    tables = {"curves": study.curves([result]), table_name: quantity_table(quantity.definition, result)}
     declared_quantities = registry.quantities(result.study, result.spec)
     table = interval_notes.add_notes(tables, [result], exact=False, quantities=declared_quantities)[table_name]
     if "note" not in table:
         return ""
     rows = table[table["filter"] == quantity.filter]
     if quantity.component is not None:
-        rows = rows[rows[quantity.of.per].astype(str) == quantity.component]
+        rows = rows[rows[quantity.definition.per].astype(str) == quantity.component]
     if quantity.at_k is not None:
         rows = rows[rows["k"] == quantity.at_k]
     elif quantity.at_s is not None and "t_s" in rows:
@@ -253,7 +253,7 @@ def estimate_at(quantity: MeasuredQuantity, series: Series) -> Estimate:
         return UNKNOWN_ESTIMATE
     if not k.any() and (quantity.at_s, quantity.at_k) != (None, None):
         option = argument("at_s", "--at") if quantity.at_k is None else argument("at_k", "--at-k")
-        raise ConfigError(f"{option}: the {quantity.of.words} has one value, not one a scan: leave it out")
+        raise ConfigError(f"{option}: the {quantity.definition.words} has one value, not one a scan: leave it out")
     if quantity.at_k is not None:
         if quantity.at_k > k[-1] or quantity.at_k < 1:
             option = argument("at_k", "--at-k")

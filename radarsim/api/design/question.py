@@ -50,19 +50,19 @@ class Cases:
     overrides: tuple[str, ...]
     name: str | None = None
     base: Case = field(init=False)
-    outside: tuple[str, ...] = field(init=False)  # filters written in Python, which the cases do not hold
+    user_filters: tuple[str, ...] = field(init=False)  # filters written in Python, which the cases do not hold
     stem: str = field(init=False)  # of the config, if it has one case; else of the case
 
     def __post_init__(self) -> None:
         experiment = load(self.config, self.overrides)
         self.base = self._select_case(experiment)
-        self.outside = tuple(user_filter.name for case in experiment.cases for user_filter in case.outside)
+        self.user_filters = tuple(user_filter.name for case in experiment.cases for user_filter in case.user_filters)
         self.stem = experiment.stem if len(experiment.cases) == 1 else self.base.stem
 
     def _select_case(self, experiment: Experiment) -> Case:
         cases_by_name = {case.name: case for case in experiment.cases}
         if self.name is None and len(cases_by_name) == 1:
-            return replace(experiment.cases[0], outside=())
+            return replace(experiment.cases[0], user_filters=())
         if self.name is None:
             choices = ", ".join(repr(name) for name in list(cases_by_name)[:MAX_NAMED_CASES]) + (
                 ", …" if len(cases_by_name) > MAX_NAMED_CASES else ""
@@ -73,14 +73,14 @@ class Cases:
         if self.name not in cases_by_name:
             suggestion = did_you_mean(self.name, cases_by_name) or f"; there are: {', '.join(cases_by_name)}"
             raise ConfigError(f"no case {self.name!r} in {experiment.stem}{suggestion}")
-        return replace(cases_by_name[self.name], outside=())
+        return replace(cases_by_name[self.name], user_filters=())
 
-    def at(self, key: str, value: float) -> Case:
+    def case_with_value(self, key: str, value: float) -> Case:
         """The case with another value at a key. Raises ConfigError where the config refuses it."""
         setting = self._setting(key, value)
         key = setting.partition("=")[0]
         try:
-            return replace(self._select_case(load(self.config, (*self.overrides, setting))), noise_of=self.base.spec)
+            return replace(self._select_case(load(self.config, (*self.overrides, setting))), noise_keys=self.base.spec)
         except ConfigError as error:
             raise ConfigError(*(_drop_argument_name(line, key) for line in error.lines)) from error
 
@@ -128,8 +128,8 @@ class Question:
     key: str
     quantity: MeasuredQuantity
     equals: float
-    over: root_search.Range
-    now: float | None
+    search_range: root_search.Range
+    config_value: float | None
     unit: str
     overrides: tuple[str, ...]
     realisations: int | None = None
@@ -156,15 +156,15 @@ def key_range(
         low, high = between
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ConfigError(f"{argument('between')}: must be two rising numbers, got {low:g} {high:g}")
-        if key.whole:
+        if key.is_whole:
             low, high = float(math.ceil(low)), float(math.floor(high))
             if low > high:
                 ends_text = " ".join(f"{end:g}" for end in between)
                 raise ConfigError(
                     f"{argument('between')}: {name} takes whole numbers, and there is none from {ends_text}"
                 )
-        return root_search.search_range(low, high, key.whole)
-    if math.isfinite(key.low) and math.isfinite(key.high) and not key.whole:
+        return root_search.search_range(low, high, key.is_whole)
+    if math.isfinite(key.low) and math.isfinite(key.high) and not key.is_whole:
         return root_search.search_range(key.low, key.high)
     if not values:
         reason = "there is no value to search about" if key.value is None else f"is {key.value:g} in the config"
@@ -172,10 +172,10 @@ def key_range(
     if key.low >= 0:
         low, high = max(rounded(min(values) / factor), key.low), min(rounded(max(values) * factor), key.high)
         return root_search.search_range(
-            math.ceil(low) if key.whole else low, math.floor(high) if key.whole else high, key.whole
+            math.ceil(low) if key.is_whole else low, math.floor(high) if key.is_whole else high, key.is_whole
         )
     size = 10 * max(map(abs, values))
-    return root_search.search_range(max(-size, key.low), min(size, key.high), key.whole)
+    return root_search.search_range(max(-size, key.low), min(size, key.high), key.is_whole)
 
 
 def range_option() -> str:
@@ -188,7 +188,7 @@ class CaseFunction(Protocol):
 
     base: Case
 
-    def at(self, key: str, value: Any) -> Case: ...
+    def case_with_value(self, key: str, value: Any) -> Case: ...
 
 
 class Curve:
@@ -207,65 +207,69 @@ class Curve:
     ):
         self.cases, self.key, self.quantity = cases, key, quantity
         self.threads, self.progress, self.realisations = threads, progress, realisations
-        self.known: dict[tuple[Any, int], Estimate] = {}
-        self.refused: dict[Any, ConfigError] = {}
+        self.estimates: dict[tuple[Any, int], Estimate] = {}
+        self.refusals: dict[Any, ConfigError] = {}
         self.scans = set[int]()  # scans at which the quantity was read, for simulated values
         self.from_tables = False
-        self.rough = False  # whether cheaper approximate values exist, for a first search
-        self.done, self.expected = 0, 0  # realisations simulated, or values that need none; 0 expected: unknown
+        self.has_rough_values = False  # whether cheaper approximate values exist, for a first search
+        self.completed, self.expected = 0, 0  # realisations simulated, or values that need none; 0 expected: unknown
 
-    def exact(self, axes: Axes) -> bool:
+    def is_exact(self, axes: Axes) -> bool:
         """Whether the quantity is known exactly: from the plan, or from one realisation's tables."""
         case = self.cases.base
         if not math.isnan(quantities.exact_value(self.quantity, case, axes)):
             return True
-        if quantities.is_planned(self.quantity.of):
+        if quantities.is_planned(self.quantity.definition):
             return False
         result = self._result(case, 1)
         _, exact_value = quantities.sampled_value(self.quantity, result)
-        without_ends = self.quantity.of.ends[0] not in quantities.quantity_table(self.quantity.of, result)
+        without_ends = self.quantity.definition.ends[0] not in quantities.quantity_table(
+            self.quantity.definition, result
+        )
         self.from_tables = without_ends or not math.isnan(exact_value)
         return self.from_tables
 
-    def exactly(self, value: Any) -> float:
+    def exact_value(self, value: Any) -> float:
         """The exact quantity at a value (None: the config's own); NaN where there is none."""
         return self._cached(value, 0, self._exact_estimate).value
 
     def roughly(self, value: Any) -> float:
         """A cheaper value, to a thousandth of σ, if the study has one; else the exact quantity."""
-        if not self.rough:
-            return self.exactly(value)
+        if not self.has_rough_values:
+            return self.exact_value(value)
         return self._cached(value, ROUGH_VALUES, lambda case: self._exact_estimate(replace(case, roughly=True))).value
 
-    def simulated(self, value: Any, realisations: int) -> Estimate:
+    def simulate(self, value: Any, realisations: int) -> Estimate:
         """The quantity with its interval, from this number of realisations."""
         return self._cached(value, realisations, lambda case: self._sampled(case, realisations)[0])
 
-    def noted(self, value: Any) -> tuple[str, ...]:
+    def interval_notes(self, value: Any) -> tuple[str, ...]:
         """The note of the tables on the interval at a value, in words."""
-        note = quantities.interval_note(self.quantity, self._result(self.cases.at(self.key, value), self.realisations))
+        note = quantities.interval_note(
+            self.quantity, self._result(self.cases.case_with_value(self.key, value), self.realisations)
+        )
         option = argument("realisations=…", "-n")
         return (f"the interval may be too narrow: {note}; use more realisations, {option}",) if note else ()
 
     def _cached(self, value: Any, count: int, compute: Callable[[Case], Estimate]) -> Estimate:
         cache_key = (math.nan if value is None else value, count)
-        if cache_key in self.known:
-            return self.known[cache_key]
+        if cache_key in self.estimates:
+            return self.estimates[cache_key]
         if value is None:
             return compute(self.cases.base)
         try:
-            estimate = compute(self.cases.at(self.key, value))
+            estimate = compute(self.cases.case_with_value(self.key, value))
         except ConfigError as error:
-            self.refused[value] = error
+            self.refusals[value] = error
             estimate = UNKNOWN_ESTIMATE
-        self.known[cache_key] = estimate
+        self.estimates[cache_key] = estimate
         cost = max(count, 1)
-        self.done += cost
+        self.completed += cost
         if self.expected and self.progress is not None:
             self.expected = max(
-                self.expected, self.done + cost
+                self.expected, self.completed + cost
             )  # a search that needs a value more than expected may need further ones
-            self.progress(self.done, self.expected, 0)
+            self.progress(self.completed, self.expected, 0)
         return estimate
 
     def _exact_estimate(self, case: Case) -> Estimate:
@@ -281,7 +285,7 @@ class Curve:
         return quantities.sampled_value(self.quantity, result)
 
     def _result(self, case: Case, realisations: int) -> CaseResult:
-        case = replace(case, against=())  # a question is of gains against the first
+        case = replace(case, further_baselines=())  # a question is of gains against the first
         work = CaseWork(case)
         return case_result(case, work, collect(work, realisations, threads=self.threads))
 
@@ -290,13 +294,13 @@ def leave_one_out(case: Case, function: Callable[[CaseResult], V], count: int) -
     """Apply a function to the result of all realisations of a case, and to those without each of n batches.
 
     Returns the value of all, the n values without a batch, and the axes of the sums."""
-    work, batch_size = CaseWork(replace(case, against=())), max(2, count // BATCHES)
+    work, batch_size = CaseWork(replace(case, further_baselines=())), max(2, count // BATCHES)
     batches = [work.simulate(n * batch_size, batch_size) for n in range(BATCHES)]
     total = sum(batches[1:], start=batches[0])
 
     def value(packed: "np.ndarray", count: int) -> V:
         sums = work.plan.layout.unpack(packed)
-        return function(CaseResult(case.name, case.study, case.spec, case.swept, count, sums, work.plan.axes))
+        return function(CaseResult(case.name, case.study, case.spec, case.swept_values, count, sums, work.plan.axes))
 
     total_value = value(total, BATCHES * batch_size)
     return total_value, [value(total - batch, (BATCHES - 1) * batch_size) for batch in batches], work.plan.axes
@@ -310,7 +314,7 @@ def predict_duration(notify: Callable[[str], None], work: str, seconds: float) -
 
 def question_fields(question: Question) -> dict[str, str]:
     """The quantity and the key, as fields of a sentence."""
-    return {"quantity": question.quantity.said, "key": question.key}
+    return {"quantity": question.quantity.translated_words, "key": question.key}
 
 
 def make_answer(
@@ -336,7 +340,7 @@ def make_answer(
         quantity=question.quantity,
         quantity_unit=question.unit,
         equals=question.equals,
-        now=question.now,
+        now=question.config_value,
         attained_now=attained_now,
         value=value,
         lo=None if solution is None else solution.lo,
@@ -347,8 +351,8 @@ def make_answer(
         others=other_values,
         limit=limit,
         limit_at=limit_at,
-        low=question.over.low,
-        high=question.over.high,
+        low=question.search_range.low,
+        high=question.search_range.high,
         command=question.command(confirmed_value),
         notes=notes,
     )
@@ -356,8 +360,8 @@ def make_answer(
 
 def undefined_error(question: Question, curve: Curve) -> ConfigError:
     """The error that says why the quantity has no value on the range, with the reason of the config if it has one."""
-    if curve.refused:
-        x, error = min(curve.refused.items(), key=lambda refusal: refusal[0])
+    if curve.refusals:
+        x, error = min(curve.refusals.items(), key=lambda refusal: refusal[0])
         lines = (
             line if line.startswith(question.key) else f"with {question.key}={number(x)}: {line}"
             for line in error.lines
@@ -380,25 +384,25 @@ def check_effect(question: Question, points: Iterable[tuple[float, float]]) -> N
 
 def first_attaining(question: Question, x: float, quantity_at: Callable[[float], float]) -> float:
     """The first of the whole numbers around a change of sign at which the quantity attains the target."""
-    sign = 1 if question.quantity.of.more_is_better else -1
-    neighbours = [n for n in (x, x - 1, x + 1) if question.over.low <= n <= question.over.high]
+    sign = 1 if question.quantity.definition.more_is_better else -1
+    neighbours = [n for n in (x, x - 1, x + 1) if question.search_range.low <= n <= question.search_range.high]
     attaining = [n for n in neighbours if sign * (quantity_at(n) - question.equals) >= 0]
     return attaining[0] if attaining else x
 
 
 def nearest_value(values: Sequence[float], question: Question) -> float:
     """The value nearest to the config's own, on the scale of the search; the first where the config has none."""
-    if question.now is None or (question.over.logarithmic and question.now <= 0):
+    if question.config_value is None or (question.search_range.logarithmic and question.config_value <= 0):
         return values[0]
-    config_place = question.over.inner(question.now)
-    return min(values, key=lambda x: abs(question.over.inner(x) - config_place))
+    config_place = question.search_range.to_scale(question.config_value)
+    return min(values, key=lambda x: abs(question.search_range.to_scale(x) - config_place))
 
 
 def boundary_note(question: Question, curve: Curve, x: float) -> tuple[str, ...]:
     """Whether the nearest value lies at an end of the search range, or of the config's bounds, in words."""
-    if x in (question.over.low, question.over.high):
+    if x in (question.search_range.low, question.search_range.high):
         return (tr("the end of the searched range; {between} searches elsewhere", between=range_option()),)
-    refused_nearby = [value for value in curve.refused if abs(value - x) <= 0.05 * abs(x)]
+    refused_nearby = [value for value in curve.refusals if abs(value - x) <= 0.05 * abs(x)]
     return (term("the limit that the config allows"),) if refused_nearby else ()
 
 

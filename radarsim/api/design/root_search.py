@@ -26,28 +26,28 @@ class Range:
     low: float
     high: float
     logarithmic: bool
-    whole: bool = False
+    whole_numbers: bool = False
 
-    def inner(self, x: float) -> float:
+    def to_scale(self, x: float) -> float:
         """A value on the scale of the search."""
         return math.log(x) if self.logarithmic else x
 
-    def outer(self, u: float) -> float:
+    def from_scale(self, u: float) -> float:
         """The value at a place of the scale, within the range; rounded where only whole numbers are allowed."""
         x = math.exp(u) if self.logarithmic else u
-        return min(max(float(round(x)) if self.whole else x, self.low), self.high)
+        return min(max(float(round(x)) if self.whole_numbers else x, self.low), self.high)
 
     def grid(self, points: int | None = None) -> list[float]:
         """Places from end to end, even on the scale; whole numbers, all of them where they are few."""
-        if self.whole and self.high - self.low < MAX_POINTS:
+        if self.whole_numbers and self.high - self.low < MAX_POINTS:
             return [float(n) for n in range(math.ceil(self.low), math.floor(self.high) + 1)]
         if points is None:
-            decades = (self.inner(self.high) - self.inner(self.low)) / math.log(10) if self.logarithmic else 0
+            decades = (self.to_scale(self.high) - self.to_scale(self.low)) / math.log(10) if self.logarithmic else 0
             points = min(max(MIN_POINTS, math.ceil(POINTS_PER_DECADE * decades) + 1), MAX_POINTS)
-        first, step = self.inner(self.low), (self.inner(self.high) - self.inner(self.low)) / (points - 1)
-        values = [self.outer(first + i * step) for i in range(points)]
+        first, step = self.to_scale(self.low), (self.to_scale(self.high) - self.to_scale(self.low)) / (points - 1)
+        values = [self.from_scale(first + i * step) for i in range(points)]
         values[0], values[-1] = self.low, self.high
-        return sorted(set(values)) if self.whole else values
+        return sorted(set(values)) if self.whole_numbers else values
 
 
 def search_range(low: float, high: float, whole_numbers: bool = False) -> Range:
@@ -61,7 +61,7 @@ class Roots:
 
     roots: tuple[float, ...]
     nearest: float
-    at_nearest: float
+    nearest_value: float
 
 
 class UndefinedFunctionError(ValueError):
@@ -94,26 +94,29 @@ def refine_root(
 
     rising is the first slope. To ten digits, or to rounding; for a function that jumps where |function| <= near_enough.
     None where a step does not bring it nearer."""
-    u, y = search_range.inner(root), function(root)
+    u, y = search_range.to_scale(root), function(root)
     for _ in range(MAX_SECANTS):
         size = 1.0 if search_range.logarithmic else abs(u)
         if y == 0 or (rising and abs(y / rising) <= SECANT_TOLERANCE * size):
-            return search_range.outer(u)
-        v = search_range.inner(search_range.outer(u - y / rising)) if rising else u
-        z = function(search_range.outer(v)) if v != u else math.nan
+            return search_range.from_scale(u)
+        v = search_range.to_scale(search_range.from_scale(u - y / rising)) if rising else u
+        z = function(search_range.from_scale(v)) if v != u else math.nan
         if not abs(z) <= abs(y) / 2:
             break
         u, y, rising = v, z, (z - y) / (v - u)
-    return search_range.outer(u) if abs(y) <= near_enough else None
+    return search_range.from_scale(u) if abs(y) <= near_enough else None
 
 
 def find_root_near(function: Function, search_range: Range, root: float, near_enough: float) -> float | None:
     """The root of a function near that of an approximation: to 1e-9, or where |function| <= near_enough. None where the
     function keeps its sign within a tenth of the range."""
-    u, reach = search_range.inner(root), search_range.inner(search_range.high) - search_range.inner(search_range.low)
+    u, reach = (
+        search_range.to_scale(root),
+        search_range.to_scale(search_range.high) - search_range.to_scale(search_range.low),
+    )
 
     def evaluate(u: float) -> tuple[float, float]:
-        x = search_range.outer(u)
+        x = search_range.from_scale(u)
         return x, function(x)
 
     start = evaluate(u)
@@ -143,16 +146,16 @@ def close_bracket(
     Ends where near_enough(x, y), at a root, or where the bracket is closed to the relative width `width`, by default to
     rounding; where the function jumps over zero, at the jump. For whole numbers: the neighbour of the change of sign
     at which the function is nearer to zero."""
-    (a, fa), (b, fb) = (search_range.inner(start[0]), start[1]), (search_range.inner(end[0]), end[1])
+    (a, fa), (b, fb) = (search_range.to_scale(start[0]), start[1]), (search_range.to_scale(end[0]), end[1])
     c, fc, t = a, fa, 0.5
     for _ in range(200):
-        x = search_range.outer(a + t * (b - a))
-        u = search_range.inner(x)
-        between = abs(search_range.outer(b) - search_range.outer(a))
+        x = search_range.from_scale(a + t * (b - a))
+        u = search_range.to_scale(x)
+        between = abs(search_range.from_scale(b) - search_range.from_scale(a))
         if (
-            x in (search_range.outer(a), search_range.outer(b))
+            x in (search_range.from_scale(a), search_range.from_scale(b))
             or between <= width * abs(x)
-            or (search_range.whole and between <= 1)
+            or (search_range.whole_numbers and between <= 1)
         ):
             break
         f = function(x)
@@ -165,7 +168,7 @@ def close_bracket(
         a, fa = u, f
         t = _next_share(a, b, c, fa, fb, fc)
     u, _ = min(((a, fa), (b, fb)), key=lambda point: abs(point[1]))
-    return search_range.outer(u)
+    return search_range.from_scale(u)
 
 
 def _next_share(a: float, b: float, c: float, fa: float, fb: float, fc: float) -> float:
@@ -185,14 +188,16 @@ def _with_edges(
 ) -> list[tuple[float, float]]:
     """The places plus those where the function starts or stops being defined, to a thousandth of a step."""
     extended = list(places)
-    if search_range.whole:
+    if search_range.whole_numbers:
         return extended
     for point, next_point in pairwise(places):
         if math.isnan(point[1]) == math.isnan(next_point[1]):
             continue
         undefined_place, defined_place = (point, next_point) if math.isnan(point[1]) else (next_point, point)
         for _ in range(10):
-            x = search_range.outer((search_range.inner(undefined_place[0]) + search_range.inner(defined_place[0])) / 2)
+            x = search_range.from_scale(
+                (search_range.to_scale(undefined_place[0]) + search_range.to_scale(defined_place[0])) / 2
+            )
             middle = (x, function(x))
             undefined_place, defined_place = (
                 (middle, defined_place) if math.isnan(middle[1]) else (undefined_place, middle)
@@ -208,7 +213,7 @@ def _with_turns(
     where zero may be reached: beyond a turn, the parabola through the three places comes at most that much nearer; and,
     without any zero, the turn that comes nearest."""
     extended = list(places)
-    if search_range.whole:
+    if search_range.whole_numbers:
         return extended
     has_crossing = any(y * y_next <= 0 for (_, y), (_, y_next) in pairwise(places))
     for (a, ya), (b, yb), (c, yc) in zip(places, places[1:], places[2:], strict=False):
@@ -227,19 +232,19 @@ def _is_minimum(places: Sequence[tuple[float, float]], x: float) -> bool:
 
 def _find_turn(function: Function, search_range: Range, low: float, high: float, sign: float) -> tuple[float, float]:
     """The minimum of sign · function between two places; ends early where it crosses zero."""
-    a, b = search_range.inner(low), search_range.inner(high)
+    a, b = search_range.to_scale(low), search_range.to_scale(high)
     u, v = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-    fu, fv = sign * function(search_range.outer(u)), sign * function(search_range.outer(v))
+    fu, fv = sign * function(search_range.from_scale(u)), sign * function(search_range.from_scale(v))
     for _ in range(40):
         if min(fu, fv) <= 0 or b - a < 1e-8 * max(abs(a), abs(b), 1.0):
             break
         if fu < fv:
             b, v, fv = v, u, fu
             u = b - GOLDEN * (b - a)
-            fu = sign * function(search_range.outer(u))
+            fu = sign * function(search_range.from_scale(u))
         else:
             a, u, fu = u, v, fv
             v = a + GOLDEN * (b - a)
-            fv = sign * function(search_range.outer(v))
+            fv = sign * function(search_range.from_scale(v))
     place, minimum = (u, fu) if fu < fv else (v, fv)
-    return search_range.outer(place), sign * minimum
+    return search_range.from_scale(place), sign * minimum

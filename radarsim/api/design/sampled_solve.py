@@ -40,12 +40,12 @@ RESIDUE = 0.02  # share of its interval to which a sampled quantity is brought t
 
 def solve_by_sampling(question: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:
     """The answer where the quantity is simulated, with the same noise at every value."""
-    search_range, count = question.over, curve.realisations
+    search_range, count = question.search_range, curve.realisations
     grid, pilot = search_range.grid(PILOT_POINTS), min(count, max(MIN_PILOT_REALISATIONS, count // PILOT_SHARE))
     curve.expected = len(grid) * pilot + FULL_VALUES * count
-    curve.simulated(None, 1)  # compiles
+    curve.simulate(None, 1)  # compiles
     start_s = time.monotonic()
-    attained_now = curve.simulated(None, count).value
+    attained_now = curve.simulate(None, count).value
     counts = {"grid": len(grid), "pilot": pilot, "more": FULL_VALUES, "count": count}
     work = tr(
         "simulates {grid} values of {key} with {pilot} realisations, then about {more} with {count}",
@@ -53,7 +53,7 @@ def solve_by_sampling(question: Question, curve: Curve, notify: Callable[[str], 
         **counts,
     )
     predict_duration(notify, work, (FULL_VALUES + len(grid) * pilot / count) * (time.monotonic() - start_s))
-    scanned = [(x, curve.simulated(x, pilot).value - question.equals) for x in grid]
+    scanned = [(x, curve.simulate(x, pilot).value - question.equals) for x in grid]
     defined = [(x, y) for x, y in scanned if not math.isnan(y)]
     if not defined:
         raise undefined_error(question, curve)
@@ -62,20 +62,20 @@ def solve_by_sampling(question: Question, curve: Curve, notify: Callable[[str], 
     if scan_notes:
         notify("; ".join(scan_notes))
         count = curve.realisations = UNPAIRED_FACTOR * count
-        curve.expected = curve.done + FULL_VALUES * count
+        curve.expected = curve.completed + FULL_VALUES * count
     answer = partial(make_answer, question, attained_now, exact=False)
     best, _ = min(defined, key=lambda point: abs(point[1]))
     places = _sign_changes(scanned) or [grid.index(best)]
     brackets = [pair for pair in map(partial(_find_bracket, question, curve, grid), places) if pair is not None]
     if not brackets:  # the pilot may have been far off, as where its errors have heavy tails
-        full_scan = [(x, curve.simulated(x, count).value - question.equals) for x in grid]
+        full_scan = [(x, curve.simulate(x, count).value - question.equals) for x in grid]
         brackets = [(full_scan[i], full_scan[i + 1]) for i in _sign_changes(full_scan)]
         best = min(
             ((x, y) for x, y in full_scan if not math.isnan(y)), key=lambda point: abs(point[1]), default=(best, 0.0)
         )[0]
     solutions = [_close_interval(question, curve, *pair) for pair in dict.fromkeys(brackets)]
     if not solutions:
-        limit = curve.simulated(best, count)
+        limit = curve.simulate(best, count)
         is_near = limit.lo <= question.equals <= limit.hi
         doubt = tr(
             "its 95 % interval, {lo:.4g} to {hi:.4g} {unit}, holds the target: more realisations, {option}, decide",
@@ -87,14 +87,17 @@ def solve_by_sampling(question: Question, curve: Curve, notify: Callable[[str], 
         notes = (doubt,) if is_near else boundary_note(question, curve, best)
         return answer(limit=limit.value, limit_at=best, notes=notes + scan_notes)
     value = nearest_value([root.value for root in solutions], question)
-    solution, estimate = next(root for root in solutions if root.value == value), curve.simulated(value, count)
-    is_jump = not search_range.whole and not estimate.lo <= question.equals <= estimate.hi
+    solution, estimate = next(root for root in solutions if root.value == value), curve.simulate(value, count)
+    is_jump = not search_range.whole_numbers and not estimate.lo <= question.equals <= estimate.hi
     return answer(
         solution=solution,
         attained=estimate.value,
         slope=None if is_jump else _sampled_slope(curve, solution),
         other_values=tuple(root.value for root in solutions if not solution.lo <= root.value <= solution.hi),
-        notes=(JUMP_NOTE,) * is_jump + (WHOLE_NUMBER_NOTE,) * search_range.whole + scan_notes + curve.noted(value),
+        notes=(JUMP_NOTE,) * is_jump
+        + (WHOLE_NUMBER_NOTE,) * search_range.whole_numbers
+        + scan_notes
+        + curve.interval_notes(value),
     )
 
 
@@ -128,7 +131,7 @@ def _find_bracket(
     for j in sorted(range(i - MAX_STEPS, i + MAX_STEPS + 1), key=lambda j: abs(j - i)):
         if not 0 <= j < len(grid) - 1:
             continue
-        ends = [(x, curve.simulated(x, curve.realisations).value - question.equals) for x in grid[j : j + 2]]
+        ends = [(x, curve.simulate(x, curve.realisations).value - question.equals) for x in grid[j : j + 2]]
         if ends[0][1] * ends[1][1] <= 0:
             return ends[0], ends[1]
     return None
@@ -136,18 +139,18 @@ def _find_bracket(
 
 def _close_interval(question: Question, curve: Curve, start: tuple[float, float], end: tuple[float, float]) -> Estimate:
     """A value and its 95 % interval: all values at which the interval of the quantity holds the target."""
-    search_range, count, target = question.over, curve.realisations, question.equals
+    search_range, count, target = question.search_range, curve.realisations, question.equals
 
     def difference(field: str, x: float) -> float:
-        return float(getattr(curve.simulated(x, count), field)) - target
+        return float(getattr(curve.simulate(x, count), field)) - target
 
     def is_near_zero(field: str, x: float, y: float) -> bool:
-        estimate = curve.simulated(x, count)
-        return not search_range.whole and abs(y) <= RESIDUE * (estimate.hi - estimate.lo)
+        estimate = curve.simulate(x, count)
+        return not search_range.whole_numbers and abs(y) <= RESIDUE * (estimate.hi - estimate.lo)
 
     def close_at(field: str, start: tuple[float, float], end: tuple[float, float]) -> float:
         # If each value has other noise, the quantity jumps; the search would close such a jump down to rounding.
-        estimate = curve.simulated(start[0], count)
+        estimate = curve.simulate(start[0], count)
         share = RESIDUE * (estimate.hi - estimate.lo) / abs(start[1] - end[1]) if len(curve.scans) > 1 else 0.0
         width = share * abs(start[0] - end[0]) / max(abs(start[0]), abs(end[0]), 1e-300)
         return root_search.close_bracket(
@@ -160,8 +163,8 @@ def _close_interval(question: Question, curve: Curve, start: tuple[float, float]
         )
 
     value = close_at("value", start, end)
-    if search_range.whole:
-        value = first_attaining(question, value, lambda n: curve.simulated(n, count).value)
+    if search_range.whole_numbers:
+        value = first_attaining(question, value, lambda n: curve.simulate(n, count).value)
     rising = end[1] > start[1]
     ends = []
     for side, field in ((-1, "hi" if rising else "lo"), (1, "lo" if rising else "hi")):
@@ -187,11 +190,11 @@ def _opposite_sign(
     """A place on one side of a value where the function has the other sign, or the end of the range. The first step is
     a twentieth of the bracket's width on the scale of the search, each further one twice as long."""
     sign = function(value)
-    step = max(abs(search_range.inner(end[0]) - search_range.inner(start[0])) / 20, search_range.whole)
-    u = search_range.inner(value)
+    step = max(abs(search_range.to_scale(end[0]) - search_range.to_scale(start[0])) / 20, search_range.whole_numbers)
+    u = search_range.to_scale(value)
     while True:
         u += side * step
-        x = search_range.outer(u)
+        x = search_range.from_scale(u)
         y = function(x)
         if y * sign <= 0 or math.isnan(y) or x in (search_range.low, search_range.high):
             return x, y
@@ -200,5 +203,5 @@ def _opposite_sign(
 
 def _sampled_slope(curve: Curve, solution: Estimate) -> float | None:
     """The change of the quantity for one unit of the key, over the interval, with the same noise at both ends."""
-    low, high = (curve.simulated(x, curve.realisations).value for x in (solution.lo, solution.hi))
+    low, high = (curve.simulate(x, curve.realisations).value for x in (solution.lo, solution.hi))
     return None if solution.lo == solution.hi or math.isnan(high - low) else (high - low) / (solution.hi - solution.lo)

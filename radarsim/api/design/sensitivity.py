@@ -163,13 +163,13 @@ def sensitivity(
         at_s = float(axes.t_s[-1])
     quantity = MeasuredQuantity(definitions[0], at_s=at_s, at_k=at_k)
     sample = SensitivitySample(quantity, definitions, axes, components, count or cases.base.realisations)
-    base = sample.of(cases.base)
-    if not np.isfinite(base.whole[0]).any():
+    base = sample.case_values(cases.base)
+    if not np.isfinite(base.all_realisations[0]).any():
         raise ConfigError("there is no estimate there")
     keys = [
         key
         for key in numeric_keys.numeric_keys(cases.base.spec)
-        if key.value and not ("." not in key.path and key.whole)
+        if key.value and not ("." not in key.path and key.is_whole)
     ]
     rows, left_out, unpaired_keys = _change_keys(sample, cases, base, keys, progress)
     effect = {key.path: key_effect(rows, key.path, leading, definitions[0].changes[0]) for key in keys}
@@ -188,7 +188,9 @@ def sensitivity(
         rows=tuple(visible_rows),
         without_effect=tuple(keys_without_effect),
         without_estimate=tuple(
-            name for name, values in zip(axes.filters, base.whole[0], strict=True) if not np.isfinite(values).any()
+            name
+            for name, values in zip(axes.filters, base.all_realisations[0], strict=True)
+            if not np.isfinite(values).any()
         ),
         not_paired=tuple(unpaired_keys),
         left_out=left_out,
@@ -217,7 +219,7 @@ def _change_keys(
     for n, key in enumerate(keys):
         try:
             value, case = changed_case(cases, key)
-            base_values, changed_values = sample.pair(cases.base, base, case)
+            base_values, changed_values = sample.paired_values(cases.base, base, case)
             rows += sample.rows(cases.base, key, value, base_values, changed_values)
             unpaired_keys += [key.path] if base_values is not base else []
         except ConfigError as error:
@@ -259,12 +261,12 @@ def changed_case(cases: Cases, key: numeric_keys.NumericKey) -> tuple[float, Cas
     """A key's value changed by ten per cent, and the case with it: larger, or smaller if the config refuses that.
     Whole numbers change by at least one. Raises ConfigError, with the reason against the larger value, if both fail."""
     assert key.value is not None
-    step = max(1, round(CHANGE * key.value)) if key.whole else CHANGE * key.value
+    step = max(1, round(CHANGE * key.value)) if key.is_whole else CHANGE * key.value
     try:
-        return key.value + step, cases.at(key.path, key.value + step)
+        return key.value + step, cases.case_with_value(key.path, key.value + step)
     except ConfigError:
         with contextlib.suppress(ConfigError):
-            return key.value - step, cases.at(key.path, key.value - step)
+            return key.value - step, cases.case_with_value(key.path, key.value - step)
         raise
 
 
@@ -281,53 +283,55 @@ class QuantityArrays(NamedTuple):
     whole (Q, F, C): of all realisations; but_one (Q, n, F, C): without each of n batches, n = 1 where exact. NaN where
     there is no estimate. t_s (K,): times of the scans, s."""
 
-    whole: np.ndarray
-    but_one: np.ndarray
+    all_realisations: np.ndarray
+    without_batch: np.ndarray
     t_s: np.ndarray
 
     @property
     def exact(self) -> bool:
-        return self.but_one.shape[1] == 1
+        return self.without_batch.shape[1] == 1
 
 
 @dataclass(frozen=True)
 class SensitivitySample:
     """Values of a case for every filter and component at one time, exact or in batches of realisations."""
 
-    asked: MeasuredQuantity
-    kinds: tuple[Quantity, ...]
+    quantity: MeasuredQuantity
+    definitions: tuple[Quantity, ...]
     axes: Axes
-    parts: tuple[tuple[str, str], ...]
+    components: tuple[tuple[str, str], ...]
     realisations: int
 
     @property
     def cells(self) -> list[tuple[int, int]]:
         """Filters and components, by index."""
-        return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.parts))]
+        return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.components))]
 
-    def pair(self, case: Case, base: QuantityArrays, changed: Case) -> tuple[QuantityArrays, QuantityArrays]:
+    def paired_values(self, case: Case, base: QuantityArrays, changed: Case) -> tuple[QuantityArrays, QuantityArrays]:
         """Values of a case, `base` with the usual realisations, and of a changed one. Raises ConfigError.
 
         If both are sampled at a time and the scan times differ, both are computed with more realisations: the noise at
         that time then belongs to different scans, so the interval of the change is that of two independent runs."""
-        changed_values = self.of(changed)
-        if base.exact or self.asked.at_s is None or np.array_equal(base.t_s, changed_values.t_s):
+        changed_values = self.case_values(changed)
+        if base.exact or self.quantity.at_s is None or np.array_equal(base.t_s, changed_values.t_s):
             return base, changed_values
         longer = replace(self, realisations=UNPAIRED_FACTOR * self.realisations)
-        return longer.of(case), longer.of(changed)
+        return longer.case_values(case), longer.case_values(changed)
 
-    def of(self, case: Case) -> QuantityArrays:
+    def case_values(self, case: Case) -> QuantityArrays:
         """Values of a case. Raises ConfigError."""
-        axes = quantities.plan_labels(self.asked, case)
+        axes = quantities.plan_labels(self.quantity, case)
         exact_values, without_ends = (
             self._cell_values(lambda quantity: quantities.exact_value(quantity, case, axes)),
             False,
         )
-        if not quantities.is_planned(self.asked.of):
+        if not quantities.is_planned(self.quantity.definition):
             work = CaseWork(case)
             result = case_result(case, work, collect(work, 1))
             exact_values = self._result_values(result, exact_only=True)
-            without_ends = self.asked.of.ends[0] not in quantities.quantity_table(self.asked.of, result)
+            without_ends = self.quantity.definition.ends[0] not in quantities.quantity_table(
+                self.quantity.definition, result
+            )
         # With only some filters' values, the others would seem to change nothing.
         exact = without_ends or np.isfinite(exact_values[0]).any(axis=1).all()
         if not exact:
@@ -336,13 +340,13 @@ class SensitivitySample:
 
     def _cell_values(self, function: Callable[[MeasuredQuantity], float]) -> np.ndarray:
         """The values (Q, F, C) of a function of a quantity, a filter and a component."""
-        cell_names = [(self.axes.filters[f], self.parts[c][0] or None) for f, c in self.cells]
+        cell_names = [(self.axes.filters[f], self.components[c][0] or None) for f, c in self.cells]
         values = [
-            function(replace(self.asked, of=definition, filter=filter_name, component=component))
-            for definition in self.kinds
+            function(replace(self.quantity, definition=definition, filter=filter_name, component=component))
+            for definition in self.definitions
             for filter_name, component in cell_names
         ]
-        return np.array(values).reshape(len(self.kinds), len(self.axes.filters), len(self.parts))
+        return np.array(values).reshape(len(self.definitions), len(self.axes.filters), len(self.components))
 
     def _sampled(self, case: Case) -> QuantityArrays:
         total_values, batch_values, axes = leave_one_out(case, self._result_values, self.realisations)
@@ -354,11 +358,11 @@ class SensitivitySample:
             definition: quantities.series_by_filter(
                 definition, quantities.quantity_table(definition, result), exact_only
             )
-            for definition in self.kinds
+            for definition in self.definitions
         }
 
         def value(quantity: MeasuredQuantity) -> float:
-            series = series_by_quantity[quantity.of].get((str(quantity.filter), quantity.component or ""))
+            series = series_by_quantity[quantity.definition].get((str(quantity.filter), quantity.component or ""))
             return math.nan if series is None else float(quantities.estimate_at(quantity, series).value)
 
         return self._cell_values(value)
@@ -369,24 +373,24 @@ class SensitivitySample:
         """A row for each filter and component that has an estimate, with the changes from base to that of a value."""
         changes = [
             (
-                _change(definition, base.whole[q], changed.whole[q]),
-                _change(definition, base.but_one[q], changed.but_one[q]),
+                _change(definition, base.all_realisations[q], changed.all_realisations[q]),
+                _change(definition, base.without_batch[q], changed.without_batch[q]),
             )
-            for q, definition in enumerate(self.kinds)
+            for q, definition in enumerate(self.definitions)
         ]
         rows: list[dict[Hashable, Any]] = []
         for f, c in self.cells:
             if not np.isfinite(changes[0][0][f, c]):
                 continue
-            component, unit = self.parts[c]
+            component, unit = self.components[c]
             values = [case.name, self.axes.filters[f], component, unit, key.path, key.value, value]
-            for q, (definition, (change, batch_changes)) in enumerate(zip(self.kinds, changes, strict=True)):
+            for q, (definition, (change, batch_changes)) in enumerate(zip(self.definitions, changes, strict=True)):
                 ends = jackknife_interval(batch_changes[:, f, c], change[f, c])
                 values += [
-                    base.whole[q, f, c],
+                    base.all_realisations[q, f, c],
                     *(100 * math.expm1(end) if definition.kind == "size" else end for end in ends),
                 ]
-            rows.append(dict(zip(columns(self.kinds), [*values, base.exact], strict=True)))
+            rows.append(dict(zip(columns(self.definitions), [*values, base.exact], strict=True)))
         return rows
 
 

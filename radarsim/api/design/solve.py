@@ -107,7 +107,9 @@ def solve(
     ((name, component),) = requested.items()
     cases, count = Cases(config, texts, case), arguments.whole_number(realisations)
     matching_keys = numeric_keys.find_numeric_keys(cases.base.spec, key)
-    measured = quantities.check_quantity(QuantityName(name, filter, component, at_s, at_k), cases.base, cases.outside)
+    measured = quantities.check_quantity(
+        QuantityName(name, filter, component, at_s, at_k), cases.base, cases.user_filters
+    )
     axes = quantities.plan_labels(measured, cases.base)
     measured = quantities.resolve_scan(measured, axes)
     search_range = key_range(matching_keys, key, between)
@@ -116,60 +118,64 @@ def solve(
     question = Question(
         cases, key, measured, equals, search_range, config_value, quantities.unit(measured, axes), texts, count
     )
-    work = _solve_exactly if not sampled and curve.exact(axes) else solve_by_sampling
+    work = _solve_exactly if not sampled and curve.is_exact(axes) else solve_by_sampling
     return work(question, curve, notify or (lambda line: None))
 
 
 def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:
     """The answer if the quantity is known exactly."""
-    attained_now = curve.exactly(None)
-    grid = question.over.grid()
+    attained_now = curve.exact_value(None)
+    grid = question.search_range.grid()
     curve.expected = len(grid) + CLOSING_VALUES
     study = registry.study(question.cases.base.study)
     base = quantities.shorten_case(question.quantity, question.cases.base)
-    curve.rough = study.costly(base) and not question.over.whole
+    curve.has_rough_values = study.costly(base) and not question.search_range.whole_numbers
     probe_value = grid[len(grid) // 3]  # not the config's own value, which a study may have cached
     approximation = study.exact_but_for(base)
     rough_value_s = measure_seconds(partial(curve.roughly, probe_value))
     # One exact value more than the search needs, if a value may take seconds; if each pattern of plots is followed, a
     # value takes a twentieth of a second.
-    exact_value_s = measure_seconds(partial(curve.exactly, probe_value)) if approximation or not curve.rough else 0.0
+    exact_value_s = (
+        measure_seconds(partial(curve.exact_value, probe_value)) if approximation or not curve.has_rough_values else 0.0
+    )
     fields = question_fields(question)
     work = tr("computes the {quantity} at about {count} values of {key}", **fields, count=curve.expected)
     seconds = CLOSING_VALUES * exact_value_s + len(grid) * (
-        ROUGH_VALUES_PER_PLACE * rough_value_s if curve.rough else exact_value_s
+        ROUGH_VALUES_PER_PLACE * rough_value_s if curve.has_rough_values else exact_value_s
     )
     predict_duration(notify, work + (tr(", each {near}", near=tr(approximation)) if approximation else ""), seconds)
     try:
         search_result = roots(question, curve)
     except root_search.UndefinedFunctionError:
         raise undefined_error(question, curve) from None
-    realisations = ROUGH_VALUES if curve.rough else 0  # both kinds differ a little where the key has no effect
-    check_effect(question, [(x, estimate.value) for (x, n), estimate in curve.known.items() if n == realisations])
+    realisations = (
+        ROUGH_VALUES if curve.has_rough_values else 0
+    )  # both kinds differ a little where the key has no effect
+    check_effect(question, [(x, estimate.value) for (x, n), estimate in curve.estimates.items() if n == realisations])
     values = search_result.roots
-    if question.over.whole:
-        values = tuple(dict.fromkeys(first_attaining(question, x, curve.exactly) for x in values))
+    if question.search_range.whole_numbers:
+        values = tuple(dict.fromkeys(first_attaining(question, x, curve.exact_value) for x in values))
     answer = partial(make_answer, question, attained_now, exact=True)
     if not values:
-        limit = search_result.at_nearest + question.equals
+        limit = search_result.nearest_value + question.equals
         return answer(
             limit=limit, limit_at=search_result.nearest, notes=boundary_note(question, curve, search_result.nearest)
         )
     value = nearest_value(values, question)
     approximation = study.exact_but_for(
-        quantities.shorten_case(question.quantity, question.cases.at(question.key, value))
+        quantities.shorten_case(question.quantity, question.cases.case_with_value(question.key, value))
     )
-    attained = curve.exactly(value)
-    is_jump = not question.over.whole and abs(attained - question.equals) > JUMP * max(
+    attained = curve.exact_value(value)
+    is_jump = not question.search_range.whole_numbers and abs(attained - question.equals) > JUMP * max(
         abs(question.equals), abs(attained_now)
     )
     return answer(
         solution=Estimate(value, value, value),
         attained=attained,
-        slope=None if is_jump else slope(curve.exactly, value, question.over),
+        slope=None if is_jump else slope(curve.exact_value, value, question.search_range),
         other_values=tuple(x for x in values if x != value),
         notes=((JUMP_NOTE,) if is_jump else ())
-        + ((WHOLE_NUMBER_NOTE,) if question.over.whole and attained != question.equals else ())
+        + ((WHOLE_NUMBER_NOTE,) if question.search_range.whole_numbers and attained != question.equals else ())
         + ((tr("σ is {what}", what=tr(approximation)),) if approximation else ()),
     )
 
@@ -180,22 +186,25 @@ def roots(question: Question, curve: Curve) -> root_search.Roots:
     Raises root_search.UndefinedFunctionError if the quantity has no value on the range."""
 
     def difference(x: float) -> float:
-        return curve.exactly(x) - question.equals
+        return curve.exact_value(x) - question.equals
 
-    if not curve.rough:
-        return root_search.find_roots(difference, question.over)
+    if not curve.has_rough_values:
+        return root_search.find_roots(difference, question.search_range)
     size = max(abs(question.equals), TINY)
-    rough_roots = root_search.find_roots(lambda x: curve.roughly(x) - question.equals, question.over, ROUGH_WIDTH)
+    rough_roots = root_search.find_roots(
+        lambda x: curve.roughly(x) - question.equals, question.search_range, ROUGH_WIDTH
+    )
     refined = [
-        refine_rough_root(difference, curve, question.over, x, TARGET_TOLERANCE * size) for x in rough_roots.roots
+        refine_rough_root(difference, curve, question.search_range, x, TARGET_TOLERANCE * size)
+        for x in rough_roots.roots
     ]
     exact_roots = [x for x in refined if x is not None]
-    if len(exact_roots) < len(refined) or (not refined and abs(rough_roots.at_nearest) < DOUBTFUL_DISTANCE * size):
-        return root_search.find_roots(difference, question.over)
+    if len(exact_roots) < len(refined) or (not refined and abs(rough_roots.nearest_value) < DOUBTFUL_DISTANCE * size):
+        return root_search.find_roots(difference, question.search_range)
     return root_search.Roots(
         tuple(exact_roots),
         rough_roots.nearest,
-        rough_roots.at_nearest if exact_roots else difference(rough_roots.nearest),
+        rough_roots.nearest_value if exact_roots else difference(rough_roots.nearest),
     )
 
 
@@ -203,10 +212,10 @@ def refine_rough_root(
     difference: Callable[[float], float], curve: Curve, search_range: root_search.Range, x: float, near_enough: float
 ) -> float | None:
     """The root near a rough one: by secants, the first from the rough quantity; if they fail, bracketed."""
-    u = search_range.inner(x)
-    ends = search_range.outer(u - STEP), search_range.outer(u + STEP)
+    u = search_range.to_scale(x)
+    ends = search_range.from_scale(u - STEP), search_range.from_scale(u + STEP)
     low, high = (curve.roughly(end) for end in ends)
-    rising = (high - low) / (search_range.inner(ends[1]) - search_range.inner(ends[0]))
+    rising = (high - low) / (search_range.to_scale(ends[1]) - search_range.to_scale(ends[0]))
     root = root_search.refine_root(difference, search_range, x, rising, near_enough)
     return root_search.find_root_near(difference, search_range, x, near_enough) if root is None else root
 
@@ -216,7 +225,7 @@ def slope(function: Callable[[float], float], value: float, search_range: root_s
     Error of the order of 1e-8 of itself; of whole numbers the change to the next."""
     step = DERIVATIVE_STEP * (abs(value) or 1.0)
     low, high = max(value - step, search_range.low), min(value + step, search_range.high)
-    if search_range.whole:
+    if search_range.whole_numbers:
         low, high = value, min(value + 1, search_range.high)
     if math.isnan(function(low)):
         low = value

@@ -63,7 +63,7 @@ class Answer(Displayable):
         if abs(attained - self.equals) < NEAR_ZERO * max(abs(self.equals), abs(self.attained_now)):
             attained = self.equals  # of a root at zero rounding is all that is left
         lines = [("", f"{self.key} = {with_unit(value, self.unit)}   {interval}")]
-        lines.append(("attains", f"{self.quantity.said}: {self._quantity(attained)}{self._now}"))
+        lines.append(("attains", f"{self.quantity.translated_words}: {self._quantity(attained)}{self._now}"))
         if self.slope is not None:
             lines.append(("slope", self._slope(value, self.slope)))
         if self.others:
@@ -77,7 +77,7 @@ class Answer(Displayable):
         if self.value is not None or limit is None or limit_key_value is None:
             return ()
         fields = {
-            **{"quantity": self.quantity.said, "key": self.key, "wanted": self._quantity(self.equals)},
+            **{"quantity": self.quantity.translated_words, "key": self.key, "wanted": self._quantity(self.equals)},
             **{"low": format_number(self.low), "high": with_unit(self.high, self.unit)},
             **{"limit": self._quantity(limit), "at": with_unit(limit_key_value, self.unit)},
         }
@@ -91,7 +91,7 @@ class Answer(Displayable):
         """The effect of a small increase of the key: `1 m/s more costs 1.7 points`."""
         step = 10.0 ** math.floor(math.log10(abs(value) / 2)) if value else 1.0
         step = max(step, 1.0) if float(value).is_integer() and step >= 0.5 else step
-        change, more_is_better = per_unit * step, self.quantity.of.more_is_better
+        change, more_is_better = per_unit * step, self.quantity.definition.more_is_better
         is_improvement = (change > 0) == more_is_better
         size = format_number(abs(change), "#.3g")
         points = tr("{size} points", size=size)
@@ -119,7 +119,7 @@ class Answer(Displayable):
         return tr(" (at {at}: {value})", at=with_unit(self.now, self.unit), value=value)
 
     def _quantity(self, value: float) -> str:
-        number = _rate(value) if self.quantity.of.kind == "share" else format_number(value, ".4g")
+        number = _rate(value) if self.quantity.definition.kind == "share" else format_number(value, ".4g")
         return f"{number} {tr(self.quantity_unit)}".rstrip()
 
 

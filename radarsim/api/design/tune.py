@@ -78,37 +78,41 @@ class Variants:
     """A case with one filter, and the baseline of its gains, with other values of the keys; like `Cases`."""
 
     def __init__(self, case: Case, filter_name: str, searched: Sequence[SearchedKey], paired: bool):
-        self.case, self.chosen, self.searched, self.seed = case, filter_name, searched, case.seed
-        self.plain = {member.name: all_keys(member) for member in case.spec.members}
+        self.case, self.filter_name, self.searched, self.seed = case, filter_name, searched, case.seed
+        self.keys_by_filter = {member.name: all_keys(member) for member in case.spec.members}
         config_baseline = getattr(case.spec, "baseline", None)
-        self.baseline = (config_baseline or next(iter(self.plain))) if paired else None
-        self.kept = {filter_name, self.baseline}
+        self.baseline = (config_baseline or next(iter(self.keys_by_filter))) if paired else None
+        self.kept_names = {filter_name, self.baseline}
         try:
-            self.base = self.of(self.plain[filter_name])
+            self.base = self.case_with_filter(self.keys_by_filter[filter_name])
         except ConfigError:  # other keys name the filters that are left out
-            self.kept, self.baseline = set(self.plain), config_baseline
-            self.base = self.of(self.plain[filter_name])
+            self.kept_names, self.baseline = set(self.keys_by_filter), config_baseline
+            self.base = self.case_with_filter(self.keys_by_filter[filter_name])
 
-    def of(self, filter_keys: Mapping[str, Any], *tuned: Mapping[str, Any]) -> Case:
+    def case_with_filter(self, filter_keys: Mapping[str, Any], *tuned: Mapping[str, Any]) -> Case:
         """The case with these keys of the filter, and with a tuned filter if it is given. Raises ConfigError."""
         members = [
-            filter_keys if name == self.chosen else keys for name, keys in self.plain.items() if name in self.kept
+            filter_keys if name == self.filter_name else keys
+            for name, keys in self.keys_by_filter.items()
+            if name in self.kept_names
         ]
         case = case_with_filters(self.case, [*members, *tuned], self.baseline)
-        return replace(case, seed=self.seed, noise_of=self.case.noise_of or self.case.spec)
+        return replace(case, seed=self.seed, noise_keys=self.case.noise_keys or self.case.spec)
 
-    def at(self, key: str, place: Place) -> Case:
+    def case_with_value(self, key: str, place: Place) -> Case:
         """The case with other values. Raises ConfigError where the config refuses them."""
-        return self.of(self.filter(place))
+        return self.case_with_filter(self.filter(place))
 
-    def beside(self, place: Place) -> Case:
+    def stated_and_tuned_case(self, place: Place) -> Case:
         """The case with the filter as stated and as tuned, with the config's own seed."""
-        case = self.of(self.plain[self.chosen], self.filter(place) | {"name": self.chosen + TUNED})
+        case = self.case_with_filter(
+            self.keys_by_filter[self.filter_name], self.filter(place) | {"name": self.filter_name + TUNED}
+        )
         return replace(case, seed=self.case.seed)
 
     def filter(self, place: Place) -> dict[str, Any]:
         """The filter's keys with other values."""
-        filter_keys = deepcopy(self.plain[self.chosen])
+        filter_keys = deepcopy(self.keys_by_filter[self.filter_name])
         for path, value in from_scale(self.searched, place, filter_keys).items():
             set_at_path(filter_keys, path, value)
         return filter_keys
@@ -128,34 +132,34 @@ class Objective:
 
     def __init__(self, variants: Sequence[Variants], curves: Sequence[Curve], exact: bool, count: int):
         self.variants, self.curves, self.exact, self.count = variants, curves, exact, count
-        self.searched, self.plain = variants[0].searched, variants[0].plain[variants[0].chosen]
-        self.of = curves[0].quantity.of
-        self.rough = exact and any(curve.rough for curve in curves)
+        self.searched, self.filter_keys = variants[0].searched, variants[0].keys_by_filter[variants[0].filter_name]
+        self.definition = curves[0].quantity.definition
+        self.rough = exact and any(curve.has_rough_values for curve in curves)
 
     @property
-    def pilot(self) -> int:
+    def pilot_realisations(self) -> int:
         """Realisations of a value of a scan."""
         return min(self.count, max(MIN_PILOT_REALISATIONS, self.count // PILOT_SHARE))
 
     def combined(self, values: Sequence[Any]) -> Any:
         """The quantity of the family, from the values of its cases, numbers or arrays."""
-        is_size = self.of.kind == "size"
+        is_size = self.definition.kind == "size"
         mean = sum(value**2 if is_size else value for value in values) / len(values)
         return mean**0.5 if is_size else mean
 
     def cost(self, values: Sequence[Any]) -> Any:
         """What is minimised, from the values of the cases."""
         combined = self.combined(values)
-        return 100.0 - combined if self.of.more_is_better else combined
+        return 100.0 - combined if self.definition.more_is_better else combined
 
     def __call__(self, place: Place, count: int | None = None) -> float:
         """The cost at a place, with all training realisations or fewer; infinite if there is no estimate."""
         if self.rough:
             values = [curve.roughly(place) for curve in self.curves]
         elif self.exact:
-            values = [curve.exactly(place) for curve in self.curves]
+            values = [curve.exact_value(place) for curve in self.curves]
         else:
-            values = [curve.simulated(place, count or self.count).value for curve in self.curves]
+            values = [curve.simulate(place, count or self.count).value for curve in self.curves]
         cost = float(self.cost(values))
         return math.inf if math.isnan(cost) else cost
 
@@ -168,16 +172,17 @@ def find_minimum(objective: Objective) -> Place:
     from scipy.optimize import minimize
 
     searched, start = objective.searched, tuple(key.stated for key in objective.searched)
-    real_indices = [i for i, key in enumerate(searched) if not key.over.whole]
-    pilot = None if objective.exact else objective.pilot
-    grids = [key.over.grid() if key.over.whole else [key.stated] for key in searched]
+    real_indices = [i for i, key in enumerate(searched) if not key.search_range.whole_numbers]
+    pilot = None if objective.exact else objective.pilot_realisations
+    grids = [key.search_range.grid() if key.search_range.whole_numbers else [key.stated] for key in searched]
     if math.prod(map(len, grids)) > MAX_WHOLE_COMBINATIONS:
         raise ConfigError(f"{argument('free', '--free')}: too many whole numbers to try: give KEY=LOW:HIGH")
 
     def scan_real_keys(best: Place) -> Place:
         for i in real_indices:
             candidates = [
-                (*best[:i], x, *best[i + 1 :]) for x in searched[i].over.grid(None if objective.exact else PILOT_POINTS)
+                (*best[:i], x, *best[i + 1 :])
+                for x in searched[i].search_range.grid(None if objective.exact else PILOT_POINTS)
             ]
             best = min((best, *candidates), key=lambda place: objective(place, pilot))
         return best
@@ -185,7 +190,7 @@ def find_minimum(objective: Objective) -> Place:
     possible = [place for place in itertools.product(*grids) if math.isfinite(objective(place, pilot))]
     best = min(map(scan_real_keys, possible), key=lambda place: objective(place, pilot), default=start)
     for step in SIMPLEX_STEPS if real_indices else ():
-        scale_place = np.array([searched[i].over.inner(best[i]) for i in real_indices])
+        scale_place = np.array([searched[i].search_range.to_scale(best[i]) for i in real_indices])
         options: Any = {
             "initial_simplex": np.vstack([scale_place, scale_place + step * np.eye(len(scale_place))]),
             "xatol": SCALE_TOLERANCE[objective.exact],
@@ -204,29 +209,30 @@ def move_keys(searched: Sequence[SearchedKey], best: Place, scale_place: np.ndar
     """A place with its real numbers moved to these positions (n,) on the scales of the search."""
     coordinates = iter(scale_place)
     return tuple(
-        x if key.over.whole else key.over.outer(float(next(coordinates))) for key, x in zip(searched, best, strict=True)
+        x if key.search_range.whole_numbers else key.search_range.from_scale(float(next(coordinates)))
+        for key, x in zip(searched, best, strict=True)
     )
 
 
 def flat_interval(objective: Objective, best: Place, i: int) -> tuple[float, float]:
     """The range of a key over which the exact quantity is within 0.1 % of its minimum."""
-    search_range, limit = objective.searched[i].over, (1 + FLAT_CHANGE) * objective(best)
+    search_range, limit = objective.searched[i].search_range, (1 + FLAT_CHANGE) * objective(best)
     ends = []
     for end in (search_range.low, search_range.high):
-        inside, outside = search_range.inner(best[i]), search_range.inner(end)
+        inside, outside = search_range.to_scale(best[i]), search_range.to_scale(end)
         if objective((*best[:i], end, *best[i + 1 :])) > limit:
             for _ in range(24):
                 middle = (inside + outside) / 2
-                is_flat = objective((*best[:i], search_range.outer(middle), *best[i + 1 :])) <= limit
+                is_flat = objective((*best[:i], search_range.from_scale(middle), *best[i + 1 :])) <= limit
                 inside, outside = (middle, outside) if is_flat else (inside, middle)
             outside = inside
-        ends.append(search_range.outer(outside))
+        ends.append(search_range.from_scale(outside))
     return ends[0], ends[1]
 
 
 def has_no_effect(objective: Objective, best: Place, i: int) -> bool:
     """Whether a key changes nothing over the whole searched range."""
-    search_range = objective.searched[i].over
+    search_range = objective.searched[i].search_range
     ends = (objective((*best[:i], x, *best[i + 1 :])) for x in (search_range.low, search_range.high))
     return all(math.isclose(value, objective(best), rel_tol=NO_CHANGE) for value in ends)
 
@@ -237,14 +243,20 @@ def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[floa
     Each move is a Newton step from the best place with the gradient of the remaining batches. Empty where the quantity
     has no minimum on this scale, for instance where it is flat or jumps, or at an end of the range."""
     searched = [
-        replace(key, over=replace(key.over, whole=True)) if is_at_end(key, x) else key
+        replace(key, search_range=replace(key.search_range, whole_numbers=True)) if is_at_end(key, x) else key
         for key, x in zip(objective.searched, best, strict=True)
     ]
-    scale_place = np.array([key.over.inner(x) for key, x in zip(searched, best, strict=True) if not key.over.whole])
+    scale_place = np.array(
+        [
+            key.search_range.to_scale(x)
+            for key, x in zip(searched, best, strict=True)
+            if not key.search_range.whole_numbers
+        ]
+    )
 
     def costs(u: np.ndarray) -> np.ndarray:
         """With all realisations, then without each of the batches."""
-        cases = [variant.at("", move_keys(searched, best, u)) for variant in objective.variants]
+        cases = [variant.case_with_value("", move_keys(searched, best, u)) for variant in objective.variants]
         pairs = zip(cases, objective.curves, strict=True)
         return np.asarray(
             objective.cost([cost_by_quantity(case, (curve.quantity,), objective.count)[:, 0] for case, curve in pairs])
@@ -272,25 +284,25 @@ def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[floa
     if not np.isfinite(curvature).all() or np.linalg.eigvalsh(curvature)[0] <= 0:
         return {}
     newton = scale_place[:, None] - np.linalg.solve(curvature, slopes - slopes[:, :1])
-    values = [from_scale(searched, move_keys(searched, best, u), objective.plain) for u in newton.T]
+    values = [from_scale(searched, move_keys(searched, best, u), objective.filter_keys) for u in newton.T]
     intervals = {}
     for path in values[0]:
-        matching_keys = [key for key in searched if key.path == path and key.of is None]
-        if matching_keys and matching_keys[0].over.whole:
+        matching_keys = [key for key in searched if key.path == path and key.largest_path is None]
+        if matching_keys and matching_keys[0].search_range.whole_numbers:
             continue
         search_range = (
-            matching_keys[0].over
+            matching_keys[0].search_range
             if matching_keys
             else ProbabilityRange(MIN_PROBABILITY**2, 1 - MIN_PROBABILITY**2, False)
         )
         inner = np.array(
             [
-                search_range.inner(min(max(place_values[path], search_range.low), search_range.high))
+                search_range.to_scale(min(max(place_values[path], search_range.low), search_range.high))
                 for place_values in values
             ]
         )
         _, lo, hi = jackknife_interval(inner[1:], float(inner[0]))
-        intervals[path] = search_range.outer(lo), search_range.outer(hi)
+        intervals[path] = search_range.from_scale(lo), search_range.from_scale(hi)
     return intervals
 
 
@@ -307,14 +319,15 @@ def cost_by_quantity(case: Case, measured: Sequence[MeasuredQuantity], count: in
 def _predict(notify: Callable[[str], None], objective: Objective, place_s: float) -> None:
     """Tell the user what the search will do and how long it takes, if that is long; place_s: seconds of one place."""
     grids = [
-        len(key.over.grid(None if objective.exact or key.over.whole else PILOT_POINTS)) for key in objective.searched
+        len(key.search_range.grid(None if objective.exact or key.search_range.whole_numbers else PILOT_POINTS))
+        for key in objective.searched
     ]
-    is_whole = [key.over.whole for key in objective.searched]
+    is_whole = [key.search_range.whole_numbers for key in objective.searched]
     scans = math.prod(itertools.compress(grids, is_whole)) * max(
         1, sum(grids) - sum(itertools.compress(grids, is_whole))
     )
     full_places = EXPECTED_VALUES_PER_KEY[objective.exact] * is_whole.count(False)
-    pilot, count = (1, 1) if objective.exact else (objective.pilot, objective.count)
+    pilot, count = (1, 1) if objective.exact else (objective.pilot_realisations, objective.count)
     for curve in objective.curves:
         curve.expected = scans * pilot + full_places * count
     keys = plural("{count} key", "{count} keys", len(grids))
@@ -324,12 +337,12 @@ def _predict(notify: Callable[[str], None], objective: Objective, place_s: float
 
 def tuning_gains(objective: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[TunedQuantity]:
     """The gain of each case, and the last of all; pairs (1 + n, 2) of each case: stated and tuned."""
-    gained, sign = [], -1 if objective.of.more_is_better else 1
+    gained, sign = [], -1 if objective.definition.more_is_better else 1
     pairs_with_total = [*pairs, np.stack([objective.combined([pair[:, i] for pair in pairs]) for i in (0, 1)], axis=1)]
     for name, pair in zip((*names, ""), pairs_with_total, strict=True):
         stated, tuned = pair.T
         with np.errstate(divide="ignore", invalid="ignore"):
-            gains = sign * (stated - tuned) * (100 / stated if objective.of.kind == "size" else 1)
+            gains = sign * (stated - tuned) * (100 / stated if objective.definition.kind == "size" else 1)
         ends: Sequence[float] = (
             jackknife_interval(gains[1:], float(gains[0])) if len(gains) > 1 else [float(gains[0])] * 3
         )
@@ -351,9 +364,9 @@ def family_cases(
             raise ConfigError(f"{argument('over', '--over')}: {key} is given by {override_origin(key)} too")
         with rename_arguments_in_errors({str(override_origin(key)): argument("over", "--over")}):
             experiment = load(config, [*settings, *([member_setting] if member_setting else [])])
-        user_filters += [user_filter.name for case in experiment.cases for user_filter in case.outside]
+        user_filters += [user_filter.name for case in experiment.cases for user_filter in case.user_filters]
         cases += [
-            replace(case, name=f"{case.name} {member_setting}".strip(), against=(), outside=())
+            replace(case, name=f"{case.name} {member_setting}".strip(), further_baselines=(), user_filters=())
             for case in experiment.cases
         ]
     for name in case_names:
@@ -415,18 +428,20 @@ def tune(
     assert filter_name is not None  # resolved
     searched, count = _common_keys(cases, filter_name, ranges), arguments.whole_number(realisations)
     count = question.BATCHES * max(2, (count or cases[0].realisations) // question.BATCHES)
-    variants = [Variants(family_case, filter_name, searched, quantity.of.paired) for family_case in cases]
+    variants = [Variants(family_case, filter_name, searched, quantity.definition.paired) for family_case in cases]
     curves = []
     for variant in variants:
         quantity = quantities.check_quantity(parse_target(wanted, filter), variant.base)
         curves.append(Curve(variant, "", replace(quantity, filter=filter_name), threads, progress, count))
     with rename_arguments_in_errors(option_names):
-        has_exact_values = [curve.exact(quantities.plan_labels(curve.quantity, curve.cases.base)) for curve in curves]
+        has_exact_values = [
+            curve.is_exact(quantities.plan_labels(curve.quantity, curve.cases.base)) for curve in curves
+        ]
     exact = all(has_exact_values) and not sampled
     for variant, curve in zip(variants, curves, strict=True):
         variant.seed = variant.seed if exact else (variant.seed + TRAINING_SEED_OFFSET) % 2**64
         curve.cases.base = variant.base = replace(variant.base, seed=variant.seed)
-        curve.rough = exact and registry.study(curve.cases.base.study).costly(curve.cases.base)
+        curve.has_rough_values = exact and registry.study(curve.cases.base.study).costly(curve.cases.base)
     objective = Objective(variants, curves, exact, count)
     _predict(notify or (lambda line: None), objective, _seconds_of_start(objective))
     best = find_minimum(objective)
@@ -463,9 +478,13 @@ def _judge_exactly(objective: Objective, best: Place) -> tuple[list[np.ndarray],
     """The exact quantity of each case with the stated and the tuned keys (1, 2); and the range of each key that is as
     good."""
     objective.rough = False
-    pairs = [np.array([[curve.exactly(None), curve.exactly(best)]]) for curve in objective.curves]
-    objective.rough = any(curve.rough for curve in objective.curves)
-    ranges = {key.path: flat_interval(objective, best, i) for i, key in enumerate(objective.searched) if key.of is None}
+    pairs = [np.array([[curve.exact_value(None), curve.exact_value(best)]]) for curve in objective.curves]
+    objective.rough = any(curve.has_rough_values for curve in objective.curves)
+    ranges = {
+        key.path: flat_interval(objective, best, i)
+        for i, key in enumerate(objective.searched)
+        if key.largest_path is None
+    }
     return pairs, ranges
 
 
@@ -474,9 +493,9 @@ def _judge_by_sampling(objective: Objective, best: Place) -> tuple[list[np.ndarr
     (1 + n, 2); and the 95 % interval of each key."""
     pairs = []
     for variant, curve in zip(objective.variants, objective.curves, strict=True):
-        names = variant.chosen, variant.chosen + TUNED
+        names = variant.filter_name, variant.filter_name + TUNED
         quantity_pair = [replace(curve.quantity, filter=name) for name in names]
-        pairs.append(cost_by_quantity(variant.beside(best), quantity_pair, objective.count))
+        pairs.append(cost_by_quantity(variant.stated_and_tuned_case(best), quantity_pair, objective.count))
     return pairs, spread_of_tuning(objective, best)
 
 
@@ -490,7 +509,7 @@ def _tuning_result(
     settings: Sequence[str],
 ) -> TuningResult:
     """The result: tuned keys, gains and notes, with the command of the run that shows the gain."""
-    case, quantity, stated_keys = cases[0], objective.curves[0].quantity, objective.plain
+    case, quantity, stated_keys = cases[0], objective.curves[0].quantity, objective.filter_keys
     filter_name = str(quantity.filter)
     (i,) = [i for i, member in enumerate(case.spec.members) if member.name == filter_name]
     prefix, tuned_keys = f"{type(case.spec).bare_keys}.{i}.", deepcopy(dict(stated_keys))
@@ -512,7 +531,7 @@ def _tuning_result(
     inert = tuple(
         prefix + _dotted(searched_key.path)
         for i, searched_key in enumerate(objective.searched)
-        if searched_key.of is None and has_no_effect(objective, best, i)
+        if searched_key.largest_path is None and has_no_effect(objective, best, i)
     )
     return TuningResult(
         stem=case.stem,
@@ -565,9 +584,9 @@ def _tuning_notes(
         for key, x in keys_and_values
         if is_at_end(key, x)
     ]
-    quantity_words = objective.curves[0].quantity.said
+    quantity_words = objective.curves[0].quantity.translated_words
     notes += [tr("{key} has no effect on {quantity}", key=key, quantity=quantity_words) for key in inert]
-    fixed_paths = {key.path for key, x in keys_and_values if key.over.whole or is_at_end(key, x)}
+    fixed_paths = {key.path for key, x in keys_and_values if key.search_range.whole_numbers or is_at_end(key, x)}
     if not objective.exact and any(path not in ranges and path not in fixed_paths for path in tuned_paths):
         notes.append(tr("no intervals of the values: the quantity is flat there, or too noisy to tell its curvature"))
     return notes

@@ -87,12 +87,12 @@ class TuningResult(Displayable):
     @property
     def gain_unit(self) -> str:
         """What gains are counted in."""
-        return "%" if self.quantity.of.kind == "size" else tr("points") if self.unit == "%" else tr(self.unit)
+        return "%" if self.quantity.definition.kind == "size" else tr("points") if self.unit == "%" else tr(self.unit)
 
     @property
     def answer(self) -> str:
         """What tuning gains, in a sentence."""
-        total, quantity_field = self.all, {"quantity": self.quantity.said}
+        total, quantity_field = self.all, {"quantity": self.quantity.translated_words}
         if self.exact:
             if len(self.inert) == len(self.keys):
                 return plural(
@@ -134,10 +134,10 @@ class TuningResult(Displayable):
 
 def objective_words(objective: "Objective", cases: int) -> str:
     """What the search makes least, or largest, in words."""
-    quantity_words = objective.curves[0].quantity.said
+    quantity_words = objective.curves[0].quantity.translated_words
     if cases == 1:
         return quantity_words
     fields = {"quantity": quantity_words, "cases": str(cases)}
-    if objective.of.kind == "size":
+    if objective.definition.kind == "size":
         return tr("{quantity}, root mean square of {cases} cases", **fields)
     return tr("{quantity}, mean of {cases} cases", **fields)

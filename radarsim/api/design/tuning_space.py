@@ -35,10 +35,10 @@ Path = tuple[str | int, ...]
 class ProbabilityRange(Range):
     """A probability, searched by its logit."""
 
-    def inner(self, x: float) -> float:
+    def to_scale(self, x: float) -> float:
         return math.log(x / (1 - x))
 
-    def outer(self, u: float) -> float:
+    def from_scale(self, u: float) -> float:
         return min(max(1 / (1 + math.exp(-u)), self.low), self.high)
 
 
@@ -50,19 +50,19 @@ class SearchedKey:
 
     path: Path
     stated: float
-    over: Range
-    of: Path | None = None
+    search_range: Range
+    largest_path: Path | None = None
 
 
 def from_scale(searched: Sequence[SearchedKey], place: Place, filter_keys: Mapping[str, Any]) -> dict[Path, float]:
     """The values of keys at a place of the search, with all of a column of probabilities; filter_keys: as stated."""
-    values = {key.path: x for key, x in zip(searched, place, strict=True) if key.of is None}
-    for largest_path in dict.fromkeys(key.of for key in searched if key.of is not None):
+    values = {key.path: x for key, x in zip(searched, place, strict=True) if key.largest_path is None}
+    for largest_path in dict.fromkeys(key.largest_path for key in searched if key.largest_path is not None):
         largest, ratios = value_at_path(filter_keys, largest_path), dict[Path, float]()
         for i, row in enumerate(filter_keys[str(largest_path[0])]):
             share = value_at_path(row, largest_path[2:])
             ratios |= {(largest_path[0], i, *largest_path[2:]): share / largest} if share > 0 else {}
-        ratios |= {key.path: x for key, x in zip(searched, place, strict=True) if key.of == largest_path}
+        ratios |= {key.path: x for key, x in zip(searched, place, strict=True) if key.largest_path == largest_path}
         values |= {path: ratio / sum(ratios.values()) for path, ratio in ratios.items()}
     return {path: solve_answer.rounded(value) for path, value in values.items()}
 
@@ -131,7 +131,7 @@ def searched_keys(
             raise ConfigError(f"{option}: no key {name!r} of filter {filter_name!r} holds a number{suggestion}")
         ranges |= dict.fromkeys(paths, between)
     if not requested_ranges:
-        ranges = {path: None for path, key in keys_by_path.items() if key.value and not key.whole}
+        ranges = {path: None for path, key in keys_by_path.items() if key.value and not key.is_whole}
     searched, filter_keys = [], all_keys(spec.members[i])
     for path, between in ranges.items():
         searched_key = _searched_key(spec.members[i], filter_keys, path, keys_by_path[path], between)
@@ -171,7 +171,7 @@ def _searched_key(
     range_example = argument('free={"KEY": (LOW, HIGH)}', f"{option} KEY=LOW:HIGH")
     with rename_arguments_in_errors({question.range_option(): range_example, argument("between"): option}):
         search_range = question.key_range([key], key.path, between, FACTOR)
-    if not key.whole and (key.low, key.high) == (0, 1) and between is None:
+    if not key.is_whole and (key.low, key.high) == (0, 1) and between is None:
         smallest = min(MIN_PROBABILITY, *(x / 10 for x in (key.value, 1 - key.value) if x > 0))
         search_range = ProbabilityRange(smallest, 1 - smallest, False)
     return SearchedKey(path, min(max(key.value, search_range.low), search_range.high), search_range)
@@ -179,7 +179,9 @@ def _searched_key(
 
 def is_at_end(key: SearchedKey, x: float) -> bool:
     """Whether a value is at an end of the searched range."""
-    low, high, position = (key.over.inner(value) for value in (key.over.low, key.over.high, x))
+    low, high, position = (
+        key.search_range.to_scale(value) for value in (key.search_range.low, key.search_range.high, x)
+    )
     return min(position - low, high - position) < NEAR_END * min(1.0, high - low)
 
 

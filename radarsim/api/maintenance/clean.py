@@ -50,8 +50,8 @@ def clean(
     not_judged: list[str] = []
     if cases is None and other_sources:
         recorded = stored_cases(Path(out))
-        cases = [case for _, case in recorded if not case.outside]
-        not_judged = [name for name, case in recorded if case.outside]
+        cases = [case for _, case in recorded if not case.user_filters]
+        not_judged = [name for name, case in recorded if case.user_filters]
     requests = None if cases is None else {request_digest(case)[:REQUEST_DIGITS] for case in cases}
     keep = {identity(case) for case in cases or ()} if other_sources else set()
     try:

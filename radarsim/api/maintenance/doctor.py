@@ -87,7 +87,7 @@ def inspect_result(folder: str | os.PathLike[str], recompute: int = 0) -> Inspec
     for name, stored_identity in record["identities"].items():
         store = blocks / stored_identity
         case = stored_case(record, name)
-        runs_code = case is not None and any(user_filter.written for user_filter in case.outside)
+        runs_code = case is not None and any(user_filter.written for user_filter in case.user_filters)
         if recompute and runs_code:
             _refuse_foreign_record(inspection.folder / "run.json")
         inspection.notes += _notes_on_sources(store, name, case if recompute or not runs_code else None)

@@ -130,7 +130,7 @@ def _check_total(audit: Audit, total: Total) -> None:
             _report_missing(audit, node := widest_node(first, stop, 62))
             first = node.stop
     cut = Partial(full, partial)
-    if partial and cut not in audit.pieces and not any(node in audit.pieces for node in cut.above(64)):
+    if partial and cut not in audit.pieces and not any(node in audit.pieces for node in cut.containing_nodes(64)):
         _report_missing(audit, cut)
     if forest.gaps(full) or (partial and cut not in audit.pieces):
         return  # nothing to add up: a larger run has merged them

@@ -18,11 +18,11 @@ class Inventory:
     run reported, as from shares or a killed run; shares then says which shares of how many are missing, as far as the
     ends show."""
 
-    asked: int
+    requested: int
     stored: int
     missing: tuple[tuple[int, int], ...]
     shares: tuple[tuple[int, ...], int] | None
-    loose: bool
+    has_loose_blocks: bool
 
 
 def take_inventory(
@@ -34,7 +34,7 @@ def take_inventory(
     first, stop, partial = share_of(realisations, block, part)
     requested, full = (stop - first) * block + partial, realisations // block
     if Total(realisations) in pieces:
-        return Inventory(requested, requested, (), None, loose=False)
+        return Inventory(requested, requested, (), None, has_loose_blocks=False)
     nodes = maximal_nodes([piece for piece in pieces if isinstance(piece, Node)], full)
     runs, blocks = gaps(nodes, stop, first), full + (realisations % block > 0)
     if partial and Partial(full, partial) not in pieces:

@@ -165,7 +165,7 @@ class Store:
             for name in os.listdir(self.path):
                 piece, path = piece_named(name), self.path / name
                 with suppress(FileNotFoundError):
-                    merged = piece is not None and any(node in durable for node in piece.above(highest))
+                    merged = piece is not None and any(node in durable for node in piece.containing_nodes(highest))
                     if merged or (name.endswith(".tmp") and now - path.stat().st_mtime > STALE_S):
                         path.unlink()
         except FileNotFoundError:  # removed by `radarsim clean`: nothing is left to tidy

@@ -64,7 +64,7 @@ class StoreWriter:
             self._raise_error()
             # `radarsim clean` may have removed what this run wrote before.
             stored = self.store.pieces()
-            if all(piece in stored or any(node in stored for node in piece.above(64)) for piece in pieces):
+            if all(piece in stored or any(node in stored for node in piece.containing_nodes(64)) for piece in pieces):
                 return
             self._durable.clear()
 

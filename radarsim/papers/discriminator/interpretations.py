@@ -50,14 +50,14 @@ class Interpretations(PaperInterpretations):
 
     def for_claim(self, claim: str) -> list[Interpretation]:
         """All combinations of E and U for exact claims; for claims that need runs, of the choices that bear on them."""
-        choices = [choice for choice in self.choices if choice.bears_on(claim)]
+        choices = [choice for choice in self.choices if choice.affects(claim)]
         singly = [
             self.interpretation(**{choice.key: alternative.name})
             for choice in choices
             for alternative in choice.alternatives
             if alternative.kind == AGAINST
         ]
-        return list(dict.fromkeys([*self.combined(choices), *singly]))
+        return list(dict.fromkeys([*self.combinations(choices), *singly]))
 
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
         """Of parts that stand there in both shipped interpretations, those of one: the interpretation takes its
@@ -72,7 +72,7 @@ class Interpretations(PaperInterpretations):
         for."""
         keys = {key for part in claim.parts for key in part.cases if isinstance(key, tuple)}
         noise = case.spec.burst.noise_variance
-        is_needed = any(_is_swept(case, *key) for key in keys) if case.swept else noise == SHIPPED_NOISE
+        is_needed = any(_is_swept(case, *key) for key in keys) if case.swept_values else noise == SHIPPED_NOISE
         if not is_needed:
             return None
         burst_version = version(interpretation)
@@ -103,7 +103,11 @@ class Interpretations(PaperInterpretations):
 
 def _is_swept(case: Case, key: str, value: float) -> bool:
     """Whether a case varies this key alone, and takes this value."""
-    return len(case.swept) == 1 and case.swept[0][0] == key and math.isclose(float(str(case.swept[0][1])), value)
+    return (
+        len(case.swept_values) == 1
+        and case.swept_values[0][0] == key
+        and math.isclose(float(str(case.swept_values[0][1])), value)
+    )
 
 
 def _changed(estimator: Any, burst_version: Version) -> Any:

@@ -37,7 +37,7 @@ class Evidence(GeneralEvidence):
     def case(self, key: Any) -> CaseResult:
         """key: an interpretation, or (swept key, value) of the maps."""
         for result in self.results:
-            swept = [(name, float(str(value))) for name, value in result.swept]
+            swept = [(name, float(str(value))) for name, value in result.swept_values]
             if isinstance(key, tuple):
                 if len(swept) == 1 and swept[0][0] == key[0] and math.isclose(swept[0][1], key[1]):
                     return result

@@ -67,7 +67,7 @@ class Interpretations(PaperInterpretations):
     def versions(self) -> list[Version]:
         """Every version of the filters that a declared interpretation asks for, with the D_M of the shipped sweep."""
         versions: dict[Version, None] = {}
-        for interpretation in self.declared():
+        for interpretation in self.declared_interpretations():
             form, start = cast(Form, interpretation["process_noise"]), cast(Start, interpretation["start"])
             for variance in (float(interpretation["manoeuvre_variance"]), *SWEPT_VARIANCES):
                 versions[form, variance, start] = None

@@ -72,7 +72,7 @@ class Fit:
     keys: tuple[FittedKey, ...]
     outliers: float | None
     gain: float
-    beside: "FurtherExplanation | None" = None
+    further_explanation: "FurtherExplanation | None" = None
     plain: "Fit | None" = None
     doubles: int = 0  # further plots of a track in a scan, left out
 
@@ -119,7 +119,7 @@ def file_likelihoods(
     interface = recording_interface(case)
     filter_names = [member.name for member in case.spec.members]
     if filter_name is not None and filter_name not in filter_names:
-        user_filters = [user_filter.name for user_filter in case.outside]
+        user_filters = [user_filter.name for user_filter in case.user_filters]
         why = ": it is written in Python, and radarsim does not know its keys" if filter_name in user_filters else ""
         raise ConfigError(f"filter: must be one of {', '.join(filter_names)}; got {filter_name}{why}")
     tracks, doubles = _read_tracks(source, interface.columns(case.spec), interface.from_any_origin)
@@ -206,7 +206,7 @@ def fit_likelihood(
     plain = result = fit_keys(likelihood, (), stages.report, rough)
     if allowed:
         result = fit_keys(likelihood, allowed, stages.next(), rough)
-    while allowing is None and (explanation := result.beside) and _is_plain_error(explanation):
+    while allowing is None and (explanation := result.further_explanation) and _is_plain_error(explanation):
         allowed = (*allowed, explanation.name)
         try:
             result = fit_keys(likelihood, allowed, stages.next(), rough)

@@ -79,7 +79,7 @@ def register_radar(radar: str, positions_file: str) -> Registration:
     adjustment = fit_biases(MatchedPlots(t[is_used], r[is_used], b[is_used], path_numbers, paths.states))
     counts_by_kind = Counter(KINDS[k] for k in matching.match.kind_numbers[is_used].tolist())
     return Registration(
-        adjusted=adjustment,
+        adjustment=adjustment,
         aircraft=_aircraft_residuals(adjustment, path_numbers, matching.names),
         plots=len(t),
         matched=int(is_used.sum()),

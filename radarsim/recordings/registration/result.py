@@ -55,7 +55,7 @@ class Registration:
     in range and bearing before the fit; the plots left out; the distance of 95 % of interpolated positions from
     straight lines."""
 
-    adjusted: Adjustment
+    adjustment: Adjustment
     aircraft: tuple[AircraftResiduals, ...]
     plots: int
     matched: int
@@ -67,16 +67,16 @@ class Registration:
 
 def registration_document(registration: Registration) -> dict[str, Any]:
     """The result as one document of plain data."""
-    r, b = registration.adjusted.sigma
+    r, b = registration.adjustment.sigma
     return {
-        "biases": [{**asdict(bias), "identifiable": bias.identifiable} for bias in registration.adjusted.biases],
+        "biases": [{**asdict(bias), "identifiable": bias.identifiable} for bias in registration.adjustment.biases],
         "sigma_range_m": r,
         "sigma_bearing_rad": b,
         "plots": registration.plots,
         "matched": registration.matched,
         "by": registration.by,
-        "outliers": registration.adjusted.outliers,
-        "clusters": registration.adjusted.clusters,
+        "outliers": registration.adjustment.outliers,
+        "clusters": registration.adjustment.clusters,
         "interpolation_m": registration.bent_m,
         "left_out": registration.left,
         "aircraft": [asdict(aircraft) for aircraft in registration.aircraft],

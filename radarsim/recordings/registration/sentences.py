@@ -14,7 +14,7 @@ OUTLIER_LAG_SIGMAS = 5.0  # standard deviations from the other aircraft, from wh
 
 def registration_lines(registration: Registration) -> list[str]:
     """Sentences on the biases, and the options that correct them."""
-    adjustment, sentences, options, has_nonzero_bias = registration.adjusted, [], [], False
+    adjustment, sentences, options, has_nonzero_bias = registration.adjustment, [], [], False
     for bias in adjustment.biases:
         key, factor = ("bearing_deg", math.degrees(1)) if bias.key == "bearing_rad" else (bias.key, 1.0)
         if not bias.identifiable:

@@ -37,12 +37,12 @@ class Pair(NamedTuple):
     """A side, and the one it is compared with."""
 
     side: Side
-    against: Side
+    reference: Side
 
     @property
     def common_noise(self) -> bool:
         """Whether both use the same measurements: study, seed, target and sensor, and as many realisations."""
-        return self.side.noise is not None and self.side.noise == self.against.noise
+        return self.side.noise is not None and self.side.noise == self.reference.noise
 
 
 def pairs(runs: Sequence[Sequence[Side]]) -> tuple[list[Pair], list[str]]:

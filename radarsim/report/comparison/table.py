@@ -63,7 +63,7 @@ def _part(pair: Pair, quantity: Quantity) -> dict[str, Any] | None:
     a, b = (None if table is None or not len(table) else comparison_rows(table, quantity) for table in stored)
     if a is None or b is None:
         return None
-    filters, other_filters = filters_of(pair.side), filters_of(pair.against)
+    filters, other_filters = filters_of(pair.side), filters_of(pair.reference)
     # Two single filters are partners whatever their names.
     are_single = len(filters) == len(other_filters) == 1 and filters != other_filters
     b = b.assign(against_filter=b["filter"])
@@ -133,7 +133,7 @@ def _columns(pair: Pair, quantity: Quantity, rows: "pd.DataFrame") -> dict[str, 
 
 
 def _names(pair: Pair, before: str) -> Mapping[str, str]:
-    side = pair.against if before else pair.side
+    side = pair.reference if before else pair.side
     return {f"{before}run": side.run, f"{before}case": side.case, f"{before}label": side.label}
 
 
@@ -153,9 +153,9 @@ def correlation(pair: Pair, quantity: Quantity, rows: "pd.DataFrame") -> tuple[n
     a, b = (_estimate(rows, end) for end in ("", "_b"))
     is_same = np.all([x == y for x, y in zip(a, b, strict=True)], axis=0)
     rho = np.full(n, -1.0)
-    if quantity == SIGMA and pair.side.count == pair.against.count:
+    if quantity == SIGMA and pair.side.count == pair.reference.count:
         rho_side = _with_baseline(pair.side, rows, "filter")
-        rho_against = _with_baseline(pair.against, rows, "against_filter")
+        rho_against = _with_baseline(pair.reference, rows, "against_filter")
         linked = _same_baseline(pair, rows)
         with np.errstate(invalid="ignore"):
             worst = rho_side * rho_against - np.sqrt(np.maximum((1 - rho_side**2) * (1 - rho_against**2), 0))

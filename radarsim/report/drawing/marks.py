@@ -93,7 +93,7 @@ REFERENCE_SHARE = 0.2  # of an axis of x: the words of a reference line nearer t
 def _draw_reference(axes: Axes, mark: Reference, x: AxisSpec) -> None:
     options: dict[str, Any] = {"color": "#555555", "linewidth": 0.7, "linestyle": (0, (2, 2)), "zorder": 1.5}
     text: dict[str, Any] = {"s": f" {mark.label} ", "ha": "right", "va": "bottom", "color": "#555555"}
-    if mark.across == "y":
+    if mark.axis_name == "y":
         axes.axhline(mark.value, **options)
         axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **text)
     else:

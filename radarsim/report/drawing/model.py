@@ -63,7 +63,7 @@ class Reference:
     """A thin line across the panel at a value of x or y ("across" says which), with a label."""
 
     value: float
-    across: str = "y"
+    axis_name: str = "y"
     label: str = ""
 
 

@@ -28,7 +28,7 @@ ANY = term("the posterior Cramér-Rao bound")
 
 def question(experiment: Experiment) -> str:
     """What an experiment with user filters asks; empty where it has none."""
-    filters = list(dict.fromkeys(member.name for case in experiment.cases for member in case.outside))
+    filters = list(dict.fromkeys(member.name for case in experiment.cases for member in case.user_filters))
     if len(filters) > 1:
         return tr("Are {names} better than the filters of the config?", names=shorten_names(filters))
     return tr("Is {name} better than the filters of the config?", name=filters[0]) if filters else ""
@@ -106,7 +106,7 @@ def _failing_clause(failures: "pd.DataFrame", name: str) -> list[Sentence]:
 def _compare(result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_name: TablesByName) -> _Comparison:
     """The rows of the component and scan that the answer is about: those asked for, else the first and the last."""
     components = [component for component in result.axes.components if component[0] in set(gains["component"])]
-    requested, t_s = user_filter_cases(result)[0].axes.judged_at or (components[0][0], np.inf)
+    requested, t_s = user_filter_cases(result)[0].axes.answer_at or (components[0][0], np.inf)
     component, unit = next((c for c in components if c[0] == requested), components[0])
     gains = gains[gains["component"] == component]
     distance_s = (gains["t_s"] - min(t_s, gains["t_s"].max())).abs()

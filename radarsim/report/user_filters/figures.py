@@ -24,10 +24,10 @@ def figures(
     """σ, gain and NEES over time with the user filters: in place of the study's figures of these names.
 
     σ and gain at least of the first component. shown_components: the components as the study calls them."""
-    if not any(result.outside for result in results):
+    if not any(result.user_filters for result in results):
         return {}
     combined = [
-        case for case, result in zip(with_user_filters_in_cases(results), results, strict=True) if result.outside
+        case for case, result in zip(with_user_filters_in_cases(results), results, strict=True) if result.user_filters
     ]
     by_name = {component.name: component for component in (*RADIAL, *shown_components)}
     components = [
@@ -48,7 +48,7 @@ def figures(
 
 def with_user_filters_in_cases(results: Sequence[CaseResult]) -> list[CaseResult]:
     """The cases with user filters among their own, as figures that are drawn from tables alone need it."""
-    return [_with_user_filters(result) if result.outside else result for result in results]
+    return [_with_user_filters(result) if result.user_filters else result for result in results]
 
 
 def _with_user_filters(result: CaseResult) -> CaseResult:

@@ -1,4 +1,4 @@
-"""Tables with the rows of user filters beside those of a config: `CaseResult.outside`.
+"""Tables with the rows of user filters beside those of a config: `CaseResult.user_filters`.
 
 The study's own tables stay as they are; rows of user filters stand below. Their gains are relative to every filter of
 the config, each over the realisations in which both have an estimate."""
@@ -31,7 +31,7 @@ REASONS = {  # in the order of the sums
 
 def user_filter_cases(result: CaseResult) -> list[CaseResult]:
     """The user filters of a result as a case; none where it has none."""
-    return [] if result.outside is None else [result.outside]
+    return [] if result.user_filters is None else [result.user_filters]
 
 
 def baseline_names(result: CaseResult) -> tuple[str, ...]:
@@ -130,7 +130,7 @@ def with_user_filters(
     """The tables with the rows of user filters below their own; measured_rows: as of `measured`."""
     if not measured_rows:
         return dict(tables_by_name)
-    with_user_filters = [result for result in results if result.outside is not None]
+    with_user_filters = [result for result in results if result.user_filters is not None]
     user_cases = [case for result in results for case in user_filter_cases(result)]
     count = len(measured_rows["curves"])
     rows = {"curves": append(tables_by_name["curves"], measured_rows["curves"]), "gains": measured_rows["gains"]}
@@ -162,7 +162,7 @@ def _without_needless_notes(gains: "pd.DataFrame", with_user_filters: Sequence[C
 
 def measured_rows(results: Sequence[CaseResult]) -> TablesByName:
     """The curves and gains of user filters; nothing where there are none."""
-    with_user_filters = [result for result in results if result.outside is not None]
+    with_user_filters = [result for result in results if result.user_filters is not None]
     if not with_user_filters:
         return {}
     user_cases = [case for result in with_user_filters for case in user_filter_cases(result)]
@@ -182,7 +182,7 @@ def table_with_user_filters(name: str, table: "Callable[[Sequence[CaseResult]], 
     """A table of the study, made from results, with the rows of user filters: curves or gains."""
 
     def make_table(results: Sequence[CaseResult]) -> "pd.DataFrame":
-        with_user_filters = [result for result in results if result.outside is not None]
+        with_user_filters = [result for result in results if result.user_filters is not None]
         study_rows = table(results)
         if name == "curves":
             return append(

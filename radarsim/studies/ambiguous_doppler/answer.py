@@ -305,7 +305,7 @@ def _remedy_sentence(results: Sequence[Result], tables_by_name: TablesByName) ->
                 continue
             helping = [
                 tr("{settings} ({share} % lost)", settings=settings, share=numeral(f"{100 * share:.2g}"))
-                for settings, share in cures(result.spec, name, dict(result.swept))
+                for settings, share in cures(result.spec, name, dict(result.swept_values))
             ]
             if not helping:
                 return []

@@ -305,7 +305,7 @@ class Keys(radial_keys.TimedStudyKeys):
         return self.model_copy(update=updates | {"target": self.target.model_copy(update=sigmas)})
 
     @classmethod
-    def carried(cls, study: str, data: Mapping[str, Any]) -> dict[str, Any] | None:
+    def convert_keys(cls, study: str, data: Mapping[str, Any]) -> dict[str, Any] | None:
         """A config of range_doppler as one of this study.
 
         Filters with velocity take it folded, and a filter is added that is the first of them with known folds. All

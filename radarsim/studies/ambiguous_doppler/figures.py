@@ -32,7 +32,7 @@ def figures(
         labels = column, tr(title), tr(caption) + left_out
         if visible and (figure := share_figure(name, visible, tables_by_name["folds"], labels)):
             figures_by_name[name] = figure
-    figures_by_name |= hypotheses_figure(experiment.shown_in("hypotheses"))
+    figures_by_name |= hypotheses_figure(experiment.cases_in_figure("hypotheses"))
     visible, left_out = case_selection.select_cases(results, case_selection.cases_for_figure(experiment, "orders"))
     figures_by_name |= orders_figure(visible, tables_by_name["orders"], left_out)
     figures_by_name = {name: figure for name, figure in figures_by_name.items() if figure}
@@ -81,7 +81,9 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
     notes: list[str] = []
     rows = tables.group_by(table, "case", "filter")
     for (_, keys), members in sweep_figures.group_swept_cases(results).items():
-        x, axis = sweep_figures.axis_positions(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
+        x, axis = sweep_figures.axis_positions(
+            members[0], keys[0], [dict(result.swept_values)[keys[0]] for result in members]
+        )
         order = np.argsort(x)
         marks: list[Line] = []
         for f in members[0].axes.filters:

@@ -43,6 +43,6 @@ def floor(spec: Any, axes: Axes) -> Floor | None:
 
     ranges, both = bound(1), bound(2)
     floors_by_doppler = {"none": ranges, "unfolded": both}
-    folded = both._replace(reached=False)
+    folded = both._replace(is_attained=False)
     kind = floors_bound.POSTERIOR if is_random else floors_bound.CRB
     return Floor(kind, tuple(floors_by_doppler.get(options.doppler, folded) for options in spec.filters), folded)

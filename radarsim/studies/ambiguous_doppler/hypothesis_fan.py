@@ -33,7 +33,7 @@ def fan(case: Case, filter_index: int, scans: int) -> Fan:
     """The lists of a filter over the first scans, in realisation 7 of the case."""
     single_filter = {"filters": (case.spec.filters[filter_index],), "baseline": None, "rare": None}
     single_spec: Any = case.spec.model_copy(update=single_filter)
-    plan = prepare(Case(case.name, case.stem, case.study, single_spec, case.swept, case.realisations, case.seed))
+    plan = prepare(Case(case.name, case.stem, case.study, single_spec, case.swept_values, case.realisations, case.seed))
     lists = []
     for k in range(1, scans + 1):
         world = plan.world._replace(

@@ -33,13 +33,13 @@ FEW_FOLDS = RowNote(
 )
 
 
-@table.whole("curves")
+@table.add_of_all_cases("curves")
 def _curves(results: Sequence[Result]) -> "pd.DataFrame":
     """As in other studies; marked where few folds may decide."""
     return _with_notes(report_tables.curves(results), _few_folds(results))
 
 
-@table.whole("gains")
+@table.add_of_all_cases("gains")
 def _gains(results: Sequence[Result]) -> "pd.DataFrame":
     """As in other studies; and relative to the oracle, the filter whose velocity is unfolded by the truth.
 
@@ -216,7 +216,7 @@ def _orders(result: Result) -> report_tables.Columns:
     }
 
 
-@table.whole("rare")
+@table.add_of_all_cases("rare")
 def _rare(results: Sequence[Result]) -> "pd.DataFrame | None":
     """Wrong folds of every filter of one order that unfolds, at the last scan.
 
@@ -227,7 +227,7 @@ def _rare(results: Sequence[Result]) -> "pd.DataFrame | None":
     )
 
 
-tables = table.made
+tables = table.make
 
 
 INPUTS = ("radar", "σ_r, m", "σ_V, m/s", "Δt, s", "λ, m", "F, Hz", "D, m/s", "D/σ_V", "P_D", "scans")

@@ -33,7 +33,7 @@ def question(experiment: Experiment) -> str:
 def answer(results: Sequence[CaseResult], tables_by_name: TablesByName) -> list[Sentence]:
     """Sentences with numbers: by case where nothing is swept, else the range of lock of each estimator."""
     seeks_losses = any(result.spec.rare is not None for result in results)
-    reported = list(results) if seeks_losses else [result for result in results if not result.swept]
+    reported = list(results) if seeks_losses else [result for result in results if not result.swept_values]
     if not reported and len(results) > 1:
         return [_range_of_locks(results, tables_by_name, name) for name in results[0].axes.filters]
     reported = reported or list(results)

@@ -39,7 +39,7 @@ def figures(results: Sequence[CaseResult], tables_by_name: Mapping, experiment: 
         case_names = case_selection.cases_for_figure(experiment, name)
         return [result for result in candidates if result.name in case_names]
 
-    unswept = [result for result in results if not result.swept]
+    unswept = [result for result in results if not result.swept_values]
     cases = {case.name: case for case in experiment.cases}
 
     def errors(result: CaseResult, tables_by_name: Mapping) -> Figure:
@@ -71,8 +71,8 @@ def swept_families(results: Sequence[CaseResult]) -> dict[tuple[str, ...], list[
     """Swept cases by the keys they differ in."""
     families: dict[tuple[str, ...], list[CaseResult]] = {}
     for result in results:
-        if result.swept:
-            families.setdefault(tuple(key for key, _ in result.swept), []).append(result)
+        if result.swept_values:
+            families.setdefault(tuple(key for key, _ in result.swept_values), []).append(result)
     return families
 
 
@@ -178,7 +178,7 @@ def accuracy(result: CaseResult, tables_by_name: Mapping) -> Figure:
 def lock_against(name: str, key: str, members: Sequence[CaseResult], tables_by_name: Mapping) -> Figure:
     """Lock at the end of the burst against one swept key, a line for each estimator."""
     designed = key.rpartition(".")[2] == "lock_probability"
-    x = np.array([float(member.swept[0][1]) for member in members])
+    x = np.array([float(member.swept_values[0][1]) for member in members])
     if designed:
         x = np.array([float(f"{1 - probability:.9g}") for probability in x])
     order = np.argsort(x)
@@ -214,12 +214,12 @@ def _swept_axis(key: str, result: CaseResult) -> str:
 
 def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], tables_by_name: Mapping) -> Figure:
     """Lock at the end over two swept keys, a map for each estimator."""
-    x, y = (np.array(sorted({float(member.swept[i][1]) for member in members})) for i in (0, 1))
+    x, y = (np.array(sorted({float(member.swept_values[i][1]) for member in members})) for i in (0, 1))
     panels = []
     for estimator in members[0].axes.filters:
         values = np.full((len(y), len(x)), np.nan)
         for member in members:
-            column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
+            column, row = (np.searchsorted(a, float(member.swept_values[i][1])) for i, a in ((0, x), (1, y)))
             values[row, column] = last_locks(tables_by_name, member, estimator)["lock_rate"]
         marks = (Heat(x, y, values, tr("share locked")),)
         x_axis, y_axis = (Axis(_swept_axis(key, members[0])) for key in keys)
@@ -248,7 +248,7 @@ def lock_border_panel(
     for n, estimator in enumerate(members[0].axes.filters):
         sure = np.zeros((len(y), len(x)), dtype=bool)
         for member in members:
-            column, row = (np.searchsorted(a, float(member.swept[i][1])) for i, a in ((0, x), (1, y)))
+            column, row = (np.searchsorted(a, float(member.swept_values[i][1])) for i, a in ((0, x), (1, y)))
             sure[row, column] = last_locks(tables_by_name, member, estimator)["lock_lo"] >= CERTAIN_LOCK_RATE
         reach = np.minimum.accumulate(sure, axis=0).sum(axis=0)
         border = np.where(reach > 0, y[np.maximum(reach, 1) - 1], np.nan)

@@ -18,7 +18,7 @@ def floor(spec: Keys, axes: DiscriminatorAxes) -> Floor | None:
     bounds = tuple(
         None
         if value.start == "truth"
-        else Bound(sigma, np.stack([no_values] * len(LAGS)), no_values, ("",) * len(sigma), reached=False)
+        else Bound(sigma, np.stack([no_values] * len(LAGS)), no_values, ("",) * len(sigma), is_attained=False)
         for value, sigma in zip(spec.estimators, axes.posterior_sigma, strict=True)
     )
     return Floor(CRB, bounds, t_s=axes.duration_s)

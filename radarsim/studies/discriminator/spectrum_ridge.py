@@ -32,7 +32,7 @@ class Ridge:
     def __call__(self, samples: np.ndarray) -> np.ndarray:
         rough = self.from_frequencies(self.frequencies(samples))
         for count in SUMS:
-            rough = self.refined(samples, rough, count)
+            rough = self.refine(samples, rough, count)
         return rough
 
     def frequencies(self, samples: np.ndarray) -> np.ndarray:
@@ -60,7 +60,7 @@ class Ridge:
             best = np.linalg.lstsq(powers[inliers], frequencies[inliers], rcond=None)[0]
         return np.concatenate([[0.0], best / np.arange(1, self.size)])
 
-    def refined(self, samples: np.ndarray, coefficients: np.ndarray, count: int) -> np.ndarray:
+    def refine(self, samples: np.ndarray, coefficients: np.ndarray, count: int) -> np.ndarray:
         """Demodulated, summed over stretches, unwrapped, and the remaining phase fitted."""
         turns = np.polynomial.polynomial.polyval(self.t, coefficients)
         bare = samples * np.exp(-2j * np.pi * (turns - np.rint(turns)))

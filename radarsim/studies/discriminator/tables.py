@@ -63,7 +63,7 @@ def _curves(result: CaseResult) -> common.Columns:
     }
 
 
-@table.whole("gains")
+@table.add_of_all_cases("gains")
 def _gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
     """Without rows: estimators have no baseline."""
     return common.join_columns((), common.GAINS)
@@ -251,13 +251,13 @@ def _passes(result: CaseResult) -> common.Columns:
     return {**common.label_columns(result, np.arange(count)), "n": np.full(count, n), "passes": mean_passes}
 
 
-@table.whole("rare")
+@table.add_of_all_cases("rare")
 def _rare(results: Sequence[CaseResult]) -> "pd.DataFrame | None":
     """Loss of lock at the last window of each estimator; `plain` bursts are not shifted."""
     return rare_events.rate_table([_rare_columns(result) for result in results if "losses" in result.sums])
 
 
-tables = table.made
+tables = table.make
 
 
 def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":

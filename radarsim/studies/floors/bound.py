@@ -31,7 +31,7 @@ class Bound(NamedTuple):
     waited: np.ndarray
     smoothed: np.ndarray
     patterns: tuple[str, ...]
-    reached: bool = True
+    is_attained: bool = True
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def _parts(floor: Floor | None, result: "CaseResult") -> Iterator[dict[str, Any]
     for f, bound in enumerate(floor.bounds):
         if bound is not None:
             yield _rows(floor, f, bound, result)
-    if (user_filters := result.outside) is not None and floor.of_all is not None:
+    if (user_filters := result.user_filters) is not None and floor.of_all is not None:
         for f in range(len(user_filters.axes.filters)):
             yield _rows(floor, f, floor.of_all, user_filters)
 
@@ -73,5 +73,5 @@ def _rows(floor: Floor, f: int, bound: Bound, result: "CaseResult") -> dict[str,
     if floor.t_s is not None:
         rows["t_s"] = floor.t_s[f, k]
     lags = {name: waited[k, c] for name, waited in zip(LAG_COLUMNS, bound.waited, strict=True)}
-    last_columns = {"smoothed": bound.smoothed[k, c], "reached": np.full(k.size, bound.reached), "kind": kinds[k]}
+    last_columns = {"smoothed": bound.smoothed[k, c], "reached": np.full(k.size, bound.is_attained), "kind": kinds[k]}
     return rows | {"floor": bound.sigma[k, c]} | lags | last_columns

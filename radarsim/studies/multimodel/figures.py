@@ -116,7 +116,7 @@ def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
         return ""
     if len(case_selection.group_by_config(results)) > 1:
         return key_labels.case_label(result).replace("_", " ")
-    return ", ".join(_value(result, key, value) for key, value in result.swept)
+    return ", ".join(_value(result, key, value) for key, value in result.swept_values)
 
 
 def _value(result: CaseResult, key: str, value: object) -> str:

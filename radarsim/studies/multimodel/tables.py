@@ -161,7 +161,7 @@ def _operations(result: "CaseResult[FlightAxes]") -> report_tables.Columns:
     return report_tables.columns_from_rows(rows)
 
 
-tables = table.made
+tables = table.make
 
 
 def cost(tables_by_name: "Mapping[str, pd.DataFrame]", run: Mapping[str, Any]) -> "pd.DataFrame | None":

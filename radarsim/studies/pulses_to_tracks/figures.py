@@ -27,7 +27,7 @@ def figures(
     """sigma_r … gain_ar; folds; locks, measured, losses of cases without a sweep, threshold of the others."""
     figures_by_name = time_figures.component_figures(results, tables_by_name, RADIAL, experiment)
     for name, (draw, title, caption) in STUDY_FIGURES.items():
-        unswept = [result for result in case_selection.unswept_cases(results) if not result.swept]
+        unswept = [result for result in case_selection.unswept_cases(results) if not result.swept_values]
         visible, left_out = case_selection.select_cases(
             results if name == "folds" else unswept, case_selection.cases_for_figure(experiment, name)
         )
@@ -55,7 +55,9 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
     """Share of bursts that locked, and σ of range at the last scan, against one swept number, for each config."""
     threshold_panels: list[Panel] = []
     for (_, keys), members in sweep_figures.group_swept_cases(results).items():
-        x, axis = sweep_figures.axis_positions(members[0], keys[0], [dict(result.swept)[keys[0]] for result in members])
+        x, axis = sweep_figures.axis_positions(
+            members[0], keys[0], [dict(result.swept_values)[keys[0]] for result in members]
+        )
         if len(keys) == 1 and not axis.ticks:
             threshold_panels += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, tables_by_name)
     if not any(panel.marks for panel in threshold_panels):

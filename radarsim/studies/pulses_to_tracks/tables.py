@@ -71,7 +71,7 @@ def tables(results: Sequence[Result]) -> "dict[str, pd.DataFrame]":
     tables_by_name = {
         "curves": report_tables.curves(results),
         "gains": report_tables.gains(results),
-        **table.made(results),
+        **table.make(results),
     }
     return {name: with_notes(frame, notes) if "component" in frame else frame for name, frame in tables_by_name.items()}
 

@@ -64,7 +64,7 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
 
 def _sweeps_variance_only(results: Sequence[Result]) -> bool:
     """Whether every case is one of a sweep over the manoeuvre variance."""
-    return all("manoeuvre_variance" in dict(result.swept) for result in results)
+    return all("manoeuvre_variance" in dict(result.swept_values) for result in results)
 
 
 def _gain_sentences(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
@@ -342,7 +342,7 @@ def _cases_over_variance(results: Sequence[Result]) -> dict[str, list[Result]]:
         if not follows_the_model(result):
             other_keys = ", ".join(
                 f"{key_labels.key_symbol(result, key)} = {key_labels.value_with_unit(result, key, value)}"
-                for key, value in result.swept
+                for key, value in result.swept_values
                 if not _is_variance(key)
             )
             name = ", ".join(filter(None, (key_labels.config_device(result), other_keys)))
@@ -358,7 +358,7 @@ def _is_variance(key: str) -> bool:
 
 
 def _has_swept_variance(result: Result) -> bool:
-    return any(_is_variance(key) for key, _ in result.swept) and not _optimised_filters(result)
+    return any(_is_variance(key) for key, _ in result.swept_values) and not _optimised_filters(result)
 
 
 def _best_variances_of_broken(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:

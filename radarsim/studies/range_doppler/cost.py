@@ -10,4 +10,4 @@ SHARED_S, INDIVIDUAL_S = 1e-7, 5e-7
 def seconds_at_most(plan: Plan) -> float:
     """CPU seconds that no processor exceeds for one realisation."""
     filters, scans = plan.axes.available.shape[:2]
-    return filters * scans * (SHARED_S if plan.made.plain else INDIVIDUAL_S)
+    return filters * scans * (SHARED_S if plan.design.plain else INDIVIDUAL_S)

@@ -36,7 +36,7 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
             placed_cases[i] = case, replace(place, name=tr("{name}, as set", name=place.name))
     user_places = [place for _, place in placed_cases if place is not None]
     reference_places = [
-        place for place in reference_places if all(place.of != user_place.of for user_place in user_places)
+        place for place in reference_places if all(place.groups != user_place.groups for user_place in user_places)
     ]
     figures = [
         gain_against_time_figure(user_places or reference_places),
@@ -61,8 +61,8 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
 
 def sentence(place: RadarOnChart) -> str:
     """The position of a radar on the chart, and its gains from Doppler in the long run."""
-    r, V, a = (round(float(gain), 1) for gain in place.exact)
-    c, last = significant_digits(place.of.c, ".2g"), place.gain[-1]
+    r, V, a = (round(float(gain), 1) for gain in place.exact_gain)
+    c, last = significant_digits(place.groups.c, ".2g"), place.gain[-1]
     verbs = [
         tr("takes {size:g} % off the range", size=r) if r >= 0 else tr("adds {size:g} % to the range", size=-r),
         tr("adds {size:g} % to the velocity", size=-V) if V < 0 else tr("{size:g} % off the velocity", size=V),
@@ -71,7 +71,7 @@ def sentence(place: RadarOnChart) -> str:
         verbs[1] = tr("takes {size:g} % off the velocity", size=V)
     gained = tr("the acceleration gains {size:g} %", size=a)
     acceleration = gained if a >= 0 else tr("the acceleration loses {size:g} %", size=-a)
-    distance = significant_digits(float(np.abs(place.exact - place.limit).max()), ".2g")
+    distance = significant_digits(float(np.abs(place.exact_gain - place.limit_gain).max()), ".2g")
     period = place.inputs[2]
     return tr(
         "{name}: in the long run Doppler {verbs}; {acceleration} (c = {c}, τ₁ = {tau_1:.3g} s, τ₂ = {tau_2:.3g} s). "
@@ -93,9 +93,9 @@ def sentence(place: RadarOnChart) -> str:
 
 def accuracy_warning(place: RadarOnChart) -> str:
     """The warning that the closed form may be inaccurate for a radar, as a further sentence; empty where it is not."""
-    if place.of.c <= closed_form.MAX_C:
+    if place.groups.c <= closed_form.MAX_C:
         return ""
-    distance = float(np.abs(place.exact - corrected_gains(place)).max())
+    distance = float(np.abs(place.exact_gain - corrected_gains(place)).max())
     clause = tr("here it is {away} points off", away=significant_digits(distance, ".2g"))
     return tr(
         " Beyond c = 50 000 the closed form may be inaccurate even with the correction for the period: "
@@ -126,12 +126,14 @@ def table(places: Sequence[RadarOnChart]) -> "pd.DataFrame":
     }
     columns |= {"tau_1_s": np.repeat([p.tau_1_s for p in places], count)}
     columns |= {"tau_2_s": np.repeat([p.tau_2_s for p in places], count)}
-    columns |= dict(zip(closed_form.Groups._fields, np.repeat([p.of for p in places], count, axis=0).T, strict=True))
+    columns |= dict(
+        zip(closed_form.Groups._fields, np.repeat([p.groups for p in places], count, axis=0).T, strict=True)
+    )
     return tables.frame(
         columns
         | {
-            "steady_gain_percent": np.concatenate([p.exact for p in places]),
-            "limit_percent": np.concatenate([p.limit for p in places]),
+            "steady_gain_percent": np.concatenate([p.exact_gain for p in places]),
+            "limit_percent": np.concatenate([p.limit_gain for p in places]),
             "corrected_percent": np.concatenate(with_period),
         }
     )

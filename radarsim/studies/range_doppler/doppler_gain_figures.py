@@ -76,7 +76,7 @@ def gain_against_time_figure(places: Sequence[RadarOnChart]) -> Figure:
 
 
 def _key(n: int, place: RadarOnChart) -> tuple[str, Style]:
-    words = f"{key_labels.escape_dollars(place.name)}: $c$ = {significant_digits(place.of.c, '.2g')}"
+    words = f"{key_labels.escape_dollars(place.name)}: $c$ = {significant_digits(place.groups.c, '.2g')}"
     return words, Style(n + 1, None, n)
 
 
@@ -91,10 +91,10 @@ def steady_gain_figure(user_places: Sequence[RadarOnChart], reference_places: Se
         size = 6.0 if n < len(user_places) else 3.4
         for i in range(3):
             style = Style(i + 1, None, n, size_pt=size)
-            marks.append(Line(np.array([place.of.c]), place.exact[i : i + 1], "", style, name=place.name))
+            marks.append(Line(np.array([place.groups.c]), place.exact_gain[i : i + 1], "", style, name=place.name))
     for group in _group_by_c(places):
-        top = max(group, key=lambda place: place.exact.max())
-        marks.append(Note(top.of.c, float(top.exact.max()), "\n".join(place.name for place in group), "nw"))
+        top = max(group, key=lambda place: place.exact_gain.max())
+        marks.append(Note(top.groups.c, float(top.exact_gain.max()), "\n".join(place.name for place in group), "nw"))
     marks.append(Reference(closed_form.no_acceleration_gain(), "x", f"$c$ = {numeral('0.698')}"))
     caption = tr(
         "Left of c = 0.698 Doppler makes the acceleration estimate of a non-manoeuvring target worse; "
@@ -110,8 +110,8 @@ def steady_gain_figure(user_places: Sequence[RadarOnChart], reference_places: Se
 def _group_by_c(places: Sequence[RadarOnChart]) -> list[list[RadarOnChart]]:
     """Radars whose c is the same to a tenth, which are named together."""
     groups: list[list[RadarOnChart]] = []
-    for place in sorted(places, key=lambda radar: radar.of.c):
-        if groups and place.of.c < 1.1 * groups[-1][0].of.c:
+    for place in sorted(places, key=lambda radar: radar.groups.c):
+        if groups and place.groups.c < 1.1 * groups[-1][0].groups.c:
             groups[-1].append(place)
         else:
             groups.append([place])
@@ -150,7 +150,9 @@ def gain_map_figure(user_places: Sequence[RadarOnChart], reference_places: Seque
         keys = []
         for n, place in enumerate([*user_places, *reference_places]):
             style = Style(0, None, n, size_pt=6.0 if n < len(user_places) else 3.4)
-            marks.append(Line(np.array([place.of.C_theta]), np.array([place.of.Lambda]), "", style, name=place.name))
+            marks.append(
+                Line(np.array([place.groups.C_theta]), np.array([place.groups.Lambda]), "", style, name=place.name)
+            )
             keys.append((key_labels.escape_dollars(place.name), style))
         limits = (float(MAP_C_THETA[0]), float(MAP_C_THETA[-1]))
         rows = (float(MAP_LAMBDA[0]), float(MAP_LAMBDA[-1]))

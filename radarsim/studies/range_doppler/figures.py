@@ -65,7 +65,7 @@ def figures(
 def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:
     """NEES per component against time: a panel for each radar or swept value, of several radars for each filter."""
     rows = tables.group_by(table, "case", "filter")
-    if len(results) == 1 or any(result.swept for result in results):
+    if len(results) == 1 or any(result.swept_values for result in results):
         nees = {(*key, "nees"): filter_rows for key, filter_rows in rows.items()}
         panels = consistency_figures.nees_panels(results, nees)
     else:

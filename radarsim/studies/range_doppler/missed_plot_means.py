@@ -34,7 +34,7 @@ class Means:
     sigma: np.ndarray
     bias: np.ndarray
     nees: np.ndarray
-    beside: np.ndarray
+    companion_sigma: np.ndarray
 
 
 RECENT_MEANS: dict[tuple, Means] = {}  # of the last filters and worlds: a filter of the range is the same at any σ_V
@@ -74,7 +74,7 @@ def compute_means(design: Design, companions: Sequence[Design], designed_case: D
     if designed_case.roughly or 2 ** len(designed_case.t) <= FOLLOWED_PATTERNS:
         limit = PATTERN_LIMITS[0] if designed_case.roughly else PATTERNS_AT_ONCE
         single = limited_mixture(limit, follow_all=not designed_case.roughly)
-        return Means(np.sqrt(single.moment), single.bias, single.nees, np.sqrt(single.beside))
+        return Means(np.sqrt(single.moment), single.bias, single.nees, np.sqrt(single.companion_moment))
     mixtures = map(limited_mixture, PATTERN_LIMITS)
     coarse_mixture, fine_mixture = next(mixtures), next(mixtures)
     while (
@@ -85,7 +85,9 @@ def compute_means(design: Design, companions: Sequence[Design], designed_case: D
     is_known = is_close(fine_mixture.moment, coarse_mixture.moment)
     whole_state = is_close(fine_mixture.nees, coarse_mixture.nees) & is_known.all(axis=1)
     companion_sigma = np.where(
-        is_close(fine_mixture.beside, coarse_mixture.beside), np.sqrt(fine_mixture.beside), np.nan
+        is_close(fine_mixture.companion_moment, coarse_mixture.companion_moment),
+        np.sqrt(fine_mixture.companion_moment),
+        np.nan,
     )
     sigma, bias = (np.where(is_known, values, np.nan) for values in (np.sqrt(fine_mixture.moment), fine_mixture.bias))
     return Means(sigma, bias, np.where(whole_state, fine_mixture.nees, np.nan), companion_sigma)

@@ -47,10 +47,10 @@ class Mixture:
     believed: np.ndarray  #: (K, 3) of the variance that it believes
     nees: np.ndarray  #: (K,) expectation of eᵀP⁻¹e / 3 over those that have started
     #: (G, K, 3) mean of e² over the patterns in which one of G other filters has an estimate as well
-    beside: np.ndarray
+    companion_moment: np.ndarray
 
     @classmethod
-    def of(cls, sums: np.ndarray) -> "Mixture":
+    def from_sums(cls, sums: np.ndarray) -> "Mixture":
         """The mixture of the sums that `kernels.patterns.add_means` has made."""
         started, nees, bias, moment, believed = sums[:, 0], sums[:, 1], sums[:, 2:5], sums[:, 5:8], sums[:, 8:11]
         available = started[:, None] + sums[:, patterns.FIRST_PLOT_PROBABILITY : patterns.FILTER_MEANS]
@@ -99,14 +99,14 @@ def mixture(
     max_waiting = waiting_limit(design.start, scans, plots.detection)
     sums = scans, patterns.FILTER_MEANS + patterns.COMPANION_MEANS * len(companion_designs)
     if max_waiting > MAX_WAITING:
-        return Mixture.of(np.full(sums, np.nan))
+        return Mixture.from_sums(np.full(sums, np.nan))
     pattern_sums = np.zeros(sums)
     patterns.add_means(
         pattern_merging.make_workspace(min(max_patterns, 1 << min(scans, 30)), columns, max_waiting, scans),
         world,
         pattern_sums,
     )
-    return Mixture.of(pattern_sums)
+    return Mixture.from_sums(pattern_sums)
 
 
 def waiting_limit(start: int, scans: int, detection: float) -> int:
@@ -122,7 +122,7 @@ def has_settled(fine_mixture: Mixture, coarse_mixture: Mixture, from_k: int = 0)
     late = slice(max(from_k - 1, 0), None)
     pairs = [
         (fine_mixture.moment[late], coarse_mixture.moment[late]),
-        (fine_mixture.beside[:, late], coarse_mixture.beside[:, late]),
+        (fine_mixture.companion_moment[:, late], coarse_mixture.companion_moment[:, late]),
     ]
     if from_k == 0:
         pairs.append((fine_mixture.nees, coarse_mixture.nees))

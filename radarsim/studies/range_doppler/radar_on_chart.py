@@ -20,9 +20,9 @@ class RadarOnChart:
     inputs: tuple[float, float, float, float]
     tau_1_s: float
     tau_2_s: float
-    of: closed_form.Groups
-    exact: np.ndarray
-    limit: np.ndarray
+    groups: closed_form.Groups
+    exact_gain: np.ndarray
+    limit_gain: np.ndarray
     t_s: np.ndarray
     gain: np.ndarray
 
@@ -55,4 +55,4 @@ def place_case(case: Case) -> RadarOnChart | None:
 
 def corrected_gains(place: RadarOnChart) -> np.ndarray:
     """The closed form's steady gains (3,) with the first order of the period."""
-    return closed_form.steady_gains(place.of.c, place.inputs[2] / place.tau_2_s)
+    return closed_form.steady_gains(place.groups.c, place.inputs[2] / place.tau_2_s)

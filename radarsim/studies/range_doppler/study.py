@@ -55,26 +55,26 @@ class Plan:
     gaussian: whether the errors are, with the exact bias and σ of the axes, and in sums of the common kind."""
 
     case: Case
-    made: DesignedCase
+    design: DesignedCase
     axes: RangeDopplerAxes
     block: int = BLOCK
 
     @property
     def gaussian(self) -> bool:
-        return self.made.plain
+        return self.design.plain
 
     @cached_property
     def layout(self) -> Layout:
         from radarsim.studies.range_doppler import kernel_problem
 
-        return kernel_problem.layout(self.made)
+        return kernel_problem.layout(self.design)
 
     @cached_property
     def problem(self) -> "Problem":
         """What is simulated, as the kernels take it."""
         from radarsim.studies.range_doppler import kernel_problem
 
-        return kernel_problem.problem(self.case, self.made, self.axes.baseline)
+        return kernel_problem.problem(self.case, self.design, self.axes.baseline)
 
 
 def prepare(case: Case) -> Plan:
@@ -216,7 +216,7 @@ def exact_means(designed_case: DesignedCase, baseline: int) -> ExactErrors:
                 else missed_plot_means.means(design, [filter_designs[baseline]], designed_case)
             )
             sigma[f], bias[f], nees[f] = filter_means.sigma, filter_means.bias, filter_means.nees
-            gain[f] = gains(filter_means.beside[0], baseline_means.beside[f])
+            gain[f] = gains(filter_means.companion_sigma[0], baseline_means.companion_sigma[f])
     return ExactErrors(sigma, bias, gain, nees, np.zeros((*shape, 3)))
 
 

@@ -69,7 +69,7 @@ STEADY = (
 )
 
 
-@table.whole("steady")
+@table.add_of_all_cases("steady")
 def steady(results: Sequence[Result]) -> "pd.DataFrame":
     """Steady σ against settling, both exact, of every case, filter and component; and σ measured at the last scan.
 
@@ -231,13 +231,13 @@ def _radar(result: Result) -> common.Columns:
     return common.columns_from_rows([row])
 
 
-@table.whole("gains")
+@table.add_of_all_cases("gains")
 def _gains_where_missed(results: Sequence[Result]) -> "pd.DataFrame | None":
     """As everywhere; where plots may be missed, of realisations in which both filters have an estimate."""
     return gains(results) if any(has_individual_gains(result) for result in results) else None
 
 
-tables = table.made
+tables = table.make
 
 
 def span_mps(result: Result) -> float:

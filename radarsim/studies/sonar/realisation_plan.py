@@ -31,7 +31,7 @@ class RealisationPlan:
     conversion: plots.Conversion
     bank: realisation_gains.RealisationBank
     detectors: detector.Detectors
-    kept: np.ndarray
+    stored_scans: np.ndarray
     block: int = BLOCK
     gaussian = False
 
@@ -48,10 +48,10 @@ class RealisationPlan:
         F, K, C = self.bank.carry.shape
         D, G, T = self.detectors.threshold.shape
         alarms = detector.Alarms(np.zeros((D, G, K)), np.zeros((D, G, T, K)), np.zeros((D, G, T, K)))
-        estimates = np.zeros((len(self.kept), F, 2, 6, count))
+        estimates = np.zeros((len(self.stored_scans), F, 2, 6, count))
         errors = np.full((F, K, C, int(self.bank.size.max()), error_count), np.nan)
         modes = np.zeros((F, K, C, 3))
-        sums = realisation_gains.BlockSums(empty_sums(F, K, C), alarms, modes, self.kept, estimates, errors)
+        sums = realisation_gains.BlockSums(empty_sums(F, K, C), alarms, modes, self.stored_scans, estimates, errors)
         inputs = (self.world, self.detections, self.conversion, self.bank, self.detectors)
         realisation_gains.simulate_block(*inputs, first, count, self.axes.baseline, sums)
         return sums
@@ -77,5 +77,5 @@ def realisation_plan(
         conversion=kernel_conversion(case, scene),
         bank=filter_banks.per_realisation_bank(specs, scene.t, scene.period, scene.nominal, detectors),
         detectors=detectors,
-        kept=np.zeros(0, dtype=np.int64),
+        stored_scans=np.zeros(0, dtype=np.int64),
     )

@@ -27,14 +27,14 @@ class Correlations(Model):
         "correlation of errors in depth or elevation", "correlation of the errors in depth or elevation", 0.0
     )
 
-    def of(self, index: int) -> float:
+    def coordinate(self, index: int) -> float:
         """The correlation of one coordinate, by its number."""
         return (self.range, self.bearing, self.third)[index]
 
 
 def coordinate_correlation(value: "float | Correlations", index: int) -> float:
     """The correlation of one coordinate; a single number applies to all of them."""
-    return value.of(index) if isinstance(value, Correlations) else value
+    return value.coordinate(index) if isinstance(value, Correlations) else value
 
 
 class FurtherSensor(Model):

@@ -62,7 +62,7 @@ def sigma_figure(
         + left_out
     )
     if shared:
-        same = key_labels.swept_description(results[0], without={key for key, _ in results[0].swept} - shared)
+        same = key_labels.swept_description(results[0], without={key for key, _ in results[0].swept_values} - shared)
         caption += " " + tr("All panels: {values}.", values=key_labels.without_markup(same))
     figure = panel_layout.arrange_columns(
         Figure(name, tr("σ of the {name}", name=component.words), caption, tuple(figure_panels))

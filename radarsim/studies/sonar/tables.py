@@ -84,7 +84,7 @@ def _normalised_errors(result: CaseResult[SonarAxes]) -> Columns:
     return {**columns, "n": n.astype(np.int64), **nees}
 
 
-@table.whole("operations")
+@table.add_of_all_cases("operations")
 def _operations(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
     """Operations of one scan of one coordinate at degree 1, no intermediate result computed twice; a test counts them.
 
@@ -232,4 +232,4 @@ def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
     return common.columns_from_rows([row])
 
 
-tables = table.made
+tables = table.make

@@ -57,7 +57,7 @@ class UserFilter(ABC):
     in_order: bool = False
     written: Mapping[str, Any] | None = None  #: its keys, where a config has it
     baseline: bool = False  #: whether gains of the others are against it too
-    judged_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
+    answer_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
 
     @abstractmethod
     def estimates(self, plots: Plots) -> Any:
@@ -82,7 +82,7 @@ class CalledFilter(UserFilter):
     target: Any
     identity: str = ""
     components: tuple[str, ...] = ()
-    alone: bool = False
+    takes_one_realisation: bool = False
     _lock: Any = field(default_factory=threading.Lock, repr=False)
 
     def estimates(self, plots: Plots) -> Any:
@@ -95,7 +95,7 @@ class CalledFilter(UserFilter):
                         f"{self.name}: a filter that is asked scan by scan must have start(world) and step(plots)"
                     )
                 return run_steps(self.name, instance, plots)
-            if not self.alone:
+            if not self.takes_one_realisation:
                 return target(plots)
             answers = [copy_estimates(target(plots_of_realisation(plots, i))) for i in range(plots.n)]
             return stack_estimates(

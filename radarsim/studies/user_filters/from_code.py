@@ -139,7 +139,7 @@ class CodeFilter(UserFilter):
     def bound_to(self, case: Case) -> "CodeFilter":
         """The filter as one of a case: the same where the case differs in nothing that the filter may see."""
         bound = self.case
-        if bound is None or bound.spec is not case.spec or bound.noise_of is not case.noise_of:
+        if bound is None or bound.spec is not case.spec or bound.noise_keys is not case.noise_keys:
             return replace(self, case=case)
         same = (bound.study, bound.name, bound.seed) == (case.study, case.name, case.seed)
         return self if same else replace(self, case=case)
@@ -277,7 +277,7 @@ class CodeFilter(UserFilter):
         target = self._target_in(code)
         with self._running(f"fails in realisations {_span(plots)}"), code.running():
             build = partial(build_filter, self.name, target) if isinstance(target, type) else partial(partial, target)
-            user_filter = CalledFilter(self.name, build(**self.arguments), alone=self.keys.one_by_one)
+            user_filter = CalledFilter(self.name, build(**self.arguments), takes_one_realisation=self.keys.one_by_one)
             return user_filter.estimates(plots)
 
     def _import_code(self) -> LoadedCode:

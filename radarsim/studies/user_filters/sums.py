@@ -37,11 +37,11 @@ PAIRED = 7  # sums over the realisations that both have: 1, e², e⁴, b², b⁴
 @dataclass(frozen=True)
 class UserFilterAxes(Axes):
     """Axes of user filters. baselines: those that the gains of the config's filters refer to as well; identities: what
-    the numbers of each depend on; judged_at: as in `UserFilter`."""
+    the numbers of each depend on; answer_at: as in `UserFilter`."""
 
     baselines: tuple[str, ...] = ()
     identities: tuple[str, ...] = ()
-    judged_at: tuple[str, float] | None = None
+    answer_at: tuple[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     """The plan of a case's user filters. Raises ConfigError where their errors cannot be paired with the study's."""
     axes = inner.axes
     draw, world, scans = drawing_setup(study, case, inner)
-    names = [member.name for member in case.outside]
+    names = [member.name for member in case.user_filters]
     if taken_names := [name for i, name in enumerate(names) if name in (*axes.filters, *names[:i])]:
         raise ConfigError(f"{case.name}: name: there is a filter {taken_names[0]!r} already; give another name")
     G, (F, K, C) = len(names), axes.available.shape
@@ -85,10 +85,10 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     )
     unknown = np.full((G, K, C), np.nan)
     labels = tuple(names), axes.components, axes.k, axes.t_s, np.ones((G, K, C), dtype=bool), 0, unknown, unknown
-    baselines = tuple(member.name for member in case.outside if member.baseline)
-    judged_at = next((member.judged_at for member in case.outside if member.judged_at), None)
-    user_axes = UserFilterAxes(*labels, baselines, tuple(member.identity for member in case.outside), judged_at)
-    return Plan(study, inner, draw, world, scans, case.outside, user_axes, layout)
+    baselines = tuple(member.name for member in case.user_filters if member.baseline)
+    answer_at = next((member.answer_at for member in case.user_filters if member.answer_at), None)
+    user_axes = UserFilterAxes(*labels, baselines, tuple(member.identity for member in case.user_filters), answer_at)
+    return Plan(study, inner, draw, world, scans, case.user_filters, user_axes, layout)
 
 
 def plots_of(plan: Plan, plots: "SimulatedPlots") -> Plots:
@@ -211,4 +211,4 @@ def error_powers(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 def result(plan: Plan, study_result: CaseResult, sums: Mapping[str, np.ndarray]) -> CaseResult:
     """The user filters as a case of their own: available only where some realisation has an estimate."""
     axes = replace(plan.axes, available=sums["estimates"] > 0)
-    return replace(study_result, sums=sums, axes=axes, against=())
+    return replace(study_result, sums=sums, axes=axes, further_baselines=())

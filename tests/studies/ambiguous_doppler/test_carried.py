@@ -104,4 +104,4 @@ def test_remedies_do_not_change_swept_keys():
     for settings in touching:
         with pytest.raises(ConfigError, match="sweep"):
             load({**MINE, "sweep": {key: [0.1, 0.2]}}, (*FOLDED, *settings.replace("--set ", "").split()))
-    assert not touching & {said for said, _ in cures(case.spec, "r+Vr", dict(case.swept))}
+    assert not touching & {said for said, _ in cures(case.spec, "r+Vr", dict(case.swept_values))}

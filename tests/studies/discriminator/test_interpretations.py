@@ -105,7 +105,7 @@ def classes(claim):
     """The outcomes of an exact claim by threshold and lobe, over noise and forecast."""
     found = {}
     varied = [choice for choice in OF.choices if choice.key in ("noise_variance", "threshold", "lobe", "forecast")]
-    for interpretation in OF.combined(varied):
+    for interpretation in OF.combinations(varied):
         seen = judge_claim(OF, CLAIMS[claim], interpretation, ExactEvidence(interpretation))
         found.setdefault((interpretation["threshold"], interpretation["lobe"]), set()).add(seen.outcome.kind)
     return found

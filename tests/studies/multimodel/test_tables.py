@@ -154,7 +154,7 @@ def test_answer_on_several_cases_is_one_sentence():
     ]
     columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
     stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
-    cases = [SimpleNamespace(name=name, swept=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
+    cases = [SimpleNamespace(name=name, swept_values=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
     (sentence,) = answer_texts(answer, cases, {"stages": stages})
     assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in sentence
     single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})

@@ -24,7 +24,9 @@ def made_of(results):
 
 def drawn_of(results, made=None, stem="mine"):
     """Its figures, each showing every case."""
-    everything = SimpleNamespace(stem=stem, shown_in=lambda name: [SimpleNamespace(name=r.name) for r in results])
+    everything = SimpleNamespace(
+        stem=stem, cases_in_figure=lambda name: [SimpleNamespace(name=r.name) for r in results]
+    )
     return range_doppler_figures.figures(results, made or made_of(results), everything)
 
 

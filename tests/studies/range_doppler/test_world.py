@@ -271,7 +271,7 @@ def test_means_over_merged_patterns_are_those_over_all(detection, monkeypatch):
     for f, mean in enumerate(whole):
         np.testing.assert_allclose(axes.exact_sigma[f, later], np.sqrt(mean.moment)[later], **near)
         np.testing.assert_allclose(axes.exact_nees[f, later], mean.nees[later], rtol=missed_plot_patterns.MAX_CHANGE)
-    left = 1 - np.sqrt(whole[1].beside[0] / whole[0].beside[1])
+    left = 1 - np.sqrt(whole[1].companion_moment[0] / whole[0].companion_moment[1])
     np.testing.assert_allclose(1 - axes.exact_gain[1, later] / 100, 1 - left[later], **near)
 
 
@@ -292,7 +292,7 @@ def test_patterns_followed_to_the_end_piece_by_piece_are_those_side_by_side(most
         given = design, plots, truth, DT
         beside = missed_plot_patterns.mixture(*given, 1 << 13, designs, from_k=from_k)
         pieces = missed_plot_patterns.mixture(*given, most, designs, from_k=from_k, follow_all=True)
-        for name in ("started", "available", "bias", "moment", "believed", "nees", "beside"):
+        for name in ("started", "available", "bias", "moment", "believed", "nees", "companion_moment"):
             size = np.sqrt(beside.moment) if name == "bias" else None
             assert_rounded(getattr(pieces, name), getattr(beside, name), size=size, operations=1 << 13)
 

@@ -183,8 +183,8 @@ def test_turns_must_follow_one_another():
 
 def test_correlation_by_coordinate():
     spec = load(config(sensor__error_correlation={"range": 0.6, "bearing": -0.2})).cases[0].spec
-    assert spec.sensor.error_correlation.of(0) == 0.6
-    assert spec.sensor.error_correlation.of(1) == -0.2
+    assert spec.sensor.error_correlation.coordinate(0) == 0.6
+    assert spec.sensor.error_correlation.coordinate(1) == -0.2
 
 
 def test_a_scan_beyond_the_last_cannot_be_missed():

@@ -36,7 +36,7 @@ class Interpretations(PaperInterpretations):
 
     def for_claim(self, claim: str) -> list[Interpretation]:
         """All combinations of the choices that bear on a claim."""
-        return list(self.combined([choice for choice in self.choices if choice.bears_on(claim)]))
+        return list(self.combinations([choice for choice in self.choices if choice.affects(claim)]))
 
     def parts(self, claim: Claim, interpretation: Interpretation) -> Sequence[Part]:
         if claim.id == ENOUGH:

@@ -127,7 +127,8 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
 def _swept_values(result: CaseResult[ClutterAxes]) -> str:
     """The swept keys of a case and their values, at length."""
     pairs = (
-        (key_labels.key_label(result, key).text, key_labels.value_with_unit(result, key, v)) for key, v in result.swept
+        (key_labels.key_label(result, key).text, key_labels.value_with_unit(result, key, v))
+        for key, v in result.swept_values
     )
     return ", ".join(f"{name}: {value}" for name, value in pairs)
 
@@ -282,7 +283,7 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
         "reaches a threshold, of {realisations} of each kind. Left: tracks started by false plots, at "
         "most exp(−threshold) of them (bound). Right: the target's first tracks. Bands: 95 % intervals.",
         realisations=case_selection.realisations_text(results),
-    ) + (tr(" Case: {swept}.", swept=_swept_values(case)) if case.swept else "")
+    ) + (tr(" Case: {swept}.", swept=_swept_values(case)) if case.swept_values else "")
     return (
         Figure("track_classes", tr("True and false tracks by score"), caption, tuple(figure_panels), 2, PAGE_MM)
         if figure_panels

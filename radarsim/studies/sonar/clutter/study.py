@@ -39,13 +39,13 @@ class Plan:
     layout: Layout
     axes: ClutterAxes
     trackers: Trackers
-    field_about_false: Field  #: false plots among which false tracks live
-    seeds: np.ndarray  #: (2,) key of the stream of their first plots
-    shift: rare_false_tracks.FalseTrackLaws | None = (
+    false_track_field: Field  #: false plots among which false tracks live
+    false_track_key: np.ndarray  #: (2,) key of the stream of their first plots
+    false_track_laws: rare_false_tracks.FalseTrackLaws | None = (
         None  #: how false tracks are drawn where they are rare; None: as they are
     )
     #: how further tracks of the target are drawn where its ends are rare; None: there are none
-    ends: EndLaws | None = None
+    end_laws: EndLaws | None = None
     block: int = realisation_plan.BLOCK
     gaussian = False
 
@@ -60,19 +60,19 @@ class Plan:
         track_sums, work = kernels_track_sums.TrackSums(sums, **part_sums), workspace(F)
         inputs = (axes.world, axes.detections, axes.field, self.trackers)
         blocks.simulate_block(*inputs, work, first, count, track_sums)
-        if self.shift is not None:
+        if self.false_track_laws is not None:
             weighted = rare_false_tracks.WeightedSums(np.zeros((F, K, 4)), np.zeros((F, 3)))
-            weighted_inputs = (self.seeds, self.field_about_false, self.shift, self.trackers)
+            weighted_inputs = (self.false_track_key, self.false_track_field, self.false_track_laws, self.trackers)
             rare_false_tracks.simulate_false_tracks(
                 *weighted_inputs, work, axes.world.dt, first, count, part_sums["scores"][1], weighted
             )
             part_sums |= weighted._asdict()
         elif axes.field.cells.density > 0:
-            false_inputs = (self.seeds, self.field_about_false, self.trackers)
+            false_inputs = (self.false_track_key, self.false_track_field, self.trackers)
             blocks.simulate_false_tracks(*false_inputs, work, axes.world.dt, first, count, track_sums)
-        if self.ends is not None:
+        if self.end_laws is not None:
             ended = EndSums(np.zeros((F, K, END_KINDS, 4)), np.zeros((F, 3)))
-            simulate_ends(*inputs, self.ends, work, first, count, ended)
+            simulate_ends(*inputs, self.end_laws, work, first, count, ended)
             part_sums |= ended._asdict()
         return block_sums.pack_sums(self.layout, sums, **part_sums)
 
@@ -102,10 +102,10 @@ def prepare(case: Case) -> Plan:
         layout=Layout(**common, **part_shapes),
         axes=labels,
         trackers=tracker_design.trackers(specs, conditions),
-        field_about_false=tracker_design.field(noise_key(case, "seeds"), spec.sensor.sector, conditions),
-        seeds=noise_key(case, "places"),
-        shift=shift,
-        ends=laws_of_ends,
+        false_track_field=tracker_design.field(noise_key(case, "seeds"), spec.sensor.sector, conditions),
+        false_track_key=noise_key(case, "places"),
+        false_track_laws=shift,
+        end_laws=laws_of_ends,
     )
 
 

@@ -235,7 +235,7 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
     }
 
 
-@table.whole("rare")
+@table.add_of_all_cases("rare")
 def _rare(results: Sequence[CaseResult[ClutterAxes]]) -> "pd.DataFrame | None":
     """That a track begun by a false plot is confirmed, or how the target's track ends, by tracker.
 
@@ -314,4 +314,4 @@ def ends_note(
     return np.where(total_note != "", total_note, in_part)
 
 
-tables = table.made
+tables = table.make

@@ -131,18 +131,18 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
 
 def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
     """Probability of detection against the manoeuvre's strength, a line for each detector."""
-    key = next((key for key, value in results[0].swept if key.rpartition(".")[2] in STRENGTHS), None)
+    key = next((key for key, value in results[0].swept_values if key.rpartition(".")[2] in STRENGTHS), None)
     if key is None:
         return None
     families: dict[tuple, list[CaseResult[ManoeuvreAxes]]] = {}
     for result in results:
-        if key in dict(result.swept):
-            families.setdefault(tuple(pair for pair in result.swept if pair[0] != key), []).append(result)
+        if key in dict(result.swept_values):
+            families.setdefault(tuple(pair for pair in result.swept_values if pair[0] != key), []).append(result)
     figure_panels = []
     for other_keys, members in families.items():
-        members.sort(key=lambda r: dict(r.swept)[key])
+        members.sort(key=lambda r: dict(r.swept_values)[key])
         strength = key_labels.key_axis_factor(members[0], key) * np.array(
-            [dict(r.swept)[key] for r in members], dtype=float
+            [dict(r.swept_values)[key] for r in members], dtype=float
         )
         marks = []
         for n, name in enumerate(usual_detectors(members[0])):
@@ -233,7 +233,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
         )
         y = Axis(tr("measured / computed $\\sigma$"), "log", ticks=ratio_ticks)
         figure_panels.append(Panel(Axis("", ticks=ticks), y, tuple(marks), tr("t = {t_s:g} s", t_s=t_s), direct=False))
-    case = f" ({key_labels.without_markup(_swept_values(result))})" if result.swept else ""
+    case = f" ({key_labels.without_markup(_swept_values(result))})" if result.swept_values else ""
     caption = (
         tr(
             "σ about the truth over the one computed from the track's covariance to first order{case}, "
@@ -247,7 +247,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
 
 def _swept_values(result: CaseResult[ManoeuvreAxes]) -> str:
     """The swept values, a strength with its unit."""
-    return ", ".join(key_labels.value_with_unit(result, key, value) for key, value in result.swept)
+    return ", ".join(key_labels.value_with_unit(result, key, value) for key, value in result.swept_values)
 
 
 def _figure_of_panels(

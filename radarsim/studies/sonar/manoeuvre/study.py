@@ -41,7 +41,7 @@ class Plan(realisation_plan.RealisationPlan):
         }
         if self.spec.uses and self.axes.uses:
             part_sums["uses"] = use_sums(
-                self.spec.uses, self.spec.frame, self.axes.uses, self.scene.t[self.kept], sums.kept_estimates
+                self.spec.uses, self.spec.frame, self.axes.uses, self.scene.t[self.stored_scans], sums.kept_estimates
             )
         return block_sums.pack_sums(self.layout, sums.errors, **part_sums)
 
@@ -56,7 +56,7 @@ def prepare(case: Case) -> Plan:
     if spec.uses:
         use_scans = np.searchsorted(scene.t, np.array(spec.uses.at_s or [scene.t[-1]]) - 1e-9)
     more = shapes(spec, detectors, len(scene.t), len(use_scans))
-    fields = vars(plan) | {"kept": use_scans, "layout": Layout(**plan.layout.shapes, **more)}
+    fields = vars(plan) | {"stored_scans": use_scans, "layout": Layout(**plan.layout.shapes, **more)}
     return Plan(**fields | {"axes": axes(spec, scene, plan.axes, detectors.phase, use_scans)}, spec=spec, scene=scene)
 
 

@@ -269,4 +269,4 @@ def _distance(sums: np.ndarray, true: np.ndarray, closing: np.ndarray) -> np.nda
     return np.stack([speed, speed, far, far, np.minimum(cpa, relative), relative], axis=1)
 
 
-tables = table.made
+tables = table.make

@@ -48,8 +48,8 @@ def reseeded(plan, seed):
         detections=axes.detections._replace(key=keys[1]),
         field=axes.field._replace(key=keys[2]),
     )
-    ends = None if plan.ends is None else plan.ends._replace(choice=keys[3], plots=keys[4])
-    return replace(plan, axes=axes, ends=ends)
+    ends = None if plan.end_laws is None else plan.end_laws._replace(choice=keys[3], plots=keys[4])
+    return replace(plan, axes=axes, end_laws=ends)
 
 
 def shares(plan, n=N):
@@ -61,9 +61,9 @@ def shares(plan, n=N):
 
 def one_law(plan):
     """The plan with every realisation drawn as it is: how plain sampling knows the first ends."""
-    own = np.zeros_like(plan.ends.shares)
+    own = np.zeros_like(plan.end_laws.shares)
     own[:, 0] = 1.0
-    return replace(plan, ends=plan.ends._replace(shares=own))
+    return replace(plan, end_laws=plan.end_laws._replace(shares=own))
 
 
 # ---- exact ----------------------------------------------------------------------------------------------------------
@@ -146,7 +146,7 @@ def test_weights_and_ends_are_the_twins(density, detection):
     keys = keys_of(filters, density, detection, scans)
     case = load(keys).cases[0]
     plan = STUDY.prepare(case)
-    given, ends, seen = tracker_design.tracking_conditions(case.spec), plan.ends, np.zeros(4)
+    given, ends, seen = tracker_design.tracking_conditions(case.spec), plan.end_laws, np.zeros(4)
     truth = plan.axes.world.truth[:, :2, 0]
     for realisation in range(40):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))

@@ -40,9 +40,9 @@ def plan_of(*of, **more):
 def reseeded(plan, seed):
     """The plan under other false plots."""
     keys = [random.stream(seed, str(i)) for i in range(4)]
-    shift = None if plan.shift is None else FalseTrackLaws(keys[2], keys[3], plan.shift.shares)
-    field = plan.field_about_false._replace(key=keys[1])
-    return replace(plan, seeds=keys[0], field_about_false=field, shift=shift)
+    shift = None if plan.false_track_laws is None else FalseTrackLaws(keys[2], keys[3], plan.false_track_laws.shares)
+    field = plan.false_track_field._replace(key=keys[1])
+    return replace(plan, false_track_key=keys[0], false_track_field=field, false_track_laws=shift)
 
 
 def share(plan, n, f=0):
@@ -95,17 +95,17 @@ def test_weights_and_lives_are_the_twins(density, rare):
     filters = [tracker("near"), tracker("pda", "pda", 3, 5), tracker("wide", m=4, n=6, gate=0.9999)]
     case = case_of(filters, density, scans=12, rare=rare)
     plan = STUDY.prepare(case)
-    given, shares, seen = tracker_design.tracking_conditions(case.spec), plan.shift.shares, np.zeros(3)
+    given, shares, seen = tracker_design.tracking_conditions(case.spec), plan.false_track_laws.shares, np.zeros(3)
     for realisation in range(150):
         sums = plan.layout.unpack(STUDY.simulate(plan, realisation, 1))
-        u, v = uniforms(plan.seeds, realisation)
+        u, v = uniforms(plan.false_track_key, realisation)
         (near, far), (left, right) = SECTOR
         first = np.array([math.sqrt(near**2 + (far**2 - near**2) * u), left + (right - left) * v])
-        law = int(np.searchsorted(np.cumsum(shares), uniforms(plan.shift.choice, realisation)[0]))
-        words = words_of(plan.shift.plots, realisation)
+        law = int(np.searchsorted(np.cumsum(shares), uniforms(plan.false_track_laws.choice, realisation)[0]))
+        words = words_of(plan.false_track_laws.plots, realisation)
         for f, choice in enumerate(tracker_design.tracker_specs(case.spec)):
             gate = tracker_design.gate_threshold(choice.gate_probability)
-            field = lambda k, i=realisation: plots.false_plots(plan.field_about_false, i, k).T  # noqa: E731
+            field = lambda k, i=realisation: plots.false_plots(plan.false_track_field, i, k).T  # noqa: E731
             weight, held = FalseTrack(choice, given, gate, SECTOR, words, field).follow(first, 12, law, shares)
             assert_weights_rounded(sums["drawn"][f], [float(law == 0), weight, weight**2], 12)
             expected = np.zeros((12, 4))
