@@ -58,12 +58,13 @@ class StoreError(RadarsimError):
     exit_code = 4
 
 
-class DisagreementError(StoreError):
+class DisagreementError(RadarsimError):
     """An exact value and its simulation differ by more than chance allows: one of the two is computed wrongly.
 
     `result` holds the tables with both, where `radarsim.run` raised it.
     """
 
+    exit_code = 4
     result: object = None
 
 

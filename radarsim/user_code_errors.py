@@ -123,7 +123,7 @@ def study_context(name: str) -> Iterator[None]:
 def call_user_function(function: Callable[..., Any], *arguments: Any, owner: str = "") -> Any:
     """The value of an author's function; ConfigError with its file and line where it fails.
 
-    owner: what the function belongs to, if its name does not show it; by default from `of_study`.
+    owner: what the function belongs to, if its name does not show it; by default from `study_context`.
     """
     try:
         return function(*arguments)

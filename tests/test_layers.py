@@ -26,7 +26,7 @@ BASICS = ("errors", "threads", "private_files")  # any other room may import the
 SUMS = ("engine.results", "engine.sums")  # the engine's plain data, which studies fill
 CASE = ("config.experiment", "config.radial_keys", "config.rare_event_keys")
 SCHEMA = (
-    *("config.cross_checks", "config.error_list", "config.key_types", "config.marks", "config.model"),
+    *("config.cross_checks", "config.error_text", "config.key_types", "config.marks", "config.model"),
     *("config.radial_keys", "config.rare_event_keys", "config.study_keys"),
 )
 ROOMS = {
@@ -54,7 +54,7 @@ ROOMS = {
     "studies.noise": ("config.experiment", "config.identity", "kernels.random"),
     "studies.radial_truth": ("constants", "physics"),
     "studies.plot_arrays": (),
-    "studies.recording_interface": ("config.experiment", "engine.results", "studies.plot_arrays"),
+    "studies.recording_interface": ("config.experiment", "studies.plot_arrays"),
     "studies.floors": ("engine.results", "report", "studies.interface"),
     "studies.interface": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "report", "report.drawing"),
@@ -77,7 +77,7 @@ ROOMS = {
     "studies.linear_exact": ("studies.linear_design",),
     "studies.linear_problem": ("config.experiment", "kernels", "studies.linear_design", "studies.noise"),
     "studies.linear_recordings": (
-        *("engine.results", "kernels", "studies.linear", "studies.linear_design", "studies.recording_interface"),
+        *("kernels", "studies.linear", "studies.linear_design", "studies.recording_interface"),
     ),
     "studies.stepwise": (
         *("config.experiment", "config.study_keys", *SUMS, "kernels", "report", "report.drawing"),
@@ -86,7 +86,8 @@ ROOMS = {
     ),
     "studies.step_checks": ("kernels", "user_code_errors"),
     "studies.step_tracker": (
-        *("engine.results", "kernels.tracing", "studies.step_checks", "studies.stepwise", "user_code_errors"),
+        *("kernels.tracing", "studies.recording_interface", "studies.step_checks", "studies.stepwise"),
+        "user_code_errors",
     ),
     "studies.user_filters": (
         *("config", *SUMS, "language", "module_sources", "studies.interface", "studies.plot_arrays"),
@@ -113,14 +114,14 @@ ROOMS = {
     ),
     "recordings": (
         *("recordings.fit", "recordings.formats", "recordings.registration", "recordings.report"),
-        *("api", "cli", "config", "engine.results", "extensions", "language", "report"),
+        *("api", "cli", "config", "extensions", "language", "report"),
         *("studies.plot_arrays", "studies.recording_interface", "studies.registry", "studies.user_filters"),
     ),
     "recordings.formats": ("recordings", "recordings.fit.folded_doppler", "language", "physics", "report"),
     "recordings.fit": ("recordings", "config", "language", "report", "studies.recording_interface"),
     "recordings.registration": ("recordings", "recordings.formats", "language", "report"),
     "recordings.report": (
-        *("recordings", "recordings.fit", "config", "engine.results", "language", "report", "report.drawing"),
+        *("recordings", "recordings.fit", "config", "language", "report", "report.drawing"),
         "studies.recording_interface",
     ),
     "papers": (  # adds itself by `extensions`; only the names for users import it
@@ -156,7 +157,10 @@ ROLES = {
     "figures": ((*DISPLAY, "report.drawing", "language"), DISPLAYED),
     "answer": ((*DISPLAY, "language"), (*DISPLAYED, "answer")),
     "chart": ((*DISPLAY, "report.drawing", "language"), (*COMPUTED, "figures")),
-    "tracking": ((*NUMBERS, "studies.noise", "studies.plot_arrays"), (*COMPUTED, "tracking")),
+    "tracking": (
+        (*NUMBERS, "studies.noise", "studies.plot_arrays", "studies.recording_interface"),
+        (*COMPUTED, "tracking"),
+    ),
     "plot_likelihood": ((*NUMBERS, "studies.recording_interface"), (*COMPUTED, "tracking")),
     "recorded_plots": (
         ("config.experiment", "constants", "studies.plot_arrays", "studies.recording_interface"),

@@ -11,8 +11,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.extensions import extension_figures, extensions
 from radarsim.language.current import ENGLISH, current_language
 from radarsim.language.translate import tr, translate_names
-from radarsim.report import answer_warnings, coinciding_lines, interval_notes, panel_layout, sentences
-from radarsim.report import captions as report_captions
+from radarsim.report import answer_warnings, caption_remarks, coinciding_lines, interval_notes, panel_layout, sentences
 from radarsim.report import tables as common
 from radarsim.report.drawing.model import Figure, reworded
 from radarsim.report.math_text import plain_text
@@ -184,7 +183,7 @@ def case_figures(
     translate = partial(translate_names, names=config_names(results))
     return {
         name: coinciding_lines.join_coinciding_lines(
-            reworded(report_captions.with_meaning_of_crosses(figure), translate)
+            reworded(caption_remarks.with_meaning_of_crosses(figure), translate)
         )
         for name, figure in figures_by_name.items()
     }

@@ -12,7 +12,7 @@ from radarsim.bursts.kernels.scoring import SIZE
 from radarsim.bursts.kernels.scoring import Z0 as SUM_Z
 from radarsim.bursts.kernels.sequence import OPTIONS, WINDOW
 from radarsim.bursts.kernels.signal import PHYSICS, block_table
-from radarsim.bursts.window_schedule import Designer, handover_directions
+from radarsim.bursts.schedule_design import Designer, handover_directions
 
 Blocks = Callable[[int], tuple[int, int, int]]
 # The sum at twice the frequency is left out of the likelihood where it is less of every window's samples than this, and

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from radarsim.config.error_list import ABSENT, KeyPath, Origin
+from radarsim.config.error_list import ABSENT, Origin
+from radarsim.config.error_text import KeyPath
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from pathlib import Path as FilePath
 
 from radarsim.config.common_keys import COMMON_KEYS, CommonKeys, Studies
 from radarsim.config.document import Document
-from radarsim.config.error_list import ABSENT, ErrorList, KeyPath, Origin, one_line
+from radarsim.config.error_list import ABSENT, ErrorList, Origin
+from radarsim.config.error_text import KeyPath, one_line
 from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern, swept_value_text
 from radarsim.config.find_files import available_stems, config_file, did_you_mean, is_stem, normalised_name
 from radarsim.config.inline_files import ReadDocument, inline_scenarios, resolve_data_files

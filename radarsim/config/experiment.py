@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any
 
-from radarsim.config.error_list import one_line, short_number
+from radarsim.config.error_text import one_line, short_number
 from radarsim.config.identity import all_keys
 
 

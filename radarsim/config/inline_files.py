@@ -5,7 +5,8 @@ from functools import cache
 from pathlib import Path as FilePath
 
 from radarsim.config.document import Document
-from radarsim.config.error_list import ErrorList, KeyPath, quoted_value
+from radarsim.config.error_list import ErrorList
+from radarsim.config.error_text import KeyPath, quoted_value
 from radarsim.config.find_files import available_stems, did_you_mean, is_stem, scenario_file
 from radarsim.config.marks import DataFile, Scenario
 from radarsim.config.model import Model

@@ -8,7 +8,8 @@ from types import MappingProxyType
 from typing import Any
 
 from radarsim.config.common_keys import Studies
-from radarsim.config.error_list import ErrorList, one_line
+from radarsim.config.error_list import ErrorList
+from radarsim.config.error_text import one_line
 from radarsim.config.experiment import Experiment
 from radarsim.config.find_files import RESERVED, config_file, is_reserved, is_stem
 from radarsim.config.load import load

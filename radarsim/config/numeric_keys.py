@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from radarsim.config.error_list import dotted
+from radarsim.config.error_text import dotted
 from radarsim.config.find_files import did_you_mean
 from radarsim.config.key_types import WholeNumber
 from radarsim.config.model import Model, annotation_parts, in_degrees, in_radians

@@ -4,7 +4,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from radarsim.config.document import Document
-from radarsim.config.error_list import ABSENT, ErrorList, KeyPath, Origin
+from radarsim.config.error_list import ABSENT, ErrorList, Origin
+from radarsim.config.error_text import KeyPath
 from radarsim.config.inline_files import ReadDocument, inline_scenarios
 from radarsim.config.model import in_degrees, in_radians
 from radarsim.config.study_keys import StudyKeys

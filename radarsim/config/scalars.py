@@ -7,7 +7,8 @@ import math
 import re
 from collections.abc import Mapping
 
-from radarsim.config.error_list import ErrorList, KeyPath, Origin
+from radarsim.config.error_list import ErrorList, Origin
+from radarsim.config.error_text import KeyPath
 
 NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 CONSTANTS = {"true": True, "false": False, "": None, "~": None, "null": None}

@@ -145,7 +145,7 @@ Baseline = Annotated[Name | None, DesignMark(), NameIn("filters")]
 BASELINE = key(
     "baseline filter", "filter against which gains are computed, or a list of several; default: the first", None
 )
-# For `Lasting` studies: the length of a run.
+# The length of a run, of `TimedStudyKeys`.
 SCANS = key("number of scans", "number of scans; or give duration_s", None)
 DURATION = key(
     "duration", "time from the first scan to the last, s, in place of scans: to the last scan within it", None

@@ -18,7 +18,7 @@ def keys_unknown_to(spec: Model, home: str) -> list[str]:
 
 
 def _unknown_keys(spec: Model, home: str, prefix: str) -> Iterator[str]:
-    """Those of `unknown_to` in a mapping whose own path is the prefix."""
+    """Those of `keys_unknown_to` in a mapping whose own path is the prefix."""
     bases = type(spec).__mro__
     known_model = next(
         (item for item in bases if issubclass(item, Model) and _is_known_module(item.__module__, home)), Model

@@ -10,7 +10,8 @@ from typing import Any
 import yaml
 
 from radarsim.config.document import Document
-from radarsim.config.error_list import ErrorList, KeyPath, Origin
+from radarsim.config.error_list import ErrorList, Origin
+from radarsim.config.error_text import KeyPath
 from radarsim.config.scalars import DEEPEST, NotFinite, from_text
 
 MAX_FILE_BYTES = 256_000  # bytes

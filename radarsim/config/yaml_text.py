@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Mapping
 
-from radarsim.config.error_list import short_number
+from radarsim.config.error_text import short_number
 
 PLAIN_TEXT = re.compile(r"[A-Za-z_][\w+ .*-]*")  # text that YAML reads as text without quotes
 RESERVED_WORDS = {"true", "false", "null", "yes", "no", "on", "off", "none"}

@@ -17,7 +17,7 @@ NO_HYPOTHESIS = -1e300  # logarithm of the weight of a place that holds no hypot
 MAX_SQUARED_DEVIATION = (
     80.0  # squared deviations, in variances, up to which folds are looked at: exp(-40) of the nearest's weight
 )
-COLUMNS = 11  # of `Lists`
+COLUMNS = 11  # of `HypothesisLists`
 INNOVATION, NEAR, FALL = 0, 1, 2  # columns of e, near and c behind the two lists
 
 

@@ -26,7 +26,8 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from radarsim import user_code_errors
 from radarsim.config.document import Document
-from radarsim.config.error_list import ErrorList, KeyPath, quoted_value
+from radarsim.config.error_list import ErrorList
+from radarsim.config.error_text import KeyPath, quoted_value
 from radarsim.config.find_files import did_you_mean
 from radarsim.config.key_types import Anything, Flag, Name, Stem
 from radarsim.config.model import Model

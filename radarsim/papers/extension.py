@@ -26,19 +26,19 @@ class UntilDecided:
     help = "Run until each claim of the config is decided, at most N realisations."
 
     def check(self, experiment: "Experiment") -> None:
-        from radarsim.papers import decide
+        from radarsim.papers import run_until_decided
 
-        decide.check_config_has_claims(experiment)
+        run_until_decided.check_config_has_claims(experiment)
 
     def simulate(self, experiment: "Experiment", options: "RunOptions", progress: Any) -> "SimulatedCases":
-        from radarsim.papers import decide
+        from radarsim.papers import run_until_decided
 
-        return decide.simulate_until_decided(experiment, options, progress)
+        return run_until_decided.simulate_until_decided(experiment, options, progress)
 
     def unmet(self, experiment: "Experiment", simulated: "SimulatedCases") -> list[str]:
-        from radarsim.papers import decide
+        from radarsim.papers import run_until_decided
 
-        return decide.undecided_messages(experiment, simulated)
+        return run_until_decided.undecided_messages(experiment, simulated)
 
 
 class PapersExtension(Extension):

@@ -12,7 +12,9 @@ from radarsim.cli.options import Count, config_argument, set_option
 from radarsim.language.translate import plural, tr
 
 if TYPE_CHECKING:
-    from radarsim.engine.results import Track
+    from radarsim.studies.recording_interface import Track
+
+    pass
 
 
 @main.command()

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from radarsim.engine.results import Track
 from radarsim.report.atomic_files import Writer
+from radarsim.studies.recording_interface import Track
 
 
 def track_header(track: Track, has_track_name: bool = False) -> tuple[str, ...]:

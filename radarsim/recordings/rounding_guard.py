@@ -8,8 +8,7 @@ filter that has lost its target magnifies any difference by itself."""
 
 import numpy as np
 
-from radarsim.engine.results import Track
-from radarsim.studies.recording_interface import Tracker
+from radarsim.studies.recording_interface import Track, Tracker
 
 TIME_STRETCH = 1 + 2.0**-33
 # permitted changes by stretched times: of σ, in σ, in probability

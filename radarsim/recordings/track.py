@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from numpy.linalg import LinAlgError
 
 from radarsim.config.experiment import Case, Experiment
-from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, PlotFault
 from radarsim.recordings import read_plots
 from radarsim.recordings.rounding_guard import RoundingGuard
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.track_rows import split_by_track
 from radarsim.recordings.tracking_result import ErrorSums, InnovationTally, TrackingResult
+from radarsim.studies.recording_interface import Track
 from radarsim.threads import mapping
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from radarsim.engine.results import Track
 from radarsim.recordings import grouping, read_plots
+from radarsim.studies.recording_interface import Track
 
 ROW_ARRAYS = ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma")  # arrays (F, n, …)
 

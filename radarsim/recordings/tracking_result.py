@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Track
 from radarsim.recordings.positions import PlotPositions, ThinnedRows
 from radarsim.recordings.study_part import recording_interface
 from radarsim.recordings.track_rows import join_tracks, select_rows
 from radarsim.studies.plot_arrays import true_column
+from radarsim.studies.recording_interface import Track
 
 GAP_INTERVALS = 3.0  # in median intervals
 START_ESTIMATES = 10  # of a filter, which are not compared with the truth

@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import plural, tr
-from radarsim.report import captions
+from radarsim.report import caption_remarks
 from radarsim.report.key_labels import (
     config_device,
     config_stem,
@@ -114,7 +114,7 @@ def left_out_remark(all_names: Sequence[str], shown_names: Sequence[str]) -> str
     fields = {
         "count": len(all_names) - len(missing),
         "all": len(all_names),
-        "names": captions.join_few_names(map(without_markup, missing), MAX_MISSING_NAMES),
+        "names": caption_remarks.join_few_names(map(without_markup, missing), MAX_MISSING_NAMES),
     }
     return " " + tr("Shown: {count} of {all}; only in the tables: {names}.", **fields)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import tr
-from radarsim.report import captions
+from radarsim.report import caption_remarks
 from radarsim.report.case_selection import MAX_MISSING_NAMES
 from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Style
 from radarsim.report.key_labels import (
@@ -94,7 +94,8 @@ def loss_lines(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
     visible = tuple(line for line in losses if (line.y > 0).any())
     names = [without_markup(line.name or line.label) for line in losses if not (line.y > 0).any()]
     remark = (
-        " " + tr("Zero throughout, so not drawn: {names}.", names=captions.join_few_names(names, MAX_MISSING_NAMES))
+        " "
+        + tr("Zero throughout, so not drawn: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
         if names
         else ""
     )

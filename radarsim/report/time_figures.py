@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import term, tr
-from radarsim.report import captions
+from radarsim.report import caption_remarks
 from radarsim.report import tables as common
 from radarsim.report.case_selection import (
     MAX_PANELS,
@@ -148,7 +148,7 @@ def _with_remark_on_losses(figure: Figure) -> Figure:
     """A figure of gains, with a remark in its caption where losses are cut."""
     if not any(panel.y.limits[0] == -CUT_LOSS_PERCENT for panel in figure.panels):
         return figure
-    names = captions.lines_below(figure, -CUT_LOSS_PERCENT)
+    names = caption_remarks.lines_below(figure, -CUT_LOSS_PERCENT)
     remark = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=CUT_LOSS_PERCENT, names=names)
     return replace(figure, caption=f"{figure.caption} {remark}")
 

@@ -106,7 +106,7 @@ def list_numbers(numbers: Iterable[str]) -> str:
 
 
 def split_clauses(sentence: str) -> list[str]:
-    """A sentence's parts between semicolons; one within brackets or between numbers (`in_a_row`) does not separate.
+    """A sentence's parts between semicolons; one within brackets or between numbers (`list_numbers`) does not separate.
 
     >>> split_clauses("locked in 12 % [11; 13] (of 5; 6 lost); lost in 88 %")
     ['locked in 12 % [11; 13] (of 5; 6 lost)', 'lost in 88 %']

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from radarsim.engine.results import Track
 from radarsim.studies.linear_design import period
-from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, usual_interval_s
+from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, Track, usual_interval_s
 
 if TYPE_CHECKING:
     from radarsim.studies.linear import LinearStudy

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -12,7 +13,36 @@ if TYPE_CHECKING:
     import numpy as np
 
     from radarsim.config.experiment import Case
-    from radarsim.engine.results import Track
+
+
+@dataclass(frozen=True)
+class Track:
+    """Estimates over recorded plots, F filters at n times: the output of `radarsim track`.
+
+    t_s (n,); estimate and sigma (F, n, C), NaN where a filter has none, in the components' units; probability (F, n, M)
+    of a filter's models, NaN beyond its own, or None where the study has no models.
+
+    For checks of the stated accuracies, if the study gives them: residual (F, n, D), plot minus estimate, of the
+    measured (name, unit), and residual_sigma (F, n, D), its σ predicted by the filter; nis (F, n, Q), the squared
+    innovation over its predicted variance, of the tested (name, degrees of freedom); NaN where there is no plot or no
+    freedom.
+
+    Where filters find several tracks, a filter is listed once for each: numbers (F,) identify them, score (F, n) is the
+    logarithm of the likelihood ratio that the track is a target's."""
+
+    filters: tuple[str, ...]
+    components: tuple[tuple[str, str], ...]
+    t_s: "np.ndarray"
+    estimate: "np.ndarray"
+    sigma: "np.ndarray"
+    probability: "np.ndarray | None" = None
+    measured: tuple[tuple[str, str], ...] = ()
+    residual: "np.ndarray | None" = None
+    tested: tuple[tuple[str, int], ...] = ()
+    nis: "np.ndarray | None" = None
+    numbers: "np.ndarray | None" = None
+    score: "np.ndarray | None" = None
+    residual_sigma: "np.ndarray | None" = None
 
 
 class Tracker(Protocol):

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from radarsim.engine.results import Track
 from radarsim.errors import PlotFault
 from radarsim.kernels import tracing
+from radarsim.studies.recording_interface import Track
 from radarsim.studies.step_checks import check_length, check_same_shape, record, step_numbers, variances
 from radarsim.user_code_errors import study_context, user_code_error
 

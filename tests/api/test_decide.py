@@ -6,7 +6,7 @@ import pytest
 
 import radarsim
 from radarsim.papers import claims_table
-from radarsim.papers.decide import _undecided_rows as undecided_rows
+from radarsim.papers.run_until_decided import _undecided_rows as undecided_rows
 from radarsim.papers.verdict_rule import CONFIRMED, UNDECIDED
 from tests.program import command
 

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from radarsim.config.error_list import ErrorList, Origin, quoted_value, short_number
+from radarsim.config.error_list import ErrorList, Origin
+from radarsim.config.error_text import quoted_value, short_number
 from radarsim.config.scalars import NotFinite, from_python, from_text
 from radarsim.errors import ConfigError
 

@@ -174,11 +174,13 @@ def forms(message):
 
 def test_names_with_commas_stay_one_name_in_a_row():
     """`cured, gated` is one filter, not two: in questions, captions and warnings."""
-    from radarsim.report import answer_warnings, captions
+    from radarsim.report import answer_warnings, caption_remarks
 
     names = ["sequence", "cured", "cured, gated", "dense"]
     assert (
-        translate.shorten_names(names) == captions.join_few_names(names) == "sequence, cured, “cured, gated” and dense"
+        translate.shorten_names(names)
+        == caption_remarks.join_few_names(names)
+        == "sequence, cured, “cured, gated” and dense"
     )
     assert answer_warnings.few_realisations_warning([SimpleNamespace(name=one, count=9) for one in names]) == [
         "sequence, cured, “cured, gated” and dense: intervals from 9 realisations are rough: run at least 200"

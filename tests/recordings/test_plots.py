@@ -6,10 +6,10 @@ import stat
 import numpy as np
 import pytest
 
-from radarsim.engine.results import Track
 from radarsim.errors import ConfigError, StoreError
 from radarsim.recordings import csv_rows, read_plots
 from radarsim.report.atomic_files import Writer
+from radarsim.studies.recording_interface import Track
 from tests.recordings import whole
 
 CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))

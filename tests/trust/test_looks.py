@@ -20,12 +20,12 @@ from radarsim.engine import results
 from radarsim.engine.dispatch import CollectedSums
 from radarsim.engine.results import Axes
 from radarsim.engine.sums import Layout
-from radarsim.papers import decide
+from radarsim.papers import run_until_decided
 from radarsim.papers.claim import Claim, PaperClaims, Part
 from radarsim.papers.claim_outcome import claim_outcome
-from radarsim.papers.decide import simulate_until_decided
 from radarsim.papers.evidence import Evidence, MissingEvidence
 from radarsim.papers.expected_ranges import ExpectedRange
+from radarsim.papers.run_until_decided import simulate_until_decided
 from radarsim.papers.verdict_rule import (
     CONFIRMED,
     MAX_LOOKS,
@@ -125,7 +125,7 @@ def test_runs_that_decide_refute_few_claims_that_are_true_at_the_border(monkeypa
         ]
 
     monkeypatch.setattr(simulate_cases, "simulate", simulated)
-    monkeypatch.setattr(decide, "_claim_rows", rows_of)
+    monkeypatch.setattr(run_until_decided, "_claim_rows", rows_of)
     for _ in range(runs):
         means = walk(rng, most, len(borders))
         ended = simulate_until_decided(experiment, RunOptions(out="nowhere"))

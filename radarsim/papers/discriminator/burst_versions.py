@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from radarsim.bursts.window_schedule import MAX_WINDOWS
+from radarsim.bursts.schedule_design import MAX_WINDOWS
 
 Phase = Literal["left out of the form", "left out of the problem", "kept"]
 Curvature = Literal["next", "as printed", "before"]

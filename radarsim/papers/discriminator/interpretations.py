@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from radarsim.bursts import window_schedule
+from radarsim.bursts import schedule_design
 from radarsim.config.experiment import Case
 from radarsim.papers.claim import Claim, PaperClaims, Part
 from radarsim.papers.claim_files import load_choices
@@ -218,7 +218,7 @@ class ExactEvidence(measures.Evidence):
     def worst_handover(self, key: Any) -> Estimate:
         """The largest probability over the hand-overs that Z passes c, by its own law; the last one is cut short."""
         weights = burst_versions.handover_weights(BURST, self._version, windows(self._version)[:-1])
-        return exact_number(max(window_schedule.tail_probability(form_weights, self._lobe) for form_weights in weights))
+        return exact_number(max(schedule_design.tail_probability(form_weights, self._lobe) for form_weights in weights))
 
     def phase_offsets(self, key: Any) -> np.ndarray:
         return burst_versions.phase_offsets(BURST, self._version, windows(self._version))

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.bursts import fisher as bursts_fisher
-from radarsim.bursts import window_schedule
+from radarsim.bursts import schedule_design
 from radarsim.bursts.burst import balanced_inverse
 from radarsim.engine.results import CaseResult
 from radarsim.papers.evidence import Evidence as GeneralEvidence
@@ -131,18 +131,18 @@ class Evidence(GeneralEvidence):
         designer, times = self._designer(key)
         threshold = designer.condition.threshold
         forms = [designer.handover(before)(after) for before, after in pairwise(times[:-1])]  # the last is cut short
-        return exact_number(max(window_schedule.tail_probability(form.values, threshold) for form in forms))
+        return exact_number(max(schedule_design.tail_probability(form.values, threshold) for form in forms))
 
-    def _designer(self, key: str) -> tuple[window_schedule.Designer, np.ndarray]:
+    def _designer(self, key: str) -> tuple[schedule_design.Designer, np.ndarray]:
         """What designed the sequence, and its windows in s."""
         result, i = self.case(key), self.estimator(key, "sequence")
         burst, condition = (
             scenario.configured_burst(result.spec),
-            window_schedule.Condition(threshold=INTERPRETATIONS[key][1]),
+            schedule_design.Condition(threshold=INTERPRETATIONS[key][1]),
         )
         fisher = partial(bursts_fisher.fisher, burst, len(COMPONENTS))
         times = burst.pulse_period_s * np.array(result.axes.pulses[i])
-        return window_schedule.Designer(burst, result.axes.prior_sigma, fisher, condition), times
+        return schedule_design.Designer(burst, result.axes.prior_sigma, fisher, condition), times
 
     def phase_offsets(self, key: str) -> np.ndarray:
         """How far the best phase lies from the start's, rad, one σ: from the forecast, then at each hand-over."""

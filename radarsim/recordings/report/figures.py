@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.engine.results import Track
 from radarsim.language.translate import tr
 from radarsim.recordings.positions import PlotPositions
 from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.report import case_selection, coinciding_lines, key_labels
 from radarsim.report.drawing.model import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.statistics import Z95, normalised_bounds
+from radarsim.studies.recording_interface import Track
 
 PLOT_STYLE = Style(GREY, None, 0, size_pt=1.6)
 BOUND_STYLE = Style(GREY, 1, width_pt=0.8)

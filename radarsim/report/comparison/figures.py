@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from radarsim.language.translate import term, tr
-from radarsim.report import captions
+from radarsim.report import caption_remarks
 from radarsim.report.case_selection import MAX_CASES, left_out_remark
 from radarsim.report.comparison.pairs import Side
 from radarsim.report.comparison.table import comparison_rows, filters_of, shared_quantities
@@ -76,7 +76,7 @@ def _figure(
         )
     ) + left_out_remark([side.label for side in compared_sides], [side.label for side in visible])
     figure = Figure(name, tr("{what} side by side", what=axis_text), caption, panels, 2, PAGE_MM, HEIGHT_MM)
-    return captions.with_meaning_of_crosses(figure)
+    return caption_remarks.with_meaning_of_crosses(figure)
 
 
 def _values(quantity: Quantity, side: Side, n: int, filters: Sequence[str], component: str, model: str) -> list[Mark]:

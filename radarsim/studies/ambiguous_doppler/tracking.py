@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Track
 from radarsim.errors import PlotFault
 from radarsim.studies.ambiguous_doppler.axes import COMPONENTS
 from radarsim.studies.ambiguous_doppler.followers import RowResult, make_follower
 from radarsim.studies.ambiguous_doppler.kernels import realisations
 from radarsim.studies.ambiguous_doppler.study import prepare
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
+from radarsim.studies.recording_interface import Track
 
 COLUMNS = ("t_s", "range_m", "velocity_mps")
 SPAN = "span_mps"  # an optional column: the span by which each velocity is ambiguous

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from radarsim.bursts import block_sums, estimators, fisher, window_schedule
+from radarsim.bursts import block_sums, estimators, fisher, schedule_design
 from radarsim.bursts import burst as model
 from radarsim.bursts.kernels import sequence as kernels
 from radarsim.bursts.kernels import sequence_lanes, signal
@@ -16,11 +16,11 @@ from radarsim.engine.results import Axes
 from radarsim.engine.sums import Layout
 from radarsim.errors import ConfigError
 from radarsim.studies.discriminator.config import Estimator, Keys
+from radarsim.studies.discriminator.estimator_windows import schedule_windows, window_designer
 from radarsim.studies.discriminator.importance_sampling import NoLoss, mixture, weighted_estimates
 from radarsim.studies.discriminator.kernels import sums as kernels_sums
 from radarsim.studies.discriminator.kernels import weights
 from radarsim.studies.discriminator.scenario import Phase, configured_burst, forecast, true_phase
-from radarsim.studies.discriminator.window_design import schedule_windows, window_designer
 from radarsim.studies.noise import noise_key
 
 COMPONENTS = (("phi0", "rad"), ("f0", "Hz"), ("f1", "Hz/s"), ("f2", "Hz/s2"), ("f3", "Hz/s3"), ("f4", "Hz/s4"))
@@ -87,7 +87,7 @@ def prepare(case: Case) -> Plan:
     """Schedules, block sums' law, step matrices and bounds of a case."""
     try:
         return make_plan(case)
-    except window_schedule.NoSchedule as error:
+    except schedule_design.NoSchedule as error:
         raise ConfigError(f"{case.name}: estimators: no designed schedule: {error}") from None
     except np.linalg.LinAlgError:
         raise ConfigError(f"{case.name}: prior: too wide, equations (15) and (16) cannot be solved") from None
@@ -99,7 +99,7 @@ def make_plan(case: Case) -> Plan:
     burst, mode = configured_burst(spec), engine_mode(spec)
     phase, sigma = true_phase(spec, burst), forecast(spec, burst)
     size = len(sigma)
-    designer = window_designer(burst, sigma, window_schedule.Condition())  # of forms, which no condition enters
+    designer = window_designer(burst, sigma, schedule_design.Condition())  # of forms, which no condition enters
     windows = schedule_windows(spec, burst, sigma)
     all_windows = sorted({w for estimator_windows in windows for w in estimator_windows})
     image = estimators.has_image(burst, sigma, all_windows, phase.turns)

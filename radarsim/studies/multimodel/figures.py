@@ -13,7 +13,16 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, term, tr
-from radarsim.report import captions, case_selection, figure_lines, key_labels, math_text, panel_layout, tables, wording
+from radarsim.report import (
+    caption_remarks,
+    case_selection,
+    figure_lines,
+    key_labels,
+    math_text,
+    panel_layout,
+    tables,
+    wording,
+)
 from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 
@@ -273,7 +282,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
 def _with_paper_number(figure: Figure | None, results: Sequence[CaseResult], number: str) -> Figure | None:
     """The figure with its number in the paper, if it is of the paper's experiment."""
     is_of_paper = figure is not None and all(result.name == "multimodel" for result in results)
-    return captions.with_figure_number(figure, number) if figure and is_of_paper else figure
+    return caption_remarks.with_figure_number(figure, number) if figure and is_of_paper else figure
 
 
 def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:

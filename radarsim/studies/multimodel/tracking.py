@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Track
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Filter, Keys
@@ -18,6 +17,7 @@ from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_
 from radarsim.studies.multimodel.scenario import true_states as scan_times
 from radarsim.studies.multimodel.study import COMPONENTS, banks, prepare
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
+from radarsim.studies.recording_interface import Track
 
 CHUNK_ROWS = 4096  # recorded plots filtered at a time
 TESTED = (("plot", 3),)

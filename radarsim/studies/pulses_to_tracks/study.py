@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.bursts.burst import Burst
 from radarsim.bursts.fisher import energy_ratio
 from radarsim.bursts.kernels.scoring import SIZE
-from radarsim.bursts.window_schedule import NoSchedule
+from radarsim.bursts.schedule_design import NoSchedule
 from radarsim.config.experiment import Case
 from radarsim.engine.sums import Layout
 from radarsim.errors import ConfigError

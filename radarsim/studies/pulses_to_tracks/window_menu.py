@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.bursts import window_schedule
+from radarsim.bursts import schedule_design
 from radarsim.bursts.burst import Burst
 from radarsim.bursts.fisher import fisher
 from radarsim.physics.motion import process_noise, transition
@@ -52,16 +52,16 @@ def theta_spreads(burst: Burst, size: int, spreads: tuple[float, float]) -> np.n
     return np.array([UNKNOWN_RAD, *(2.0 / burst.wavelength_m * np.array([at_start, acceleration]))])[:size]
 
 
-def designer(burst: Burst, size: int, spreads: tuple[float, float]) -> window_schedule.Designer:
+def designer(burst: Burst, size: int, spreads: tuple[float, float]) -> schedule_design.Designer:
     """The designer of a forecast's windows: by the paper's Gaussian tail, P_Δ = 0.99, c = 1."""
     sigma = theta_spreads(burst, size, spreads)
-    return window_schedule.Designer(burst, sigma, partial(fisher, burst, size), window_schedule.Condition())
+    return schedule_design.Designer(burst, sigma, partial(fisher, burst, size), schedule_design.Condition())
 
 
 def sequence_windows(burst: Burst, options: Any, spreads: tuple[float, float]) -> tuple[int, ...]:
     """The windows in pulses of a filter's sequence; raises NoSchedule if there are none."""
     lengths = designer(burst, parameter_count(options), spreads).windows()
-    return tuple(window_schedule.densify(lengths, 2) if options.estimator == "dense" else lengths)
+    return tuple(schedule_design.densify(lengths, 2) if options.estimator == "dense" else lengths)
 
 
 def window_menu(burst: Burst, options: Any, widest: tuple[float, float]) -> Menu:

@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language.translate import tr
 from radarsim.report import (
-    captions,
+    caption_remarks,
     case_selection,
     consistency_figures,
     figure_lines,
@@ -46,7 +46,7 @@ def figures(
     figures_by_name = time_figures.component_figures(results, tables_by_name, RADIAL, experiment)
     if experiment.stem == PAPER_CONFIG:
         figures_by_name |= {
-            name: captions.with_figure_number(figures_by_name[name], FIGURE_NUMBERS[name])
+            name: caption_remarks.with_figure_number(figures_by_name[name], FIGURE_NUMBERS[name])
             for name in figures_by_name
             if name in FIGURE_NUMBERS
         }

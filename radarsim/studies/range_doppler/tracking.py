@@ -7,7 +7,6 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.config.radial_keys import MAX_SCANS
-from radarsim.engine.results import Track
 from radarsim.kernels import second_order
 from radarsim.kernels.kalman_algebra import pack, unpack
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
@@ -18,6 +17,7 @@ from radarsim.studies.range_doppler.filter_design import least_squares, noise_by
 from radarsim.studies.range_doppler.kernels import missed_block, recorded_rows
 from radarsim.studies.range_doppler.package_filters import GivenGains, Scans, filter_recorded
 from radarsim.studies.range_doppler.study import COMPONENTS, prepare
+from radarsim.studies.recording_interface import Track
 
 START_RANGES = 3  # ranges of a track from which its state is found, in the likelihood
 MAX_START_PLOTS = 200  # plots in which a start is looked for; a file of velocities alone never has one

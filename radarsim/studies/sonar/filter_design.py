@@ -16,7 +16,7 @@ import numpy as np
 from radarsim.kernels.kalman_algebra import pack, unpack
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.studies.sonar.detector_arrays import AdaptiveRule, ModelPair
-from radarsim.studies.sonar.kernels import kalman, least_squares, small_matrices
+from radarsim.studies.sonar.kernels import kalman, least_squares, normal_equations
 from radarsim.studies.sonar.plot_errors import step_correlations
 
 
@@ -116,7 +116,7 @@ def window_weights(plots: Plots, k: int, length: int, size: int) -> tuple[int, n
     A = np.stack([np.ones_like(since), since, since**2 / 2], axis=1)
     times = Plots(plots.t[first : k + 1], w, plots.period, plots.sigma).moments()[:, -1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        P = unpack(small_matrices.leading_inverse(pack(np.einsum("mn,ni,nj->mij", w, A, A)), np.minimum(times, size)))
+        P = unpack(normal_equations.leading_inverse(pack(np.einsum("mn,ni,nj->mij", w, A, A)), np.minimum(times, size)))
     P[~np.isfinite(P).all(axis=(1, 2))] = 0.0  # weights so unequal that one plot alone counts: no rate is known
     scale = plots.period ** -np.arange(3.0)
     weights = np.einsum("i,mij,nj,mn->min", scale, P, A, w)

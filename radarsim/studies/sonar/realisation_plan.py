@@ -10,7 +10,7 @@ from radarsim.engine.sums import Layout
 from radarsim.studies.sonar import filter_banks, filter_design
 from radarsim.studies.sonar.axes import GivenPlotsAxes
 from radarsim.studies.sonar.block_sums import empty_sums, flatten_errors, pack_sums, shapes
-from radarsim.studies.sonar.exact import exact_values
+from radarsim.studies.sonar.exact_errors import exact_values
 from radarsim.studies.sonar.kernel_inputs import designs, kernel_conversion, kernel_detections, kernel_world
 from radarsim.studies.sonar.kernels import detector, plots, realisation_gains
 from radarsim.studies.sonar.kernels import world as kernels_world

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Track
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
+from radarsim.studies.recording_interface import Track
 from radarsim.studies.sonar import conversion, detector_arrays, filter_banks, filter_design, kernel_inputs, labels
 from radarsim.studies.sonar.config import Keys
-from radarsim.studies.sonar.kernels import detector, imm, realisation_gains, small_matrices, steps, windows
+from radarsim.studies.sonar.kernels import chunks, detector, imm, realisation_gains, steps, windows
 from radarsim.studies.sonar.scene import build_scene, filter_specs, third_coordinate
 
 MAX_ROWS = 200_000  # of a file: the designs of all rows are held in memory
@@ -185,18 +185,15 @@ def estimate_recorded(
     F, C, n = len(specs), len(z), len(t)
     detectors = detector_arrays.detector_arrays([], filter_banks.needed_tests(specs), np.zeros(n, dtype=np.int64), C)
     bank = filter_banks.per_realisation_bank(specs, t, period, sigma, detectors)
-    x, Y, further_rows = (np.zeros((F, C, rows, small_matrices.CHUNK)) for rows in (4, 8, imm.ROWS))
-    memory = steps.Filters(x, Y, further_rows, np.empty((6, small_matrices.CHUNK)))
-    recent, T = (
-        np.zeros((C, 3, bank.memory, small_matrices.ROW)),
-        np.zeros((len(detectors.plots), C + 1, small_matrices.CHUNK)),
-    )
-    count = np.zeros((C, small_matrices.CHUNK))
+    x, Y, further_rows = (np.zeros((F, C, rows, chunks.CHUNK)) for rows in (4, 8, imm.ROWS))
+    memory = steps.Filters(x, Y, further_rows, np.empty((6, chunks.CHUNK)))
+    recent, T = (np.zeros((C, 3, bank.memory, chunks.ROW)), np.zeros((len(detectors.plots), C + 1, chunks.CHUNK)))
+    count = np.zeros((C, chunks.CHUNK))
     estimates, covariances = np.zeros((F, n, C, 3)), np.zeros((F, n, C, 3, 3))
     scale = period ** -np.arange(3.0)
     packed = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
     for k, dt in enumerate(np.diff(t, prepend=t[0])):
-        plot, w = (np.repeat(values[:, k : k + 1], small_matrices.CHUNK, axis=1) for values in (z, weight))
+        plot, w = (np.repeat(values[:, k : k + 1], chunks.CHUNK, axis=1) for values in (z, weight))
         previous_count, count = count, count + (w > 0)
         for c in range(C if bank.memory else 0):
             windows.remember_plots(recent[c], plot[c], w[c], dt / period)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from radarsim.bursts import block_sums, estimators, window_schedule
+from radarsim.bursts import block_sums, estimators, schedule_design
 from radarsim.bursts import fisher as bursts_fisher
 from radarsim.bursts.burst import Burst
 from tests.studies.discriminator import naive as naive
@@ -23,19 +23,19 @@ PRINTED_PRIOR = np.array([6.1, 67.5, 6.1e3, 183.38e3, 2.426e6])
 def designer(burst=COMPUTED, sigma=None, **condition):
     fisher = partial(bursts_fisher.fisher, burst, 5)
     sigma = bursts_fisher.spreads(fisher(burst.duration_s)) * TIMES if sigma is None else sigma
-    return window_schedule.Designer(burst, sigma, fisher, window_schedule.Condition(**condition))
+    return schedule_design.Designer(burst, sigma, fisher, schedule_design.Condition(**condition))
 
 
 def test_paper_pairs_three_sigma_with_its_probability():
-    assert window_schedule.spread_factor(0.99) == 3.0
-    assert window_schedule.spread_factor(0.9) < 3.0 < window_schedule.spread_factor(0.999)
+    assert schedule_design.spread_factor(0.99) == 3.0
+    assert schedule_design.spread_factor(0.9) < 3.0 < schedule_design.spread_factor(0.999)
 
 
 @pytest.mark.parametrize(("weights", "threshold"), [([1], 0.1), ([1], 60), ([2, 2], 5), ([0.5] * 5, 1), ([1e6], 1)])
 def test_tail_of_equal_weights_is_chi_square(weights, threshold):
     expected = chi2.sf(threshold / weights[0], len(weights))
     # To the 10⁻¹² that it states; weights of 10⁶ move the pole, at 0, beside the path.
-    found = window_schedule.tail_probability(np.array(weights, float), threshold)
+    found = schedule_design.tail_probability(np.array(weights, float), threshold)
     assert found == pytest.approx(expected, rel=1e-12)
 
 
@@ -43,7 +43,7 @@ def test_tail_of_unequal_weights_against_sampling():
     weights, rng = np.array([0.19, 0.05, 2e-3, 1e-7]), np.random.default_rng(1)
     n = 2_000_000
     share = np.mean(rng.standard_normal((n, 4)) ** 2 @ weights > 1.0)
-    expected = window_schedule.tail_probability(weights, 1.0)
+    expected = schedule_design.tail_probability(weights, 1.0)
     assert share == pytest.approx(expected, abs=share_error(expected, n))
 
 
@@ -55,7 +55,7 @@ def test_gaussian_condition_is_equation_14():
     # The twin's error is a difference of inverses; of the form, 1 is taken off.
     twin, condition = naive.handover_form(one, other, mu), scaled_condition(np.stack([one, other])).max()
     assert_rounded(
-        window_schedule.excess(values, d.condition), twin - 1.0, size=twin, condition=condition, operations=25
+        schedule_design.excess(values, d.condition), twin - 1.0, size=twin, condition=condition, operations=25
     )
 
 
@@ -80,14 +80,14 @@ def test_each_designed_window_is_the_longest_safe_one():
     windows = d.windows()
     for a, b in itertools.pairwise(windows[:-1]):
         form = d.handover(a * period)
-        shorter, longer = (window_schedule.excess(form(after * period).values, d.condition) for after in (b - 1, b + 1))
+        shorter, longer = (schedule_design.excess(form(after * period).values, d.condition) for after in (b - 1, b + 1))
         assert shorter < 0 < longer
 
 
 def losses(d, windows):
     """The probability of each hand-over's loss, as the form's tail has it."""
     forms = [d.handover(a * 1e-5)(b * 1e-5) for a, b in itertools.pairwise(windows)]
-    return [window_schedule.tail_probability(form.values, 1.0) for form in forms]
+    return [schedule_design.tail_probability(form.values, 1.0) for form in forms]
 
 
 def test_hand_overs_of_the_paper_are_less_safe_than_designed():
@@ -117,10 +117,10 @@ def test_a_perfect_forecast_needs_one():
 
 
 def test_density_puts_windows_at_geometric_means():
-    assert window_schedule.densify([100, 400, 30000], 2) == [100, 200, 400, 3464, 30000]
-    assert window_schedule.densify([100, 800], 3) == [100, 200, 400, 800]
-    assert window_schedule.densify([5, 6], 2) == [5, 6]  # no room between
-    assert len(window_schedule.densify(designer().windows(), 2)) == 25
+    assert schedule_design.densify([100, 400, 30000], 2) == [100, 200, 400, 3464, 30000]
+    assert schedule_design.densify([100, 800], 3) == [100, 200, 400, 800]
+    assert schedule_design.densify([5, 6], 2) == [5, 6]  # no room between
+    assert len(schedule_design.densify(designer().windows(), 2)) == 25
 
 
 def test_direction_is_the_leading_error_of_a_handover():
@@ -128,7 +128,7 @@ def test_direction_is_the_leading_error_of_a_handover():
     d = designer()
     windows = d.windows()
     k, period = 6, 1e-5
-    direction = window_schedule.handover_directions(d, windows)[k]
+    direction = schedule_design.handover_directions(d, windows)[k]
     information, mu = d.posterior(windows[k] * period)
     mean_square = direction @ information @ direction / (2 * mu)
     assert_rounded(mean_square, 1.0, condition=scaled_condition(information), operations=25)

@@ -8,7 +8,7 @@ import pytest
 
 from radarsim.api.configs import load
 from radarsim.bursts import fisher as bursts_fisher
-from radarsim.bursts import window_schedule
+from radarsim.bursts import schedule_design
 from radarsim.engine.results import CaseResult
 from radarsim.papers.discriminator.burst_versions import PRINTED_PRIOR
 from radarsim.papers.discriminator.interpretations import ExactEvidence, Interpretations, windows
@@ -55,14 +55,14 @@ def test_the_probability_of_a_miss_is_that_of_the_prepared_case(cases):
         spec, axes = cases[noise].spec, result.axes
         burst = scenario.configured_burst(spec)
         fisher = partial(bursts_fisher.fisher, burst, 5)
-        condition = window_schedule.Condition(threshold=float(taken.get("threshold", "0.5")))
-        designer = window_schedule.Designer(burst, axes.prior_sigma, fisher, condition)
+        condition = schedule_design.Condition(threshold=float(taken.get("threshold", "0.5")))
+        designer = schedule_design.Designer(burst, axes.prior_sigma, fisher, condition)
         times = burst.pulse_period_s * np.array(axes.pulses[0])
         forms = [designer.handover(before)(after).values for before, after in pairwise(times[:-1])]
         # Forms are of inverses; a tail of 0.02 changes by some four times the relative change of its weights.
         known = np.diag(bursts_fisher.phase_prior(axes.prior_sigma))
         allowed = 4 * rounding(max(scaled_condition(fisher(t) + known) for t in times), 25)
-        wanted = max(window_schedule.tail_probability(form, condition.threshold) for form in forms)
+        wanted = max(schedule_design.tail_probability(form, condition.threshold) for form in forms)
         assert ExactEvidence(OF.interpretation(**taken)).worst_handover("any").value == pytest.approx(
             wanted, rel=allowed
         )

@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.bursts import burst as model
 from radarsim.bursts import fisher as bursts_fisher
-from radarsim.bursts.window_schedule import Condition, Designer
+from radarsim.bursts.schedule_design import Condition, Designer
 from radarsim.papers.discriminator import burst_versions
 from radarsim.papers.discriminator.burst_versions import BURST, PRINTED_PRIOR, Version
 from tests.tolerances import rounding, scaled_condition

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarsim.studies.sonar import closed_forms, exact, filter_design, least_squares, plot_errors
+from radarsim.studies.sonar import closed_forms, exact_errors, filter_design, least_squares, plot_errors
 from tests.studies.sonar.precision import TERMS, assert_covariances_rounded
 from tests.tolerances import assert_rounded
 
@@ -49,7 +49,7 @@ def test_recursion_of_true_errors_is_that_of_the_weights(rho, size):
         filter_design.design_recursion(plots, size, 0.6, 1e-4),
         filter_design.design_recursion(plots, size, 0.0, 1e-3, 0, filter_design.settled_gain(5.0, 30.0, size, 1e-3)),
     ):
-        bias, S = exact.recursive_errors(design.gain, design.carry, t, truth, steps, np.full(12, 30.0), 0.0)
+        bias, S = exact_errors.recursive_errors(design.gain, design.carry, t, truth, steps, np.full(12, 30.0), 0.0)
         for m in range(4):
             W = np.array(unit_weights(design, t, m))
             for k in range(size - 1, 12):
@@ -80,10 +80,10 @@ def test_walk_of_velocity_by_both_ways_of_reckoning():
     plots = filter_design.Plots(t, np.ones((1, 9)), 5.0, 30.0)
     truth = np.zeros((9, 3))
     design = filter_design.design_recursion(plots, 2)
-    _, S = exact.recursive_errors(design.gain, design.carry, t, truth, np.zeros(9), np.full(9, 30.0), walk)
+    _, S = exact_errors.recursive_errors(design.gain, design.carry, t, truth, np.zeros(9), np.full(9, 30.0), walk)
     first, W, _ = filter_design.window_weights(plots, 8, 9, 2)
     C = plot_errors.error_covariance(np.full(9, 30.0), 0.0, t, 5.0)
-    _, other = exact.weighted_errors(W, first, t, truth, C, walk, first)
+    _, other = exact_errors.weighted_errors(W, first, t, truth, C, walk, first)
     assert_covariances_rounded(S[0, 1:], np.concatenate([S[0, 1:8], other]))
 
 

@@ -112,7 +112,7 @@ def accumulate_losses(errors, options, potential, posterior, weights, losses):
             for i in range(n):
                 for lock in range(len(LOCKS)):
                     if lock_flags[i, k, lock] == 0.0:
-                        # As `add_weight`, which is compiled to other last digits here.
+                        # As `mixtures.add_event_weight`, which is compiled to other last digits here.
                         losses[f, k, lock, 0] += weights[i]
                         losses[f, k, lock, 1] += weights[i] * weights[i]
                         losses[f, k, lock, 2] += 1.0

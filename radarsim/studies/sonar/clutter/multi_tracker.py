@@ -11,7 +11,7 @@ import numpy as np
 from radarsim.studies.sonar.clutter.kernels import gate as kernels_gate
 from radarsim.studies.sonar.clutter.kernels import track_prediction, track_rules, track_update
 from radarsim.studies.sonar.clutter.tracker_design import Conditions, TrackerSpec, trackers
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK
+from radarsim.studies.sonar.kernels.chunks import CHUNK
 
 
 @dataclass

@@ -25,7 +25,7 @@ from radarsim.studies.sonar.clutter.kernels.rare_ends import END_KINDS, EndSums,
 from radarsim.studies.sonar.clutter.kernels.tracker import Trackers, workspace
 from radarsim.studies.sonar.clutter.target_detections import detected_plots
 from radarsim.studies.sonar.config import Keys
-from radarsim.studies.sonar.exact import exact_values
+from radarsim.studies.sonar.exact_errors import exact_values
 from radarsim.studies.sonar.kernels.plots import Detections
 from radarsim.studies.sonar.scene import Scene, build_scene, filter_specs
 

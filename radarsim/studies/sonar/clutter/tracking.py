@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.results import Track
 from radarsim.errors import ConfigError
 from radarsim.studies.noise import noise_key
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
+from radarsim.studies.recording_interface import Track
 from radarsim.studies.sonar import kernel_inputs, labels
 from radarsim.studies.sonar.clutter import tracker_design
 from radarsim.studies.sonar.clutter.multi_tracker import confirmed_tracks

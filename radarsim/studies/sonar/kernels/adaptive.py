@@ -13,8 +13,9 @@ from radarsim.kernels import kalman_algebra, lane_matrices, lanes
 from radarsim.kernels.compiler import inline
 from radarsim.kernels.lane_matrices import choose3, choose6, get6, put3, put6
 from radarsim.kernels.lanes import address, full, get, where_greater
+from radarsim.studies.sonar.kernels.chunks import GROUPS
 from radarsim.studies.sonar.kernels.detector import UNTESTED, parabola
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS, leading_inverse
+from radarsim.studies.sonar.kernels.normal_equations import leading_inverse
 from radarsim.studies.sonar.kernels.steps import memory_addresses
 
 MODE, QUIET, PLOTS = range(3)  # further rows of an adaptive filter's memory; PLOTS: number of plots that it uses

@@ -14,8 +14,9 @@ import numpy as np
 
 from radarsim.kernels.compiler import inline, kernel, kernel_part
 from radarsim.kernels.lanes import address, full, get, put, total, where_greater
-from radarsim.studies.sonar.kernels import small_matrices
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS, leading_inverse
+from radarsim.studies.sonar.kernels import normal_equations
+from radarsim.studies.sonar.kernels.chunks import GROUPS
+from radarsim.studies.sonar.kernels.normal_equations import leading_inverse
 
 UNTESTED = -1.0  # the statistic where there was no test: it exceeds no threshold
 
@@ -45,7 +46,7 @@ def parabola(recent, length, longest, i):
 
     Relative to the newest plot the sums lose no digits."""
     newest = get(recent, i)
-    Y, b = small_matrices.normal_equations(recent, length, longest, i, newest, 0.5)
+    Y, b = normal_equations.normal_equations(recent, length, longest, i, newest, 0.5)
     return Y, b, newest
 
 

@@ -19,8 +19,9 @@ from radarsim.kernels.compiler import inline
 from radarsim.kernels.lane_matrices import choose3, choose6, get6, put3, put6
 from radarsim.kernels.lanes import full, get, put, where_greater
 from radarsim.studies.sonar.kernels import steps
+from radarsim.studies.sonar.kernels.chunks import GROUPS
+from radarsim.studies.sonar.kernels.kalman import manoeuvre_covariance
 from radarsim.studies.sonar.kernels.least_squares import least_squares
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS, manoeuvre_covariance
 from radarsim.studies.sonar.kernels.steps import memory_addresses
 
 # Further rows of the filter's memory: states of both models, covariances of both, probabilities of both.

@@ -7,7 +7,6 @@ from radarsim.kernels.compiler import inline
 from radarsim.kernels.lane_matrices import choose3, choose6
 from radarsim.kernels.lanes import full, where_greater
 from radarsim.studies.sonar.kernels.least_squares import NOTHING_NEW
-from radarsim.studies.sonar.kernels.small_matrices import manoeuvre_covariance
 
 KALMAN_GAIN = (0.0, 0.0, 0.0)  # instead of a fixed gain
 
@@ -20,6 +19,14 @@ class Model(NamedTuple):
     c: float  #: correlation
     q: float  #: manoeuvre variance
     gain: tuple[float, float, float]  #: of a filter of fixed gain, else KALMAN_GAIN
+
+
+@inline
+def manoeuvre_covariance(q, tau, size):
+    """Q (6) of a random derivative of order `size` and variance q, constant over tau."""
+    half = 0.5 * tau * tau
+    g = (half, tau, 0.0) if size == 2 else (tau * half / 3.0, half, tau)
+    return kalman_algebra.add_outer(kalman_algebra.NO_NOISE, q, g)
 
 
 @inline

@@ -3,7 +3,7 @@
 from radarsim.kernels import kalman_algebra
 from radarsim.kernels.compiler import inline
 from radarsim.kernels.lanes import full, where_greater
-from radarsim.studies.sonar.kernels.small_matrices import leading_inverse
+from radarsim.studies.sonar.kernels.normal_equations import leading_inverse
 
 NOTHING_NEW = 1e-12  # of a plot's variance: less is rounding
 

@@ -2,7 +2,7 @@
 
 from radarsim.kernels.compiler import kernel_part
 from radarsim.kernels.lanes import address, full, get, total
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS
+from radarsim.studies.sonar.kernels.chunks import GROUPS
 
 
 @kernel_part

@@ -13,10 +13,10 @@ from radarsim.kernels.compiler import kernel, kernel_part
 from radarsim.kernels.lanes import address
 from radarsim.studies.sonar.kernels import adaptive as kernels_adaptive
 from radarsim.studies.sonar.kernels import detector, imm, mode_sums
+from radarsim.studies.sonar.kernels.chunks import ROW, copy_row
 from radarsim.studies.sonar.kernels.kalman import Model
 from radarsim.studies.sonar.kernels.plots import convert, count_plots, detect
 from radarsim.studies.sonar.kernels.shared_gains import CHUNK, Sums
-from radarsim.studies.sonar.kernels.small_matrices import ROW, copy_row
 from radarsim.studies.sonar.kernels.steps import Filters, Plots, update_recursive
 from radarsim.studies.sonar.kernels.sums import Course, add_ahead, add_sums, rows_of
 from radarsim.studies.sonar.kernels.windows import fit_window, remember_plots

@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.kernels.compiler import inline, kernel, kernel_part, summing_kernel
 from radarsim.kernels.kalman_algebra import constant_acceleration, predict_state
-from radarsim.studies.sonar.kernels.small_matrices import copy_row
+from radarsim.studies.sonar.kernels.chunks import copy_row
 from radarsim.studies.sonar.kernels.world import move_and_measure
 
 CHUNK = 512

@@ -28,9 +28,9 @@ from radarsim.kernels import kalman_algebra, lane_matrices
 from radarsim.kernels.compiler import inline
 from radarsim.kernels.lane_matrices import get4, put4, put6
 from radarsim.kernels.lanes import address, get
+from radarsim.studies.sonar.kernels.chunks import GROUPS
 from radarsim.studies.sonar.kernels.kalman import kalman
 from radarsim.studies.sonar.kernels.least_squares import least_squares
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS
 
 
 class Filters(NamedTuple):

@@ -17,7 +17,8 @@ from radarsim.kernels.compiler import inline, kernel_part
 from radarsim.kernels.kalman_algebra import dot, times
 from radarsim.kernels.lane_matrices import get6
 from radarsim.kernels.lanes import address, full, get, total, where_greater
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS, leading_inverse
+from radarsim.studies.sonar.kernels.chunks import GROUPS
+from radarsim.studies.sonar.kernels.normal_equations import leading_inverse
 
 
 class Course(NamedTuple):

@@ -4,7 +4,8 @@ from radarsim.kernels import kalman_algebra, lane_matrices
 from radarsim.kernels.compiler import inline, kernel
 from radarsim.kernels.lane_matrices import put6
 from radarsim.kernels.lanes import address, full, get, put, where_greater
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS, PITCH, leading_inverse, normal_equations
+from radarsim.studies.sonar.kernels.chunks import GROUPS, PITCH
+from radarsim.studies.sonar.kernels.normal_equations import leading_inverse, normal_equations
 from radarsim.studies.sonar.kernels.steps import memory_addresses
 
 

@@ -16,7 +16,7 @@ from radarsim.studies.sonar import STUDY
 from radarsim.studies.sonar.clutter import plots, tables, tracker_design
 from radarsim.studies.sonar.clutter.kernels import track_sums
 from radarsim.studies.sonar.clutter.kernels.outside_gate import probability_outside_gate
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK
+from radarsim.studies.sonar.kernels.chunks import CHUNK
 from radarsim.studies.sonar.kernels.world import move_and_measure
 from tests.studies.sonar.clutter import naive_ends
 from tests.studies.sonar.clutter.test_rare import assert_weights_rounded, words_of

@@ -37,7 +37,7 @@ from radarsim.studies.sonar.clutter.kernels.track_sums import (
     PLOTS_IN_GATE_COUNT,
     TARGET_PLOT_COUNT,
 )
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK
+from radarsim.studies.sonar.kernels.chunks import CHUNK
 
 
 @inline

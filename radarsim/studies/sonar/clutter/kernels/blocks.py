@@ -31,8 +31,8 @@ from radarsim.studies.sonar.clutter.kernels.track_sums import (
     add_scores,
 )
 from radarsim.studies.sonar.clutter.kernels.tracker import Scan, Target, reset_tracks, step_tracker, tracks_of_tracker
+from radarsim.studies.sonar.kernels.chunks import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.plots import detect
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.sums import Course, add_ahead, rows_of
 from radarsim.studies.sonar.kernels.world import move_and_measure
 

@@ -37,7 +37,7 @@ from radarsim.studies.sonar.clutter.kernels import gate as kernels_gate
 from radarsim.studies.sonar.clutter.kernels.outside_gate import probability_outside_gate
 from radarsim.studies.sonar.clutter.kernels.rare_boxes import MAX_BOX_MEAN, MAX_RATIO, associate_in_box, gate_box
 from radarsim.studies.sonar.clutter.kernels.rare_false_tracks import LAW
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK, copy_row
+from radarsim.studies.sonar.kernels.chunks import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.world import move_and_measure
 
 YOUNG_SCANS = 3.0  # a track is young in the scans of the rule that confirms it, and in so many more

@@ -32,7 +32,7 @@ from radarsim.studies.sonar.clutter.kernels.rare_end_laws import (
     write_young_errors,
 )
 from radarsim.studies.sonar.clutter.kernels.rare_false_tracks import LAW
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK
+from radarsim.studies.sonar.kernels.chunks import CHUNK
 from radarsim.studies.sonar.kernels.sums import Course
 
 END_KINDS = 4  # the last two: a false plot came into the gate of the young track, but not in place of the target's

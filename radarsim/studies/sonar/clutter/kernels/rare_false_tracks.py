@@ -30,7 +30,7 @@ from radarsim.studies.sonar.clutter.kernels import (
 )
 from radarsim.studies.sonar.clutter.kernels import gate as kernels_gate
 from radarsim.studies.sonar.clutter.kernels.rare_boxes import MAX_BOX_MEAN, MAX_RATIO, associate_in_box, gate_box
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK
+from radarsim.studies.sonar.kernels.chunks import CHUNK
 
 NO_PLOT = (0.0, 0.0, 0.0)  # of the target
 # Rows of the state of importance sampling of a false track: the law that it is drawn from; the ratios so far of the

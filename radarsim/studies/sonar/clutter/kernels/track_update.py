@@ -13,8 +13,8 @@ from radarsim.studies.sonar.clutter.kernels.track_prediction import (
     predict_line_covariance,
 )
 from radarsim.studies.sonar.kernels import steps
+from radarsim.studies.sonar.kernels.chunks import GROUPS
 from radarsim.studies.sonar.kernels.least_squares import least_squares
-from radarsim.studies.sonar.kernels.small_matrices import GROUPS
 from radarsim.studies.sonar.kernels.steps import get_information
 
 

@@ -16,7 +16,7 @@ from radarsim.studies.sonar.clutter.kernels.gate import PDA, AssociationRule
 from radarsim.studies.sonar.clutter.kernels.track_prediction import Tracks, predict
 from radarsim.studies.sonar.clutter.kernels.track_rules import FIRST, ROWS
 from radarsim.studies.sonar.clutter.kernels.track_update import update
-from radarsim.studies.sonar.kernels.small_matrices import CHUNK
+from radarsim.studies.sonar.kernels.chunks import CHUNK
 
 
 class Trackers(NamedTuple):

@@ -1,13 +1,9 @@
-"""Chunks of realisations, and small matrices of eight realisations at a time."""
+"""Normal equations of a polynomial through recent plots, and the inverse of their matrix."""
 
 from radarsim.kernels import kalman_algebra
-from radarsim.kernels.compiler import inline, kernel_part
-from radarsim.kernels.lanes import WIDTH, full, get, where_greater
-
-CHUNK = 512  # realisations, as in `shared_gains`
-GROUPS = CHUNK // WIDTH
-PITCH = GROUPS + 1  # of the rows of recent plots: rows 4 KiB apart would all use the same few lines of the cache
-ROW = PITCH * WIDTH
+from radarsim.kernels.compiler import inline
+from radarsim.kernels.lanes import full, get, where_greater
+from radarsim.studies.sonar.kernels.chunks import PITCH
 
 
 @inline
@@ -46,18 +42,3 @@ def normal_equations(recent, length, longest, i, origin, half):
         h = (1.0, zero - age, half * age * age)
         Y, b = kalman_algebra.add_outer(Y, w, h), kalman_algebra.add_scaled(b, w * z, h)
     return Y, b
-
-
-@kernel_part
-def copy_row(source, target):
-    """Copy a row (CHUNK,); an assignment to a slice has Numba compile texts of errors for seconds."""
-    for i in range(target.size):
-        target[i] = source[i]
-
-
-@inline
-def manoeuvre_covariance(q, tau, size):
-    """Q (6) of a random derivative of order `size` and variance q, constant over tau."""
-    half = 0.5 * tau * tau
-    g = (half, tau, 0.0) if size == 2 else (tau * half / 3.0, half, tau)
-    return kalman_algebra.add_outer(kalman_algebra.NO_NOISE, q, g)

@@ -5,20 +5,20 @@ from functools import lru_cache, partial
 import numpy as np
 
 from radarsim.bursts import burst as model
-from radarsim.bursts import fisher, window_schedule
+from radarsim.bursts import fisher, schedule_design
 from radarsim.studies.discriminator.config import Keys
 
 
 def window_designer(
-    burst: model.Burst, sigma: np.ndarray, condition: window_schedule.Condition
-) -> window_schedule.Designer:
+    burst: model.Burst, sigma: np.ndarray, condition: schedule_design.Condition
+) -> schedule_design.Designer:
     """The designer of a burst's windows under a forecast sigma (size,)."""
-    return window_schedule.Designer(burst, sigma, partial(fisher.fisher, burst, len(sigma)), condition)
+    return schedule_design.Designer(burst, sigma, partial(fisher.fisher, burst, len(sigma)), condition)
 
 
 @lru_cache(maxsize=64)
 def designed_windows(
-    burst: model.Burst, sigma: tuple[float, ...], condition: window_schedule.Condition
+    burst: model.Burst, sigma: tuple[float, ...], condition: schedule_design.Condition
 ) -> tuple[int, ...]:
     """Windows in pulses of one condition, designed once: of many cases that differ elsewhere they are the same."""
     return tuple(window_designer(burst, np.array(sigma), condition).windows())
@@ -32,9 +32,9 @@ def schedule_windows(spec: Keys, burst: model.Burst, sigma: np.ndarray) -> list[
             windows_by_estimator.append([burst.pulses])
             continue
         if e.schedule == "designed":
-            condition = window_schedule.Condition(e.lock_probability, e.main_lobe_threshold, e.tail)
+            condition = schedule_design.Condition(e.lock_probability, e.main_lobe_threshold, e.tail)
             windows = list(designed_windows(burst, tuple(sigma.tolist()), condition))
         else:
             windows = sorted({burst.pulses_in(duration) for duration in e.schedule})
-        windows_by_estimator.append(window_schedule.densify(windows, e.density)[: e.first_windows])
+        windows_by_estimator.append(schedule_design.densify(windows, e.density)[: e.first_windows])
     return windows_by_estimator
