@@ -13,8 +13,8 @@ from collections import defaultdict
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.forked_programs import Start
 from tests.variables import CLEARED
-from tests.warm import Start
 
 # Folders, in the order in which their groups begin; what is short is left for the end, where processes wait.
 LONG = ("studies", "trust", "cli", "app", "engine", "docs", "report", "language", "kernels", "recorded")

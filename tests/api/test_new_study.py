@@ -1,6 +1,6 @@
 """`radarsim new-study` writes a package under a name that nothing has, and never over anything.
 
-That the package works is tested by tests/studies/test_outside.py.
+That the package works is tested by tests/studies/test_package_studies.py.
 """
 
 import pytest

@@ -13,7 +13,7 @@ from radarsim.cli.command_group import main
 from radarsim.engine.collect import collect
 from radarsim.report.quantities import FLOORS
 from radarsim.studies import registry
-from tests.cli.test_stopped import ended_by
+from tests.cli.test_interrupts import ended_by
 from tests.program import command
 
 MANOEUVRE = ("sonar_manoeuvre", "--case", "sonar_manoeuvre target.acceleration_mps2=0.4")

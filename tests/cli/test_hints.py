@@ -5,7 +5,7 @@ import pytest
 from radarsim.api import configs
 from radarsim.errors import ConfigError
 from tests.program import command
-from tests.recordings import whole
+from tests.recordings import plot_files
 from tests.recordings.test_plots import CHOICES, faults
 
 COLUMNS = "plots.csv:1: must have the columns t_s, range_m, bearing_rad or t_s, x_m, y_m; got "
@@ -21,7 +21,7 @@ def test_a_raw_file_is_shown_the_way(tmp_path, sign, shown, monkeypatch):
     assert line == f"{COLUMNS}{given}; ranges and positions with other names, separators or units: {command_given}"
     monkeypatch.chdir(tmp_path)
     command(*command_given.split()[1:], "--column", "t_s=Zeit")
-    assert list(whole.read(tmp_path / "imported.csv", CHOICES)["range_m"]) == [20500, 20400]
+    assert list(plot_files.read(tmp_path / "imported.csv", CHOICES)["range_m"]) == [20500, 20400]
 
 
 def test_a_decimal_comma_is_told(tmp_path):

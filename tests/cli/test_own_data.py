@@ -23,7 +23,7 @@ from radarsim.recordings import csv_rows, read_plots, simulate_plots, study_part
 from radarsim.recordings.report import innovation_tests
 from radarsim.studies.range_doppler import tracking
 from tests.program import command
-from tests.recordings import whole
+from tests.recordings import plot_files
 from tests.tolerances import Z, assert_rounded, rounding
 
 RUNS = {  # config, overrides
@@ -66,7 +66,7 @@ def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, con
     columns = simulate_plots.simulate_realisation(one, realisation)
     path = tmp_path / "plots.csv"
     csv_rows.write_columns(columns, path)
-    case, track = whole.track(one, path)
+    case, track = plot_files.track(one, path)
     work = CaseWork(case)
     sums = work.plan.layout.unpack(work.simulate(realisation, 1))
     at = np.asarray(work.plan.axes.k) - 1
@@ -95,9 +95,9 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
             tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
         ]
         parts = track_rows.join_tracks(pieces)
-        scale = np.where(whole.sigma > 0, whole.sigma, 1.0)
-        assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(whole.estimate))
-        assert np.nanmax(np.abs(parts.estimate - whole.estimate) / scale) < track_rounding(whole)
+        scale = np.where(plot_files.sigma > 0, plot_files.sigma, 1.0)
+        assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(plot_files.estimate))
+        assert np.nanmax(np.abs(parts.estimate - plot_files.estimate) / scale) < track_rounding(whole)
 
 
 def test_uneven_times_and_missing_values_are_least_squares_without_a_manoeuvre():

@@ -216,7 +216,7 @@ def process(*arguments, **options):
 
 
 def test_output_that_cannot_be_written_and_output_that_nobody_reads(tmp_path):
-    """More states of the streams: tests/cli/test_surroundings.py."""
+    """More states of the streams: tests/cli/test_environments.py."""
     shell, options = f"{sys.executable} -m radarsim list", {"capture_output": True, "env": newcomer(tmp_path)}
     full = subprocess.run(f"{shell} > /dev/full", shell=True, check=False, **options)
     assert (full.returncode, full.stderr) == (4, b"output: cannot be written: No space left on device\n")

@@ -14,7 +14,7 @@ from radarsim.recordings.report import figures, page, sentences
 from radarsim.report import page as report_page
 from radarsim.report.drawing.model import Line, Note
 from tests.program import command
-from tests.recordings import whole
+from tests.recordings import plot_files
 from tests.tolerances import assert_rounded, share_error
 
 
@@ -43,7 +43,7 @@ def test_residuals_lie_between_their_bounds(tmp_path, config):
     more = more.get(config, ())
     one, inside, count = loaded(config, *more), 0, 0
     for i in range(12):
-        _, track = whole.track(one, written(tmp_path / "plots.csv", simulate_plots.simulate_realisation(one, i)))
+        _, track = plot_files.track(one, written(tmp_path / "plots.csv", simulate_plots.simulate_realisation(one, i)))
         share = np.abs(track.residual[:, 10:]) / track.residual_sigma[:, 10:]
         share = share[np.isfinite(share)]
         inside, count = inside + int((share < 2).sum()), count + share.size

@@ -10,7 +10,7 @@ from radarsim.errors import ConfigError, StoreError
 from radarsim.recordings import csv_rows, read_plots
 from radarsim.report.atomic_files import Writer
 from radarsim.studies.recording_interface import Track
-from tests.recordings import whole
+from tests.recordings import plot_files
 
 CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))
 
@@ -18,7 +18,7 @@ CHOICES = (("t_s", "range_m", "bearing_rad"), ("t_s", "x_m", "y_m"))
 def read(tmp_path, text):
     path = tmp_path / "plots.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return whole.read(path, CHOICES)
+    return plot_files.read(path, CHOICES)
 
 
 def faults(tmp_path, text):
@@ -105,7 +105,7 @@ def test_times_that_do_not_rise_may_be_of_several_tracks(tmp_path):
 
 def test_a_missing_file(tmp_path):
     with pytest.raises(ConfigError, match=r"nothing\.csv: cannot be read: No such file"):
-        whole.read(tmp_path / "nothing.csv", CHOICES)
+        plot_files.read(tmp_path / "nothing.csv", CHOICES)
 
 
 def test_a_track_is_written_row_by_row(tmp_path):
@@ -119,7 +119,7 @@ def test_a_track_is_written_row_by_row(tmp_path):
         probability=np.array([[[0.25, 0.75], [0.5, 0.5]], [[1.0, nan], [1.0, nan]]]),
     )
     path = tmp_path / "track.csv"
-    whole.write(track, path)
+    plot_files.write(track, path)
     assert path.read_text() == (
         "t_s,filter,component,unit,estimate,sigma,probability_1,probability_2\n"
         "0.0,one,r,m,1.0,0.5,0.25,0.75\n"
@@ -134,7 +134,7 @@ def test_a_track_is_written_row_by_row(tmp_path):
 def test_an_unwritable_place(tmp_path):
     track = Track(("one",), (("r", "m"),), np.zeros(1), np.zeros((1, 1, 1)), np.ones((1, 1, 1)))
     with pytest.raises(StoreError, match="cannot be written"):
-        whole.write(track, tmp_path / "no folder" / "track.csv")
+        plot_files.write(track, tmp_path / "no folder" / "track.csv")
 
 
 def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path, monkeypatch):
@@ -147,7 +147,7 @@ def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path, mon
     path.write_text("t_s,range_m,bearing_rad\n0,9000,1\n1e-6,9000,1\n1e7,9000,1\n")
     (config,) = load_experiments.load_all(["sonar_smoothing"])
     with pytest.raises(ConfigError, match=r"plots\.csv:4: t_s: after a gap of 1e\+07 s .* split the file here"):
-        whole.track(config, path)
+        plot_files.track(config, path)
 
     def without_solution(tracker, columns):
         raise LinAlgError
@@ -156,7 +156,7 @@ def test_intervals_that_no_filter_can_take_are_a_fault_of_the_file(tmp_path, mon
         type(study_part.recording_interface(config.cases[0]).tracker(config.cases[0])), "feed", without_solution
     )
     with pytest.raises(ConfigError, match=r"plots\.csv: t_s: intervals so different"):
-        whole.track(config, path)
+        plot_files.track(config, path)
 
 
 def test_an_existing_file_keeps_its_mode_and_a_new_one_heeds_the_umask(tmp_path):

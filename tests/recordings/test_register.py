@@ -22,7 +22,7 @@ from radarsim.recordings.formats.records import BIASES
 from radarsim.recordings.formats.sites import Site, parse_sites
 from radarsim.recordings.registration import bias_fit, register, sentences
 from radarsim.report.statistics import Z95
-from tests.recordings.formats.made import block, plot_048, position_021
+from tests.recordings.formats.example_files import block, plot_048, position_021
 from tests.tolerances import rounding, share_error, sigma_error
 
 NONE = (0.0, 0.0, 0.0, 0.0)

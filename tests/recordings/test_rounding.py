@@ -9,7 +9,7 @@ from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 from radarsim.recordings import csv_rows, rounding_guard, simulate_plots, study_part, track_rows
 from radarsim.recordings.rounding_guard import RoundingGuard, differing_rows
-from tests.recordings import whole
+from tests.recordings import plot_files
 from tests.tolerances import rounding
 
 SCANS = 14
@@ -63,7 +63,7 @@ def file_with(tmp_path, steps):
 @pytest.mark.parametrize("gap", [10, 100, 1000, 5000, 10_000])
 def test_sigma_after_a_gap_is_that_of_exact_arithmetic(tmp_path, gap):
     one = load("rls2")
-    _, track = whole.track(one, file_with(tmp_path, [gap, 10, 10]))
+    _, track = plot_files.track(one, file_with(tmp_path, [gap, 10, 10]))
     for f, options in enumerate(one.cases[0].spec.filters):
         expected = exact(len(options.observes), options.initial_scans, [gap, 10, 10])
         np.testing.assert_allclose(
@@ -75,12 +75,12 @@ def test_sigma_after_a_gap_is_that_of_exact_arithmetic(tmp_path, gap):
 @pytest.mark.parametrize("gap", [1e6, 1e7, 1e8, 1e9, 1e10, 1e12])
 def test_a_gap_that_leaves_no_digits_ends_the_track_with_its_place(tmp_path, gap, after):
     with pytest.raises(ConfigError, match=rf"plots\.csv:{SCANS + 2}: t_s: after a gap of .* s .*split the file here"):
-        whole.track(load("rls2"), file_with(tmp_path, [gap] + [10] * after))
+        plot_files.track(load("rls2"), file_with(tmp_path, [gap] + [10] * after))
 
 
 def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):
     """A file without long intervals, whose range fails for a long time: the filter of ranges counts its own gap."""
-    columns = whole.read(file_with(tmp_path, [1000] * 100 + [10]), (("t_s", "range_m", "velocity_mps"),))
+    columns = plot_files.read(file_with(tmp_path, [1000] * 100 + [10]), (("t_s", "range_m", "velocity_mps"),))
     columns["range_m"][SCANS:-1] = np.nan
     (case,) = load("rls2").cases
     study = study_part.recording_interface(case)
@@ -111,9 +111,9 @@ def test_other_studies_print_nothing_that_is_lost(tmp_path, config, overrides, g
     csv_rows.write_columns({n: c for n, c in columns.items() if not n.startswith("true_")}, tmp_path / "plots.csv")
     if lost:
         with pytest.raises(ConfigError, match=r"plots\.csv:.* t_s: "):
-            whole.track(one, tmp_path / "plots.csv")
+            plot_files.track(one, tmp_path / "plots.csv")
     else:
-        _, track = whole.track(one, tmp_path / "plots.csv")
+        _, track = plot_files.track(one, tmp_path / "plots.csv")
         known = np.isfinite(track.estimate)
         assert (track.sigma[known] >= 0).all()
         assert (track.sigma[..., 0][known[..., 0]] > 0).all()
@@ -121,7 +121,7 @@ def test_other_studies_print_nothing_that_is_lost(tmp_path, config, overrides, g
 
 def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
     one = load("rls2")
-    columns = whole.read(file_with(tmp_path, [1e7, 10, 10]), (("t_s", "range_m", "velocity_mps"),))
+    columns = plot_files.read(file_with(tmp_path, [1e7, 10, 10]), (("t_s", "range_m", "velocity_mps"),))
     (case,) = one.cases
     study = study_part.recording_interface(case)
     for size in (1, 5, 14, 100):
@@ -136,7 +136,7 @@ def test_pieces_of_a_file_lose_their_digits_where_the_whole_does(tmp_path):
 
 
 def test_tracks_differ_by_sigma_estimate_or_an_impossible_sigma(tmp_path):
-    _, track = whole.track(load("rls2"), file_with(tmp_path, [10]))
+    _, track = plot_files.track(load("rls2"), file_with(tmp_path, [10]))
     assert not differing_rows(track, track).any()
     for name, value in (("sigma", np.nan), ("sigma", 0.0), ("estimate", np.nan), ("estimate", 7.0)):
         other = track_rows.select_rows(track, np.arange(SCANS + 1))

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from tests.studies import outside
+from tests.studies import example_packages
 
 WHOLE = """
 from radarsim.studies.interface import Study
@@ -51,17 +51,17 @@ def radarsim(tmp_path_factory, warm):
     folder = tmp_path_factory.mktemp("broken")
     site = folder / "site"
     for name, (source, _) in PACKAGES.items():
-        outside.metadata(site, f"pack-{name}", "2.0", {name: f"module_of_{name}:STUDY"})
+        example_packages.metadata(site, f"pack-{name}", "2.0", {name: f"module_of_{name}:STUDY"})
         if source is not None:
             (site / f"module_of_{name}.py").write_text(source)
     for number in (1, 2):
-        outside.metadata(site, f"pack-twice{number}", "2.0", {"twice": "module_of_typed:STUDY"})
-    outside.metadata(site, "pack-shipping", "2.0", {"shipping": "packed.study:STUDY"})
+        example_packages.metadata(site, f"pack-twice{number}", "2.0", {"twice": "module_of_typed:STUDY"})
+    example_packages.metadata(site, "pack-shipping", "2.0", {"shipping": "packed.study:STUDY"})
     (site / "packed" / "shipped" / "configs").mkdir(parents=True)
     (site / "packed" / "__init__.py").write_text("raise ImportError('no numba here')")
     (site / "packed" / "shipped" / "configs" / "packed_slopes.yaml").write_text("study: shipping\nrealisations: 9\n")
-    outside.metadata(site, "pack-thief", "2.0", {"sonar": "module_of_typed:STUDY"})
-    return outside.beside(warm, site, folder)
+    example_packages.metadata(site, "pack-thief", "2.0", {"sonar": "module_of_typed:STUDY"})
+    return example_packages.beside(warm, site, folder)
 
 
 @pytest.mark.slow

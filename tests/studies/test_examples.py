@@ -13,9 +13,9 @@ import pytest
 from radarsim import user_code_errors
 from radarsim.api.design.solve import TARGET_TOLERANCE
 from tests.program import csv_bytes
-from tests.studies import outside
+from tests.studies import example_packages
 
-EXAMPLES = outside.ROOT / "examples"
+EXAMPLES = example_packages.ROOT / "examples"
 N = 5000  # a whole block and a partial one
 
 
@@ -25,14 +25,14 @@ def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("examples")
     for example in sorted(EXAMPLES.iterdir()):
         if (example / "pyproject.toml").is_file():
-            outside.installed(example, folder / "site")
+            example_packages.installed(example, folder / "site")
     return folder
 
 
 @pytest.fixture(scope="module")
 def radarsim(place, warm):
     """The real command, beside the installed packages."""
-    return outside.beside(warm, place / "site", place)
+    return example_packages.beside(warm, place / "site", place)
 
 
 LINES = {"chirp": 113, "bearings": 191, "learned": 247}  # at most, of its file, without imports
@@ -158,8 +158,8 @@ def test_the_bearings_questions_and_recorded_plots(radarsim, tmp_path):
 def copied(tmp_path, warm):
     """The command beside a copy of an example, and the file to edit."""
     shutil.copytree(EXAMPLES / "chirp", tmp_path / "chirp")
-    outside.installed(tmp_path / "chirp", tmp_path / "site")
-    return outside.beside(warm, tmp_path / "site", tmp_path), tmp_path / "chirp/src/chirp/__init__.py"
+    example_packages.installed(tmp_path / "chirp", tmp_path / "site")
+    return example_packages.beside(warm, tmp_path / "site", tmp_path), tmp_path / "chirp/src/chirp/__init__.py"
 
 
 FAULTS = {  # what is put into the file: what is said, and whether the tables are written

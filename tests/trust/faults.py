@@ -64,7 +64,7 @@ def reseeded(case: Any, seed: int = 1) -> Any:
 P1_STUDY = "studies/range_doppler/test_study.py"
 OTHER_NOISE = "trust/test_faults.py::test_seeds_and_streams_have_noise_of_their_own"
 P1_EXACT = "studies/range_doppler/test_exact.py"
-OTHER_SEED = "studies/test_every.py::test_a_case_is_the_same_elsewhere_and_another_with_another_seed"
+OTHER_SEED = "studies/test_all_studies.py::test_a_case_is_the_same_elsewhere_and_another_with_another_seed"
 IDENTITY = "config/test_identity.py::test_labels_and_spelt_out_defaults_change_nothing"
 
 
@@ -206,17 +206,17 @@ def rows_under_another_component(right):
     return lambda result, c: right(result, len(result.axes.components) - 1 - c)
 
 
-@fault("report.interval_notes:is_exact", "report/test_notes.py::test_no_note_stands_beside_an_exact_value")
+@fault("report.interval_notes:is_exact", "report/test_row_notes.py::test_no_note_stands_beside_an_exact_value")
 def notes_beside_exact_values(right):
     return lambda table: right(table) & False
 
 
-@fault("papers.verdict_rule:widening_factor", "report/test_claims_rule.py::test_level_is_of_all_parts")
+@fault("papers.verdict_rule:widening_factor", "report/test_verdict_rule.py::test_level_is_of_all_parts")
 def each_part_judged_as_if_alone(right):
     return lambda parts: right(1)
 
 
-@fault("papers.verdict_rule:judged_interval", "report/test_claims_rule.py::test_exact_first")
+@fault("papers.verdict_rule:judged_interval", "report/test_verdict_rule.py::test_exact_first")
 def exact_values_judged_by_their_sample(right):
     return lambda part, parts=1: right(dataclasses.replace(part, exact=float("nan")), parts)
 

@@ -37,10 +37,10 @@ PROCESSORS = {
     "old": Processor("generic", "Prescott", tuple(FEATURES)),  # SSE2: no fused multiply-add
 }
 # Folders of tests that compare computed numbers: the others are of texts, files and processes.
-NUMERICAL = ("app", "kernels", "physics", "recorded", "report", "studies", "trust")
+NUMERICAL = ("api", "kernels", "physics", "recordings", "report", "studies", "trust")
 # Of them, what reaches most formulas in least time, 100 s of a processor: primitives, designs, exact values, and
 # bursts, in whose searches roundings grow.
-PRIMITIVES = ("test_algebra.py", "test_lanes.py", "test_linear.py", "test_random.py", "test_traced.py")
+PRIMITIVES = ("test_algebra.py", "test_lanes.py", "test_linear.py", "test_random.py", "test_tracing.py")
 DESIGNS = ("test_exact.py", "test_filters.py", "test_closed_form.py", "test_recursion.py")
 BURSTS = ("discriminator/test_kernels.py", "pulses_to_tracks/test_kernels.py")
 

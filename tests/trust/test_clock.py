@@ -10,7 +10,7 @@ import pytest
 
 import radarsim
 from radarsim.report.csv_text import to_csv
-from tests.warm import Start
+from tests.forked_programs import Start
 
 # The time of day, as every call of the C library tells it, moved by STEP_S seconds once the file STEP_ONCE is there.
 SHIM = r"""

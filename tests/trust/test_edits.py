@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.forked_programs import Start
 from tests.trust import mutate
-from tests.warm import Start
 
 ROOT = Path(__file__).parents[2]
 SIZES = (900, 9_000, 60_000)  # less than a block of realisations, some blocks, many

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from tests.tolerances import rounding
-from tests.trust import plain
+from tests.trust import sums_without_compiler as plain
 
 OPERATIONS = 100  # between a number that is drawn and one that is compared: steps of a filter, a sum over realisations
 AGREED = rounding(50, OPERATIONS)  # κ of a plot's covariance, see `plain.EVEN`, and of designed filters: 1.1·10⁻¹²
@@ -30,10 +30,10 @@ LEAST = 1e-6  # of a p-value
 
 
 def elsewhere(path, **environment):
-    """The arrays of `tests.trust.plain` from an interpreter of its own."""
+    """The arrays of `tests.trust.sums_without_compiler` from an interpreter of its own."""
     paths = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
     subprocess.run(
-        [sys.executable, "-W", "ignore", "-m", "tests.trust.plain", str(path)],
+        [sys.executable, "-W", "ignore", "-m", "tests.trust.sums_without_compiler", str(path)],
         env=os.environ | {"PYTHONPATH": paths} | environment,
         cwd=ROOT,
         check=True,

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.warm import Start
+from tests.forked_programs import Start
 
 PR_CAPBSET_DROP, PASS_OVER = 24, (1, 2)  # CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH
 NO_FIGURES = ("-n", "4000", "--no-figures")

@@ -33,8 +33,8 @@ TEST_RUNNERS = "pytest>", "hypothesis>"
 # From the unpacked source distribution: what depends on pydantic, on the layout of the files, and on the extras.
 TESTS = (
     "tests/config/test_identity.py",
-    "tests/config/test_lookup.py",
-    "tests/config/test_kinds.py",
+    "tests/config/test_find_files.py",
+    "tests/config/test_keys_by_kind.py",
     "tests/recordings/formats",
 )
 BUILDER = "builder"  # the environment that builds the distributions

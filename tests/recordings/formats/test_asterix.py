@@ -12,7 +12,7 @@ from radarsim.recordings.formats.import_options import Options
 from radarsim.recordings.formats.sites import Site
 from radarsim.recordings.track_names import TrackNames
 from tests.program import command
-from tests.recordings.formats.made import (
+from tests.recordings.formats.example_files import (
     EARTH_M,
     SITE,
     block,

@@ -15,7 +15,7 @@ from radarsim.recordings.formats.import_options import Options, check_encoding
 from radarsim.recordings.formats.import_recording import import_recording
 from radarsim.recordings.formats.records import UnrolledClock
 from radarsim.recordings.formats.sites import HEIGHT_ACCURACY_M, Antenna, Site, antenna_angles, position_columns
-from tests.recordings.formats.made import (
+from tests.recordings.formats.example_files import (
     CLOCK_S,
     EARTH_M,
     PLACE,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from radarsim.recordings.formats.import_options import Options, parse_truth
-from tests.recordings.formats.made import EARTH_M, PLACE, SITE, fuzz, imported, refused
+from tests.recordings.formats.example_files import EARTH_M, PLACE, SITE, fuzz, imported, refused
 from tests.recordings.formats.test_importing import NM, local
 from tests.tolerances import assert_rounded
 

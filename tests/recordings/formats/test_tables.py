@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.recordings.formats.import_options import Options
 from radarsim.recordings.formats.sites import Site
-from tests.recordings.formats.made import CLOCK_S, EARTH_M, SITE, imported, refused
+from tests.recordings.formats.example_files import CLOCK_S, EARTH_M, SITE, imported, refused
 from tests.recordings.formats.test_importing import local
 from tests.tolerances import assert_rounded
 

@@ -25,7 +25,7 @@ from radarsim.studies.ambiguous_doppler import (
 from radarsim.studies.ambiguous_doppler.kernels import layout, realisations, recorded_rows
 from radarsim.studies.ambiguous_doppler.tables import FEW_FOLDS
 from tests.answers import answer_texts
-from tests.recordings import whole
+from tests.recordings import plot_files
 from tests.studies.ambiguous_doppler.conftest import tolerances
 from tests.tolerances import assert_rounded, mean_error
 
@@ -269,7 +269,7 @@ def test_too_many_folds_are_reported_with_their_row(tmp_path, change, words):
     t = np.arange(15) * 10.0
     csv_rows.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
     with warnings.catch_warnings(action="error"), pytest.raises(ConfigError) as error:
-        whole.track(experiment, tmp_path / "plots.csv")
+        plot_files.track(experiment, tmp_path / "plots.csv")
     assert words in str(error.value)
 
 

@@ -12,7 +12,7 @@ from radarsim.report import statistics
 from radarsim.report.drawing import canvas
 from radarsim.studies.sonar import STUDY, closed_forms, plot_errors
 from radarsim.studies.sonar.smoothing_figures import conversion_figure, plots_figure
-from tests.studies.sonar import counted
+from tests.studies.sonar import counted_operations as counted
 from tests.studies.sonar.precision import LINE, TERMS
 from tests.tolerances import Z, assert_rounded, scaled_condition, sigma_error
 

@@ -8,7 +8,7 @@ import pytest
 from radarsim.api import load_experiments
 from radarsim.errors import ConfigError
 from radarsim.recordings import simulate_plots
-from tests.recordings import whole
+from tests.recordings import plot_files
 from tests.studies.sonar.precision import LINE, TERMS
 from tests.tolerances import Z, assert_rounded
 
@@ -38,7 +38,7 @@ def test_the_example_is_realisation_3_of_the_shipped_config():
 
 def test_the_target_of_the_example_is_found():
     """The track of the highest score is the target's, in every tracker; the one of known association is left out."""
-    _, track = whole.track(loaded(), EXAMPLE)
+    _, track = plot_files.track(loaded(), EXAMPLE)
     assert set(track.filters) == {"nearest", "PDA", "nearest, 4 of 6"}
     truth = np.genfromtxt(EXAMPLE, delimiter=",", names=True)
     for name in set(track.filters):
@@ -52,8 +52,8 @@ def test_the_target_of_the_example_is_found():
 
 
 def test_columns_tell_the_tracks_apart(tmp_path):
-    _, track = whole.track(loaded(), EXAMPLE)
-    whole.write(track, tmp_path / "track.csv")
+    _, track = plot_files.track(loaded(), EXAMPLE)
+    plot_files.write(track, tmp_path / "track.csv")
     header, first = (tmp_path / "track.csv").read_text().split("\n")[:2]
     assert header == "t_s,filter,component,unit,estimate,sigma,track,score"
     assert first.split(",")[6] == "1"
@@ -71,8 +71,8 @@ def test_one_plot_a_scan_is_the_plain_filter(tmp_path):
     tracker = {**rules, "association": "nearest", "gate_probability": 1.0}
     (one,) = load_experiments.load_all([base | {"sensor": sensor, "filters": [rules]}])
     (other,) = load_experiments.load_all([base | {"sensor": sensor | {"sector": sector}, "filters": [tracker]}])
-    _, plain = whole.track(one, path)
-    _, found = whole.track(other, path)
+    _, plain = plot_files.track(one, path)
+    _, found = plot_files.track(other, path)
     assert found.estimate.shape == plain.estimate.shape
     # Over the 15 scans the plots are 9 km away and less than 500 m apart, of σ 30 m; bearings are nearer, in σ.
     size = (LINE * 500 + 9e3) / 30 * plain.sigma
@@ -83,15 +83,15 @@ def test_one_plot_a_scan_is_the_plain_filter(tmp_path):
 def test_equal_times_are_for_trackers_alone(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3), (0, 8e3, 0.2), (5, 9e3, 0.3)])
     with pytest.raises(ConfigError, match="must be later than the row before, got 0 after 0"):
-        whole.track(loaded("sonar_smoothing", ()), path)
-    whole.track(loaded(), path)
+        plot_files.track(loaded("sonar_smoothing", ()), path)
+    plot_files.track(loaded(), path)
     with pytest.raises(ConfigError, match="must not be earlier than the row before, got 4 after 5"):
-        whole.track(loaded(), written(path, [(5, 9e3, 0.3), (4, 8e3, 0.2)]))
+        plot_files.track(loaded(), written(path, [(5, 9e3, 0.3), (4, 8e3, 0.2)]))
 
 
 def test_a_scan_without_plots_and_no_track_at_all(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3), (5, "", ""), (10, 9e3, "")])
-    _, track = whole.track(loaded(), path)
+    _, track = plot_files.track(loaded(), path)
     assert track.estimate.shape == (0, 3, 4)
 
 
@@ -99,4 +99,4 @@ def test_an_oracle_alone_cannot_track(tmp_path):
     path = written(tmp_path / "plots.csv", [(0, 9e3, 0.3)])
     config = loaded("sonar_clutter", (*ONE, "filters=[{name: a, kind: kalman, association: known}]"))
     with pytest.raises(ConfigError, match="use nearest or pda"):
-        whole.track(config, path)
+        plot_files.track(config, path)

@@ -14,7 +14,7 @@ import pytest
 
 from radarsim.kernels.cache import ROOT
 from tests.program import csv_bytes
-from tests.studies import outside
+from tests.studies import example_packages
 
 N = 10_000  # two whole blocks and a partial one
 
@@ -42,9 +42,9 @@ realisations: 2e4
 def new_study(warm, folder, name, *options):
     """The command beside a new package in a folder, installed in its folder `site`."""
     (folder / "site").mkdir()
-    command = outside.beside(warm, folder / "site", folder)
+    command = example_packages.beside(warm, folder / "site", folder)
     command("new-study", name, *options)
-    outside.installed(folder / name, folder / "site")
+    example_packages.installed(folder / name, folder / "site")
     return command
 
 
@@ -54,7 +54,7 @@ def place(tmp_path_factory, warm):
     folder = tmp_path_factory.mktemp("outside")
     new_study(warm, folder, "fifth")
     (folder / "fifth/src/fifth/shipped/configs/fifth_step.yaml").write_text(STEP_CONFIG)
-    page = (outside.ROOT / "docs/howto/translate.md").read_text(encoding="utf-8")
+    page = (example_packages.ROOT / "docs/howto/translate.md").read_text(encoding="utf-8")
     (folder / "fifth/src/fifth/language").mkdir()
     catalogue = page.partition("```po\n")[2].partition("```")[0]
     (folder / "fifth/src/fifth/language/ru.po").write_text(catalogue, encoding="utf-8")
@@ -64,14 +64,14 @@ def place(tmp_path_factory, warm):
 @pytest.fixture(scope="module")
 def radarsim(place, warm):
     """The real command, beside the installed package."""
-    return outside.beside(warm, place / "site", place)
+    return example_packages.beside(warm, place / "site", place)
 
 
 @pytest.fixture(scope="module")
 def ran(place):
     """The folder of results of a finished run, in an interpreter with hashes of its own."""
     words = ("run", "fifth", "-n", str(N), "--threads", "1", "--out", "results")
-    path = os.pathsep.join([str(place / "site"), str(outside.ROOT)])
+    path = os.pathsep.join([str(place / "site"), str(example_packages.ROOT)])
     subprocess.run(
         [sys.executable, "-m", "radarsim", *words], cwd=place, env=os.environ | {"PYTHONPATH": path}, check=True
     )

@@ -1,4 +1,4 @@
-"""Sums of tiny runs of every kernel, as arrays in a file: `python -m tests.trust.plain OUT.npz`.
+"""Sums of tiny runs of every kernel, as arrays in a file: `python -m tests.trust.sums_without_compiler OUT.npz`.
 
 With NUMBA_DISABLE_JIT=1 the kernels are plain Python; those on lanes then get NumPy floats, eight in an array, in place
 of the registers, and calculate by the same algebra. The names of the kernels that ran are kept beside the sums.

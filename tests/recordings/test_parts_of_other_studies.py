@@ -5,7 +5,7 @@ import pytest
 
 from radarsim.api.load_experiments import load_all
 from radarsim.recordings import csv_rows, simulate_plots, study_part
-from tests.studies import outside
+from tests.studies import example_packages
 
 FILES = {
     "__init__.py": """
@@ -69,7 +69,7 @@ def place(tmp_path):
     (tmp_path / "site/frozen").mkdir(parents=True)
     for name, text in FILES.items():
         (tmp_path / "site/frozen" / name).write_text(text)
-    outside.metadata(tmp_path / "site", "frozen", "1", {"frozen": "frozen:STUDY"})
+    example_packages.metadata(tmp_path / "site", "frozen", "1", {"frozen": "frozen:STUDY"})
     (tmp_path / "mine.yaml").write_text(CONFIG)
     columns = simulate_plots.simulate_realisation(load_all(["rls2"], ())[0])
     csv_rows.write_columns({name: np.asarray(column) for name, column in columns.items()}, tmp_path / "plots.csv")
@@ -78,7 +78,7 @@ def place(tmp_path):
 
 @pytest.mark.slow
 def test_a_borrowed_part_refuses_keys_that_it_does_not_know(place, warm):
-    command = outside.beside(warm, place / "site", place)
+    command = example_packages.beside(warm, place / "site", place)
     for words in (("track", "mine.yaml", "plots.csv"), ("fit", "mine.yaml", "plots.csv"), ("simulate", "mine.yaml")):
         told = command(*words, *(("-o", "out.csv") if words[0] != "fit" else ()), code=2).stderr
         assert "does not know filters.0.frozen_from_k" in told

@@ -12,8 +12,8 @@ from click.testing import CliRunner
 
 from radarsim.cli.command_group import main
 from radarsim.language.current import VARIABLE
+from tests.forked_programs import ROOT, Start
 from tests.program import command, csv_bytes, newcomer
-from tests.warm import ROOT, Start
 
 # Streams always have the encoding that is named; files ASCII, where the locale is not installed and cannot be compiled.
 LOCALE = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}

@@ -15,7 +15,7 @@ from radarsim.errors import ConfigError
 from radarsim.report import quantities
 from radarsim.report.quantities import Quantity
 from radarsim.studies import registry
-from tests.studies import outside
+from tests.studies import example_packages
 from tests.tolerances import assert_rounded, rounding
 
 PRECISION = 10 * TARGET_TOLERANCE  # of a root, where the quantity changes by a tenth of what the key does
@@ -93,7 +93,7 @@ def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("quantities")
     (folder / "site/areas_of").mkdir(parents=True)
     (folder / "site/areas_of/__init__.py").write_text(STUDY)
-    outside.metadata(folder / "site", "areas-of", "1.0", {"areas": "areas_of:STUDY"})
+    example_packages.metadata(folder / "site", "areas-of", "1.0", {"areas": "areas_of:STUDY"})
     (folder / "a.yaml").write_text(CONFIG)
     (folder / "b.yaml").write_text(CONFIG.replace("sigma_velocity_mps: 15", "sigma_velocity_mps: 5"))
     return folder
@@ -102,7 +102,7 @@ def place(tmp_path_factory):
 @pytest.fixture(scope="module")
 def radarsim(place, warm):
     """The real command, beside the installed package."""
-    return outside.beside(warm, place / "site", place)
+    return example_packages.beside(warm, place / "site", place)
 
 
 def solved(radarsim, *words):

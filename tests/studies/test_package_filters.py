@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.studies import outside
+from tests.studies import example_packages
 
 ROOT = Path(__file__).parents[2]
 N = 9000  # two whole blocks and a partial one
@@ -62,14 +62,14 @@ def place(tmp_path_factory):
     (folder / "site").mkdir()
     shutil.copytree(ROOT / "examples/frozen", folder / "frozen")
     shutil.copy(folder / "frozen/frozen.yaml", folder)
-    outside.installed(folder / "frozen", folder / "site")
+    example_packages.installed(folder / "frozen", folder / "site")
     return folder
 
 
 @pytest.fixture(scope="module")
 def radarsim(place, warm):
     """The real command beside the installed package."""
-    return outside.beside(warm, place / "site", place)
+    return example_packages.beside(warm, place / "site", place)
 
 
 @pytest.fixture(scope="module")
@@ -176,13 +176,13 @@ def beside_broken(tmp_path_factory, warm):
     sources = {kind: source for kind, (source, _) in PACKAGES.items()}
     sources |= {kind: CLASS.format(kind=kind, body=body) for kind, (body, *_) in FAILING.items()}
     for kind, source in sources.items():
-        outside.metadata(site, f"pack-{kind}", "2.0", {kind: f"module_of_{kind}:Own"}, "radarsim.filters")
+        example_packages.metadata(site, f"pack-{kind}", "2.0", {kind: f"module_of_{kind}:Own"}, "radarsim.filters")
         (site / f"module_of_{kind}.py").write_text(source)
     for number in (1, 2):
         offers = {"twice": "module_of_twice:Own"}
-        outside.metadata(site, f"pack-twice{number}", "2.0", offers, "radarsim.filters")
+        example_packages.metadata(site, f"pack-twice{number}", "2.0", offers, "radarsim.filters")
     (site / "module_of_twice.py").write_text(CLASS.format(kind="twice", body="pass"))
-    return outside.beside(warm, site, folder), site
+    return example_packages.beside(warm, site, folder), site
 
 
 def test_what_cannot_be_used_is_named_where_it_is_asked_for_and_listed(beside_broken, tmp_path):
