@@ -123,17 +123,20 @@ def tracker_of(plan) -> dict:
     """The members of the C structure Tracker: one tracker, and a sector that is not a full circle."""
     of, field = plan.trackers, plan.axes.field
     cells = field.cells
-    assert len(of.gate) == 1
+    assert len(of.chi_square) == 1
     assert not cells.ring
     numbers = {"joint": int(of.association[0] == PDA), "nq": cells.nq, "nb": cells.nb}
-    numbers |= {"levels": len(of.thresholds), "shares": len(field.share)}
+    numbers |= {"levels": len(of.score_thresholds), "shares": len(field.share)}
     assert numbers["shares"] <= 40  # MAX_MEAN_IN_CELL
-    for name in ("gate", "m", "n", "misses", "speed", "lost"):
+    for name in ("m", "n", "misses", "speed", "lost"):
         numbers[name] = float(getattr(of, name)[0])
-    numbers |= {"detection": float(of.detection), "inside": float(of.inside[0]), "assumed": float(of.density)}
+    numbers["gate"] = float(of.chi_square[0])
+    numbers |= {"detection": float(of.detection), "inside": float(of.gate_probability[0]), "assumed": float(of.density)}
     numbers |= {name: float(getattr(cells, name)) for name in ("q0", "dq", "b0", "db", "density")}
-    keys = {"field": field.key, "about": plan.field_about_false.key, "seeds": plan.seeds}
-    return numbers | keys | {"share": field.share, "threshold": of.thresholds, "manoeuvre": of.manoeuvre[0].copy()}
+    keys = {"field": field.key, "about": plan.false_track_field.key, "seeds": plan.false_track_key}
+    return (
+        numbers | keys | {"share": field.share, "threshold": of.score_thresholds, "manoeuvre": of.manoeuvre[0].copy()}
+    )
 
 
 def tracker(library, pool, n: int, pairs: int) -> str:

@@ -171,7 +171,11 @@ def untranslated(code: str) -> list[str]:
     entries = {
         one.key: one for one in gettext_catalogue.entries((CATALOGUES / f"{code}.po").read_text(encoding="utf-8"))
     }
-    return [text for context, text, _ in found() if (context, text) not in entries or not entries[context, text].done]
+    return [
+        text
+        for context, text, _ in found()
+        if (context, text) not in entries or not entries[context, text].is_translated
+    ]
 
 
 def main() -> None:

@@ -153,11 +153,17 @@ def _collect_case(
     """The sums of a case, and the cell of its widest interval where a precision is set."""
     if target is None:
         return collector(case.realisations), None
-    from radarsim.report.precision import FIRST_LOOK, MIN_REALISATIONS, look_counts, minimum_realisations, widest_cell
+    from radarsim.report.precision import (
+        FIRST_LOOK,
+        MIN_REALISATIONS_WITHOUT_TAILS,
+        look_counts,
+        minimum_realisations,
+        widest_cell,
+    )
 
     looks: list[CollectedSums] = []
     best, cell = None, None
-    for n in look_counts(case.realisations, MIN_REALISATIONS if target.curves else FIRST_LOOK):
+    for n in look_counts(case.realisations, MIN_REALISATIONS_WITHOUT_TAILS if target.curves else FIRST_LOOK):
         looks.append(collector(n))
         # A run that is stopped before a look may hold fewer realisations without a gap than at the previous look.
         if best is None or looks[-1].count > best.count:

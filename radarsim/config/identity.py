@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from radarsim.config.marks import AddedKeyMark, DataFile, DesignMark, DisplayMark, NameIn
+from radarsim.config.marks import DataFile, DesignMark, DisplayMark, LaterKeyMark, NameIn
 
 
 def digest(value: object) -> str:
@@ -58,7 +58,7 @@ def _plain_mapping(model: BaseModel, excluded_marks: tuple[type, ...]) -> dict[s
 
 def _is_added_default(model: BaseModel, name: str, info: FieldInfo) -> bool:
     """Whether a field that earlier versions lacked has its default, which keeps their behaviour."""
-    return any(isinstance(mark, AddedKeyMark) for mark in info.metadata) and getattr(model, name) == info.default
+    return any(isinstance(mark, LaterKeyMark) for mark in info.metadata) and getattr(model, name) == info.default
 
 
 def _value_without_names(model: BaseModel, name: str, info: FieldInfo) -> object:

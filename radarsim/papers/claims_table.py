@@ -13,7 +13,7 @@ from radarsim.papers.evidence import Evidence, ExactNumber, MissingEvidence
 from radarsim.papers.paper_cases import CaseKeys, ShippedCases, case_keys, key_differences, paper_members
 from radarsim.papers.verdict_rule import CONFIRMED, REFUTED, JudgedPart, judged_interval, miss_in_margins, part_verdict
 from radarsim.report import tables
-from radarsim.report.statistics import ERROR_OF_PROGRAM, MIN_REALISATIONS, Estimate, standard_errors
+from radarsim.report.statistics import ERROR_OF_PROGRAM, MIN_TRUSTED_REALISATIONS, Estimate, standard_errors
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -241,7 +241,7 @@ def exact_value(part: Part, evidence: Evidence, measured: Estimate) -> float:
 def disagreement_message(part: Part, judged: JudgedPart) -> str:
     """A message where a part has an exact value of its own, further off than chance explains; else nothing. All other
     values follow from tables, which `agreement` compares with their exact columns."""
-    if part.exact is None or not judged.is_known_exactly or judged.n < MIN_REALISATIONS:
+    if part.exact is None or not judged.is_known_exactly or judged.n < MIN_TRUSTED_REALISATIONS:
         return ""
     slack = max(1e-9 * abs(judged.exact), ROUNDING * judged.margin)
     distance = standard_errors(Estimate(judged.measured, judged.lo, judged.hi), judged.exact)

@@ -34,7 +34,7 @@ def to_local(antenna: np.ndarray, R: np.ndarray, height: float) -> np.ndarray:
 
 def normal_cosine(biconical: np.ndarray) -> np.ndarray:
     """Cosine (…) of the angle from the antenna's normal of biconical (…, 3), sqrt(1 - sin² e - sin² a). Raises
-    OutsideSector where it is not > 0."""
+    OutsideSectorError where it is not > 0."""
     square = 1.0 - np.sin(biconical[..., 1]) ** 2 - np.sin(biconical[..., 2]) ** 2
     # |e| + |a| >= 90° is no direction in front of the antenna.
     if not np.all((square > 0) & (np.abs(biconical[..., 1:]).sum(axis=-1) < math.pi / 2)):
@@ -45,13 +45,13 @@ def normal_cosine(biconical: np.ndarray) -> np.ndarray:
 
 
 def from_biconical(biconical: np.ndarray) -> np.ndarray:
-    """Antenna coordinates (…, 3) of biconical points, eq. (10); raises OutsideSector."""
+    """Antenna coordinates (…, 3) of biconical points, eq. (10); raises OutsideSectorError."""
     r, u = biconical[..., 0], normal_cosine(biconical)
     return np.stack([r * u, r * np.sin(biconical[..., 1]), r * np.sin(biconical[..., 2])], axis=-1)
 
 
 def jacobian(biconical: np.ndarray) -> np.ndarray:
-    """Derivatives (…, 3, 3) of the antenna coordinates by (r, e, a): J of eq. (10); raises OutsideSector."""
+    """Derivatives (…, 3, 3) of the antenna coordinates by (r, e, a): J of eq. (10); raises OutsideSectorError."""
     r, e, a = np.moveaxis(biconical, -1, 0)
     u, zero = normal_cosine(biconical), np.zeros_like(r)
     return np.stack(

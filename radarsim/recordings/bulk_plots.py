@@ -26,7 +26,7 @@ def write_realisations(
     """Write the plots of n realisations of an experiment's one case from number `first` on, in the format that the
     path's ending names, CSV by default. Returns those of the first ones.
 
-    Raises ConfigError as `batches`, or where a format's package is missing; errors of `Writer`."""
+    Raises ConfigError as `plot_batches`, or where a format's package is missing; errors of `Writer`."""
     write = BULK_WRITERS.get(Path(path).suffix.lower(), write_csv)
     first_plots = next(plot_batches(experiment, n, first, chunk=2))
     size = max(8, NUMBERS_PER_DRAW // sum(array[0].size for array in first_plots.arrays().values()))

@@ -9,10 +9,10 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import plural, shorten_names
 from radarsim.report import provenance, rare_events
-from radarsim.report.interval_notes import BELIEVED_VARIES, HEAVY_TAILS, MIN_EFFECTIVE, supporting_counts
+from radarsim.report.interval_notes import BELIEVED_VARIES, HEAVY_TAILS, MIN_EFFECTIVE, estimate_counts
 from radarsim.report.row_notes import concerns, note_kinds
 from radarsim.report.sentences import Sentence
-from radarsim.report.statistics import MIN_REALISATIONS
+from radarsim.report.statistics import MIN_TRUSTED_REALISATIONS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +33,7 @@ def answer_warnings(
 
 def few_realisations_warning(results: Sequence[CaseResult]) -> list[str]:
     """A line on the cases whose intervals rest on too few realisations, if any."""
-    counts = {result.name: result.count for result in results if result.count < MIN_REALISATIONS}
+    counts = {result.name: result.count for result in results if result.count < MIN_TRUSTED_REALISATIONS}
     if not counts:
         return []
     line = plural(
@@ -42,7 +42,7 @@ def few_realisations_warning(results: Sequence[CaseResult]) -> list[str]:
         max(counts.values()),
         cases=shorten_names(list(dict.fromkeys(counts)), MAX_NAMES),
         counts=provenance.span(list(counts.values())),
-        least=MIN_REALISATIONS,
+        least=MIN_TRUSTED_REALISATIONS,
     )
     return [line]
 
@@ -101,7 +101,7 @@ def needed_realisations(
     rows: "pd.DataFrame", tables_by_name: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
 ) -> np.ndarray:
     """How many realisations (rows,) intervals with a note take, from the effective ones; NaN where unknown."""
-    n, fewest = supporting_counts(rows.drop(columns="n_eff", errors="ignore"), tables_by_name, results)
+    n, fewest = estimate_counts(rows.drop(columns="n_eff", errors="ignore"), tables_by_name, results)
     has_tails = (note_kinds(rows) == HEAVY_TAILS.kind) & (fewest < MIN_EFFECTIVE)
     with np.errstate(divide="ignore"):
         return np.where(has_tails, n * MIN_EFFECTIVE / fewest, np.nan)

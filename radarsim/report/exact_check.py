@@ -22,7 +22,7 @@ from radarsim.report import tables
 from radarsim.report.quantities import Quantity
 from radarsim.report.statistics import (
     ERROR_OF_PROGRAM,
-    MIN_REALISATIONS,
+    MIN_TRUSTED_REALISATIONS,
     Z95,
     Estimate,
     largest_by_chance,
@@ -87,7 +87,7 @@ def standardised_errors(
 
     name: that of the column's table; approximate_cases: those whose exact values are accurate to `ALMOST` only. 0 where
     missing rare events may explain the difference, see above. NaN where no exact value is known, or fewer than
-    `MIN_REALISATIONS` realisations measured it."""
+    `MIN_TRUSTED_REALISATIONS` realisations measured it."""
     table = tables_by_name[name]
     (value, low, high), exact = measured_values(table, column), table[column.exact].to_numpy(dtype=float)
     size, unseen = _size_and_unseen(table, name, column.value, value, exact, quantities)
@@ -97,7 +97,7 @@ def standardised_errors(
         is_close = np.abs(exact - value) <= tolerance
         nearest = np.where(is_close, value, exact - np.sign(exact - value) * np.where(is_close, 0.0, tolerance))
     n = table["n"] if "n" in table else table["case"].map(tables_by_name["curves"].groupby("case")["n"].min())
-    enough = (n.to_numpy(dtype=float) >= MIN_REALISATIONS) & ~np.isnan(exact)
+    enough = (n.to_numpy(dtype=float) >= MIN_TRUSTED_REALISATIONS) & ~np.isnan(exact)
     return np.where(enough, standard_errors(Estimate(value, low, high), nearest), np.nan)
 
 

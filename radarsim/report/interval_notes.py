@@ -88,7 +88,7 @@ def _with_notes(
     notes = table["note"].to_numpy(dtype=object) if "note" in table else np.full(len(table), "", dtype=object)
     table = table.drop(columns="note") if "note" in table else table
     if name not in WITHOUT_RULES:
-        by_rules = heavy_tail_notes(*supporting_counts(table, tables_by_name, results))
+        by_rules = heavy_tail_notes(*estimate_counts(table, tables_by_name, results))
         if paired:
             by_rules = notes_where(
                 (by_rules == "") & _alike(table, tables_by_name["curves"], paired), ALIKE_FILTERS, by_rules
@@ -156,7 +156,7 @@ def _alike(gains: "pd.DataFrame", curves: "pd.DataFrame", paired: Sequence[Quant
     return are_alike
 
 
-def supporting_counts(
+def estimate_counts(
     table: "pd.DataFrame", tables_by_name: Mapping[str, "pd.DataFrame"], results: Sequence[CaseResult]
 ) -> tuple[np.ndarray, np.ndarray]:
     """For each row, the number of realisations that it is computed from, and the smallest effective number nearby.

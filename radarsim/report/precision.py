@@ -5,7 +5,7 @@ block, it would stop where chance made the intervals narrow, and the place would
 
 An interval of σ is also narrow where rare large errors have not occurred yet. A sample cannot show what it lacks: a
 narrower target, or one more doubling, helps little. So where errors are not known to be Gaussian, no run ends below a
-minimum of realisations: FLOOR, or FLOOR_OF_TAILS after large errors."""
+minimum of realisations, which is higher after large errors."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 Table = Callable[[Sequence[CaseResult]], "pandas.DataFrame"]  # of a study: the table of the quantity
 FIRST_LOOK = 2000
-MIN_REALISATIONS = 64_000  # with errors of probability 10⁻⁴, all but two samples in 1000 have one
+MIN_REALISATIONS_WITHOUT_TAILS = 64_000  # with errors of probability 10⁻⁴, all but two samples in 1000 have one
 MIN_REALISATIONS_WITH_TAILS = 512_000  # of these 51 are expected: the interval then covers 92 %
 TAIL_RATIO = 3  # realisations for each effective one, from which on errors are large: κ = 4; Gaussian ones have two
 EQUAL = 1e-9  # relative difference of widths that is rounding
@@ -88,7 +88,11 @@ def minimum_realisations(result: CaseResult, curves: Table | None) -> int:
     if curves is None:
         return FIRST_LOOK
     rows = curves([result])
-    return MIN_REALISATIONS_WITH_TAILS if (TAIL_RATIO * rows["n_eff"] < rows["n"]).any() else MIN_REALISATIONS
+    return (
+        MIN_REALISATIONS_WITH_TAILS
+        if (TAIL_RATIO * rows["n_eff"] < rows["n"]).any()
+        else MIN_REALISATIONS_WITHOUT_TAILS
+    )
 
 
 def widest_cell(result: CaseResult, table: Table, quantity: Quantity = SIGMA) -> WidestInterval | None:

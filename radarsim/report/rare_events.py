@@ -156,7 +156,7 @@ def rate_fields(row: "pd.Series") -> dict[str, Any]:
 
 def mean_weight_warnings(rates: "pd.DataFrame | None") -> list[str]:
     """A line on the worst case whose weights have a wrong mean, which makes every rate wrong."""
-    if rates is None or not len(rows := rates[rates["n"] >= statistics.MIN_REALISATIONS]):
+    if rates is None or not len(rows := rates[rates["n"] >= statistics.MIN_TRUSTED_REALISATIONS]):
         return []
     excess = (rows["mean_weight"] - 1).abs() - MAX_MEAN_ERROR * rows["mean_weight_se"]
     worst = rows.iloc[int(excess.to_numpy().argmax())]

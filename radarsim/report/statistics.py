@@ -14,7 +14,7 @@ Values = Any  # a number or an array of numbers: NumPy computes with both alike,
 Z95 = 1.959963984540054
 # Where less than this stands behind a 95 % interval, its coverage was measured to leave 93.6 … 96.4 %
 # (tests/trust/test_statistics.py).
-MIN_REALISATIONS = (
+MIN_TRUSTED_REALISATIONS = (
     200  # realisations of a run: of Gaussian errors paired gains cover 93.6 % at 30, means of products 93.2 at 100
 )
 MIN_EVENTS = 20  # rare errors, or weighted events, behind an interval that they decide

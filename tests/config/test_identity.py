@@ -17,7 +17,7 @@ from radarsim.api.configs import load
 from radarsim.config.find_files import SHIPPED
 from radarsim.config.identity import identity_keys
 from radarsim.config.key_types import key
-from radarsim.config.marks import AddedKeyMark, DataFile, DesignMark
+from radarsim.config.marks import DataFile, DesignMark, LaterKeyMark
 from radarsim.config.model import Model
 from radarsim.config.study_keys import StudyKeys
 from radarsim.studies import registry
@@ -183,10 +183,10 @@ def marks(model):
 
 def test_a_key_that_several_models_share_has_the_marks_of_each():
     shared = key("key", "a key that several models share", [])
-    first = pydantic.create_model("First", __base__=Model, shared=(Annotated[list[int], AddedKeyMark()], shared))
+    first = pydantic.create_model("First", __base__=Model, shared=(Annotated[list[int], LaterKeyMark()], shared))
     second = pydantic.create_model("Second", __base__=Model, shared=(Annotated[list[str], DesignMark()], shared))
     third = pydantic.create_model("Third", __base__=Model, shared=(list[str], shared))
-    assert [marks(model) for model in (first, second, third)] == [[AddedKeyMark], [DesignMark], []]
+    assert [marks(model) for model in (first, second, third)] == [[LaterKeyMark], [DesignMark], []]
     assert (first(shared=[1]).shared, second(shared=["1"]).shared, third().shared) == ([1], ["1"], [])
 
 

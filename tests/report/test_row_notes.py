@@ -15,7 +15,7 @@ from radarsim.report import answer_warnings, interval_notes, statistics
 from radarsim.report.quantities import Quantity
 from radarsim.report.row_notes import has_note
 from radarsim.report.sentences import MeasuredInterval, Sentence, as_sentence
-from radarsim.report.statistics import MIN_REALISATIONS
+from radarsim.report.statistics import MIN_TRUSTED_REALISATIONS
 from radarsim.studies import registry
 
 
@@ -179,9 +179,9 @@ def test_warning_is_about_the_intervals_that_the_answer_rests_on():
     (line,) = answer_warnings.answer_warnings(results, made, [sigma_of(14), sigma_of(15, 26, 27), sigma_of(14)])
     assert line.startswith("3 intervals of the answer are too narrow")
     (line,) = answer_warnings.answer_warnings(
-        [SimpleNamespace(name="a", count=MIN_REALISATIONS - 1)], made, [sigma_of(14)]
+        [SimpleNamespace(name="a", count=MIN_TRUSTED_REALISATIONS - 1)], made, [sigma_of(14)]
     )
-    assert f"{MIN_REALISATIONS - 1} realisations are rough" in line
+    assert f"{MIN_TRUSTED_REALISATIONS - 1} realisations are rough" in line
 
 
 def test_note_on_one_interval_gives_no_warning_of_another():
@@ -216,7 +216,7 @@ def test_note_on_what_an_interval_leaves_out_gives_no_warning():
 
 def test_words_of_notes_and_sentences_change_no_number_and_no_mark(monkeypatch):
     """The same tables, but for the notes' texts, and the same warnings, whatever is written in either."""
-    result = radarsim.run("orders", realisations=MIN_REALISATIONS)
+    result = radarsim.run("orders", realisations=MIN_TRUSTED_REALISATIONS)
     (warning,) = (line for line in result.warnings if "of the answer" in line)
     other_text = replace(interval_notes.HEAVY_TAILS, text="rarely large")
     for module in (answer_warnings, interval_notes):
@@ -250,7 +250,7 @@ def test_plain_text_of_a_user_study_rests_on_every_filter_at_the_last_scan():
 
 def check_notes_and_warning(config):
     """Of a shipped config: no note beside an exact value; a warning at most, on intervals that are in the answer."""
-    result = radarsim.run(config, realisations=MIN_REALISATIONS)
+    result = radarsim.run(config, realisations=MIN_TRUSTED_REALISATIONS)
     study, made = registry.study(result.experiment.study), result.tables
     for table in made.values():
         exact = [name for name in table if name in ("exact_sigma", "exact_percent", "exact_right")]
@@ -296,5 +296,5 @@ def test_notes_say_what_their_rows_have():
 
 
 def test_filters_whose_names_hold_a_comma_are_told_apart():
-    results = [SimpleNamespace(name=name, count=MIN_REALISATIONS - 1) for name in ("PDA", "PDA, 4 of 6")]
+    results = [SimpleNamespace(name=name, count=MIN_TRUSTED_REALISATIONS - 1) for name in ("PDA", "PDA, 4 of 6")]
     assert answer_warnings.few_realisations_warning(results)[0].startswith("PDA and “PDA, 4 of 6”: ")

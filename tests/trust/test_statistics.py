@@ -89,7 +89,11 @@ def slack(repetitions):
 @pytest.mark.parametrize("kind", KINDS)
 def test_coverage_at_the_least_sizes_without_a_note(kind):
     low, high = GAUSSIAN
-    assert low - slack(500) / 2 <= coverage(kind, gaussian, statistics.MIN_REALISATIONS, 500) <= high + slack(500) / 2
+    assert (
+        low - slack(500) / 2
+        <= coverage(kind, gaussian, statistics.MIN_TRUSTED_REALISATIONS, 500)
+        <= high + slack(500) / 2
+    )
     assert coverage(kind, student5, FEW_HEAVY, 500) >= HEAVY[0] - slack(500) / 2
 
 
@@ -98,7 +102,7 @@ def test_coverage_at_the_least_sizes_without_a_note(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_gaussian_coverage_over_two_thousand_repetitions(kind, n):
     low, high = GAUSSIAN
-    assert low <= coverage(kind, gaussian, n * statistics.MIN_REALISATIONS, MANY) <= high
+    assert low <= coverage(kind, gaussian, n * statistics.MIN_TRUSTED_REALISATIONS, MANY) <= high
 
 
 @pytest.mark.slow

@@ -42,8 +42,8 @@ from radarsim.report import statistics
 from radarsim.report.precision import (
     FIRST_LOOK,
     MAX_REALISATIONS,
-    MIN_REALISATIONS,
     MIN_REALISATIONS_WITH_TAILS,
+    MIN_REALISATIONS_WITHOUT_TAILS,
     look_counts,
 )
 from radarsim.report.quantities import LOST, SIGMA
@@ -319,10 +319,10 @@ def test_sigma_with_rare_large_errors_is_covered_where_a_precision_ends(monkeypa
     held, ends = Synthetic(draw, False, MAX_REALISATIONS).covered(monkeypatch, truth, 3.0, SEEDS)
     assert held >= at_least(0.90, SEEDS)
     assert np.median(ends) == MIN_REALISATIONS_WITH_TAILS
-    assert ends.min() >= MIN_REALISATIONS
+    assert ends.min() >= MIN_REALISATIONS_WITHOUT_TAILS
 
 
-@pytest.mark.parametrize(("gaussian", "end"), [(True, 4000), (False, MIN_REALISATIONS)])
+@pytest.mark.parametrize(("gaussian", "end"), [(True, 4000), (False, MIN_REALISATIONS_WITHOUT_TAILS)])
 def test_gaussian_errors_are_covered_and_cost_the_least_where_they_are_known_to_be(monkeypatch, gaussian, end):
     held, ends = Synthetic(rare(0.0, 1.0)[0], gaussian, MAX_REALISATIONS).covered(monkeypatch, 1.0, 3.0, SEEDS // 4)
     assert held >= at_least(0.95, SEEDS // 4)
@@ -344,7 +344,7 @@ def test_a_rate_is_covered_where_a_precision_ends(monkeypatch):
     seen = [lossy.run(np.random.default_rng((seed, 8)), monkeypatch, 20.0, "lost", locks)[1:] for seed in range(SEEDS)]
     held = [of.lo <= share <= of.hi for n, values in seen for of in (statistics.rate(values[1], n),)]
     assert np.mean(held) >= at_least(0.94, SEEDS)
-    assert max(n for n, _ in seen) < MIN_REALISATIONS
+    assert max(n for n, _ in seen) < MIN_REALISATIONS_WITHOUT_TAILS
 
 
 @pytest.mark.slow
@@ -381,7 +381,7 @@ def test_where_a_run_ends_is_foretold(monkeypatch):
     """By the same floors: from sums as a pilot has them, with rare errors and without."""
     from radarsim.report.precision import needed_realisations
 
-    for share, floor in ((0.0, MIN_REALISATIONS), (1e-3, MIN_REALISATIONS_WITH_TAILS)):
+    for share, floor in ((0.0, MIN_REALISATIONS_WITHOUT_TAILS), (1e-3, MIN_REALISATIONS_WITH_TAILS)):
         draw, _ = rare(share, 10)
         synthetic = Synthetic(draw, False, MAX_REALISATIONS)
         square, fourth = draw(np.random.default_rng(2), 16_000)

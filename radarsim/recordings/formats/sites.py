@@ -1,6 +1,6 @@
-"""A radar on the earth (WGS 84): measurements of positions, and positions of its plots.
+"""A radar on the earth (WGS 84): measurements of positions, and positions of its plots (by pymap3d).
 
-A radar on the earth (WGS 84) measures positions, and its plots have positions (by pymap3d). Local axes: x north, y up,
+Local axes: x north, y up,
 z east, with the origin at the radar. Bearings are counted from north to east. Elevations are above the plane that is
 level at the radar; an aircraft far away and low lies below it."""
 

@@ -127,21 +127,21 @@ def nees_columns(result: CaseResult) -> common.Columns:
 def with_user_filters(
     tables_by_name: TablesByName, results: Sequence[CaseResult], measured_rows: TablesByName
 ) -> "dict[str, pd.DataFrame]":
-    """The tables with the rows of user filters below their own; measured_rows: as of `measured`."""
+    """The tables with the rows of user filters below their own; measured_rows: of the function of that name."""
     if not measured_rows:
         return dict(tables_by_name)
-    with_user_filters = [result for result in results if result.user_filters is not None]
+    results_with_filters = [result for result in results if result.user_filters is not None]
     user_cases = [case for result in results for case in user_filter_cases(result)]
     count = len(measured_rows["curves"])
     rows = {"curves": append(tables_by_name["curves"], measured_rows["curves"]), "gains": measured_rows["gains"]}
     rows = interval_notes.add_notes(rows, [*results, *user_cases], exact=False)
-    rows["gains"] = _without_needless_notes(rows["gains"], with_user_filters)
+    rows["gains"] = _without_needless_notes(rows["gains"], results_with_filters)
     rows["curves"] = rows["curves"].tail(count)
     for name, table in rows.items():
         if "note" in table and not table["note"].any():
             rows[name] = table.drop(columns="note")
-    rows["failures"] = common.join_columns(map(failure_columns, with_user_filters))
-    rows["nees"] = common.join_columns(map(nees_columns, with_user_filters))
+    rows["failures"] = common.join_columns(map(failure_columns, results_with_filters))
+    rows["nees"] = common.join_columns(map(nees_columns, results_with_filters))
     appended = {
         name: append(tables_by_name[name], table) if name in tables_by_name else table
         for name, table in rows.items()
@@ -150,30 +150,30 @@ def with_user_filters(
     return {**tables_by_name, **appended}
 
 
-def _without_needless_notes(gains: "pd.DataFrame", with_user_filters: Sequence[CaseResult]) -> "pd.DataFrame":
+def _without_needless_notes(gains: "pd.DataFrame", results_with_filters: Sequence[CaseResult]) -> "pd.DataFrame":
     """Gains without notes where both filters are the same but for rounding, or differ a little in every realisation."""
     if "note" not in gains:
         return gains
     is_equal = gains["gain_hi"] - gains["gain_lo"] < SINGLE
-    rests_on_few = np.concatenate([_rests_on_few(result) for result in with_user_filters])
+    rests_on_few = np.concatenate([_rests_on_few(result) for result in results_with_filters])
     differs_everywhere = (note_kinds(gains) == interval_notes.ALIKE_FILTERS.kind) & ~rests_on_few
     return gains.assign(note=gains["note"].mask(is_equal | differs_everywhere, ""))
 
 
 def measured_rows(results: Sequence[CaseResult]) -> TablesByName:
     """The curves and gains of user filters; nothing where there are none."""
-    with_user_filters = [result for result in results if result.user_filters is not None]
-    if not with_user_filters:
+    results_with_filters = [result for result in results if result.user_filters is not None]
+    if not results_with_filters:
         return {}
-    user_cases = [case for result in with_user_filters for case in user_filter_cases(result)]
+    user_cases = [case for result in results_with_filters for case in user_filter_cases(result)]
     return {
         "curves": common.curves(user_cases),
-        "gains": common.join_columns(map(gains, with_user_filters), common.GAINS),
+        "gains": common.join_columns(map(gains, results_with_filters), common.GAINS),
     }
 
 
 def tables_for_claims(tables_by_name: TablesByName, measured_rows: TablesByName) -> TablesByName:
-    """The tables with the rows of those that are `measured` below their own."""
+    """The tables with the measured rows below their own."""
     appended = {name: append(tables_by_name[name], table) for name, table in measured_rows.items()}
     return {**tables_by_name, **appended}
 
@@ -182,14 +182,15 @@ def table_with_user_filters(name: str, table: "Callable[[Sequence[CaseResult]], 
     """A table of the study, made from results, with the rows of user filters: curves or gains."""
 
     def make_table(results: Sequence[CaseResult]) -> "pd.DataFrame":
-        with_user_filters = [result for result in results if result.user_filters is not None]
+        results_with_filters = [result for result in results if result.user_filters is not None]
         study_rows = table(results)
         if name == "curves":
             return append(
-                study_rows, common.curves([case for result in with_user_filters for case in user_filter_cases(result)])
+                study_rows,
+                common.curves([case for result in results_with_filters for case in user_filter_cases(result)]),
             )
         if name == "gains":
-            return append(study_rows, common.join_columns(map(gains, with_user_filters), common.GAINS))
+            return append(study_rows, common.join_columns(map(gains, results_with_filters), common.GAINS))
         return study_rows
 
     return make_table

@@ -284,8 +284,8 @@ class Keys(radial_keys.TimedStudyKeys):
     filters: study_keys.Members[Filter] = key("filters", "the filters; all see the same plots")
     baseline: study_keys.Baseline = study_keys.BASELINE
     scans: Annotated[Annotated[int, WholeNumber(2, MAX_SCANS)] | None, DesignMark()] = study_keys.SCANS
-    duration_s: Annotated[Positive | None, DesignMark(), marks.AddedKeyMark()] = study_keys.DURATION
-    rare: Annotated[RareFolds | None, DesignMark(), marks.AddedKeyMark()] = key(
+    duration_s: Annotated[Positive | None, DesignMark(), marks.LaterKeyMark()] = study_keys.DURATION
+    rare: Annotated[RareFolds | None, DesignMark(), marks.LaterKeyMark()] = key(
         "rare wrong folds",
         "importance sampling of wrong folds, for filters that are almost always right: rare.csv",
         None,

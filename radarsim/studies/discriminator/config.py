@@ -9,7 +9,7 @@ from pydantic import Field
 from radarsim.config import cross_checks, key_types, marks, rare_event_keys, study_keys
 from radarsim.config.cross_checks import CheckError, check_error, cross_check
 from radarsim.config.key_types import Flag, Name, Number, Positive, WholeNumber, key
-from radarsim.config.marks import AddedKeyMark, DesignMark
+from radarsim.config.marks import DesignMark, LaterKeyMark
 from radarsim.config.model import Model
 
 MAX_SAMPLES = 1_000_000
@@ -211,7 +211,7 @@ class Keys(study_keys.StudyKeys):
         "samples drawn and demodulated once; auto: block_sums where it is valid, else samples",
         "auto",
     )
-    rare: Annotated[Rare | None, DesignMark(), AddedKeyMark()] = key(
+    rare: Annotated[Rare | None, DesignMark(), LaterKeyMark()] = key(
         "rare losses of lock",
         "importance sampling of losses of lock, for sequences that lock almost always: rare.csv",
         None,

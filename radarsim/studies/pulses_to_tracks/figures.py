@@ -17,7 +17,7 @@ from radarsim.studies.pulses_to_tracks.tables import Result
 if TYPE_CHECKING:
     import pandas as pd
 
-MIN_REALISATIONS = 30  # for a point to be drawn
+MIN_REALISATIONS_OF_POINT = 30  # for a point to be drawn
 DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 
@@ -162,7 +162,7 @@ def losses_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -
     range_rows = tables.select_rows(tables_by_name["losses"], case=result.name, component="r", k=result.axes.k[-1])
     marks = []
     for (name,), rows in tables.group_by(range_rows, "filter").items():
-        rows = rows[rows["n"] >= MIN_REALISATIONS]
+        rows = rows[rows["n"] >= MIN_REALISATIONS_OF_POINT]
         if len(rows) > 1:
             rows = rows.assign(sigma_hi=np.minimum(rows["sigma_hi"], 1e3 * rows["sigma"]))
             marks.append(_line(result, name, rows, ("since_loss", "sigma", "sigma_lo", "sigma_hi")))

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from radarsim.config import cross_checks, key_types, marks, radial_keys, study_keys
 from radarsim.config.cross_checks import CheckError, check_error, cross_check
 from radarsim.config.key_types import NonNegative, Number, Positive, key
-from radarsim.config.marks import AddedKeyMark
+from radarsim.config.marks import LaterKeyMark
 from radarsim.config.model import Model
 from radarsim.config.radial_keys import MAX_SCANS
 
@@ -26,24 +26,24 @@ class Radar(radial_keys.Radar):
         1000.0,
         symbol="F_r",
     )
-    detection_probability: Annotated[key_types.Probability, Field(gt=0), AddedKeyMark()] = key(
+    detection_probability: Annotated[key_types.Probability, Field(gt=0), LaterKeyMark()] = key(
         "detection probability",
         "probability that a scan gives its plot, range and velocity together",
         1.0,
         symbol="P_D",
     )
-    bias_range_m: Annotated[Number, AddedKeyMark()] = key(
+    bias_range_m: Annotated[Number, LaterKeyMark()] = key(
         "bias of the measured range", "mean error of a measured range, m", 0.0
     )
-    bias_velocity_mps: Annotated[Number, AddedKeyMark()] = key(
+    bias_velocity_mps: Annotated[Number, LaterKeyMark()] = key(
         "bias of the measured radial velocity", "mean error of a measured velocity, m/s", 0.0
     )
-    sigma_bias_range_m: Annotated[NonNegative, AddedKeyMark()] = key(
+    sigma_bias_range_m: Annotated[NonNegative, LaterKeyMark()] = key(
         "σ of the random bias in range",
         "standard deviation of an additional error of range, drawn once per realisation, m",
         0.0,
     )
-    sigma_bias_velocity_mps: Annotated[NonNegative, AddedKeyMark()] = key(
+    sigma_bias_velocity_mps: Annotated[NonNegative, LaterKeyMark()] = key(
         "σ of the random bias in radial velocity",
         "standard deviation of an additional error of velocity, drawn once per realisation, m/s",
         0.0,
@@ -71,7 +71,7 @@ class JerkPulse(radial_keys.ManoeuvreStart):
         return radial_keys.polynomial_reach_m(self.coefficients, t) + abs(self.jerk_mps3) * t**3 / 6
 
 
-DisplacementSigma = Annotated[NonNegative, AddedKeyMark()]
+DisplacementSigma = Annotated[NonNegative, LaterKeyMark()]
 
 
 class RandomFlight(Model):
@@ -157,7 +157,7 @@ class FilterKeys(Model):
 class Filter(FilterKeys):
     """A second-order Kalman filter started by least squares."""
 
-    kind: Annotated[Literal["kalman"], AddedKeyMark()] = key("kind", "the Kalman filter of the study", "kalman")
+    kind: Annotated[Literal["kalman"], LaterKeyMark()] = key("kind", "the Kalman filter of the study", "kalman")
     manoeuvre_variance: Positive | Best = key(
         "manoeuvre variance",
         "variance of the random jerk it allows for, (m/s³)²: D_M; or the error that it minimises",
@@ -192,7 +192,7 @@ class Keys(radial_keys.TimedStudyKeys):
     filters: study_keys.Members[Filter] = key("filters", "the filters; all see the same plots")
     baseline: study_keys.Baseline = study_keys.BASELINE
     scans: Annotated[Annotated[int, key_types.WholeNumber(2, MAX_SCANS)] | None, marks.DesignMark()] = study_keys.SCANS
-    duration_s: Annotated[Positive | None, marks.DesignMark(), AddedKeyMark()] = study_keys.DURATION
+    duration_s: Annotated[Positive | None, marks.DesignMark(), LaterKeyMark()] = study_keys.DURATION
 
     @model_validator(mode="after")
     def _completed(self) -> Self:

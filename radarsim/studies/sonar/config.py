@@ -91,7 +91,7 @@ class Keys(study_keys.StudyKeys):
         "course, speed, predicted position and closest approach, with their σ; none: left out",
         None,
     )
-    rare: Annotated[RareTracks | None, DesignMark(), marks.AddedKeyMark()] = key(
+    rare: Annotated[RareTracks | None, DesignMark(), marks.LaterKeyMark()] = key(
         "rare events",
         "importance sampling of false tracks, for trackers that hardly have any, and of the target's track, for "
         "those that hardly lose it: rare.csv",

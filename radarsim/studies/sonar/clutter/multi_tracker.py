@@ -42,9 +42,9 @@ class MultiTracker:
     def __init__(self, spec: TrackerSpec, conditions: Conditions):
         arrays = trackers([spec], conditions)
         self.spec, self.conditions, self.manoeuvre = spec, conditions, arrays.manoeuvre[0]
-        association, gate = int(arrays.association[0]), arrays.gate[0]
+        association, chi_square = int(arrays.association[0]), arrays.chi_square[0]
         self.rule = kernels_gate.AssociationRule(
-            association, gate, conditions.detection, spec.gate_probability, conditions.density, spec.speed
+            association, chi_square, conditions.detection, spec.gate_probability, conditions.density, spec.speed
         )
         self.chunks: list[track_prediction.Tracks] = []
         self.free: list[tuple[int, int]] = []
@@ -110,7 +110,7 @@ class MultiTracker:
         confirmed = np.array([track.state == track_rules.CONFIRMED for track in self.alive])
         busy = np.zeros(len(self.alive), dtype=bool)
         for group in (confirmed, ~confirmed) if len(self.alive) else ():
-            a, p = np.nonzero((distance <= self.rule.gate) & group[:, None])
+            a, p = np.nonzero((distance <= self.rule.chi_square) & group[:, None])
             order = np.argsort(distance[a, p], kind="stable")
             for track, plot in zip(a[order], p[order], strict=True):
                 if owner[plot] < 0 and (takes_several[track] or not busy[track]):

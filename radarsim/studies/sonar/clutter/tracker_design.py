@@ -116,14 +116,14 @@ def trackers(specs: Sequence[TrackerSpec], conditions: Conditions) -> Trackers:
     variance = np.stack([spec.variance for spec in specs])
     return Trackers(
         association=np.array([ASSOCIATIONS[spec.association] for spec in specs]),
-        gate=np.array([gate_threshold(spec.gate_probability) for spec in specs]),
-        inside=np.array([spec.gate_probability for spec in specs]),
+        chi_square=np.array([gate_threshold(spec.gate_probability) for spec in specs]),
+        gate_probability=np.array([spec.gate_probability for spec in specs]),
         m=np.array([float(spec.m) for spec in specs]),
         n=np.array([float(spec.n) for spec in specs]),
         misses=np.array([float(spec.misses) for spec in specs]),
         speed=np.array([spec.speed for spec in specs]),
         lost=np.array([spec.lost for spec in specs]),
         manoeuvre=variance * conditions.period**4 / conditions.sigma**2,
-        thresholds=THRESHOLDS,
+        score_thresholds=THRESHOLDS,
         **conditions._asdict(),
     )

@@ -50,16 +50,16 @@ def associate_track(draws, rule, realisation, k, plot, gate, counts):
     irr, irb, ibb, det = inverse_two(gate.S[0], gate.S[1], gate.S[2])
     S_inverse = (irr, irb, ibb)
     if plot[0] > 0.0:
-        gated_plots = add_plot(gated_plots, nu_r, nu_b, 0.0, S_inverse, OPEN_GATE if is_known else rule.gate)
+        gated_plots = add_plot(gated_plots, nu_r, nu_b, 0.0, S_inverse, OPEN_GATE if is_known else rule.chi_square)
         if gate.settled:
             counts[TARGET_PLOT_COUNT] += 1.0
-            counts[PLOTS_IN_GATE_COUNT] += distance_squared(nu_r, nu_b, S_inverse) <= rule.gate
+            counts[PLOTS_IN_GATE_COUNT] += distance_squared(nu_r, nu_b, S_inverse) <= rule.chi_square
     cells = draws.cells
     if cells.density > 0.0:
-        with_false = add_false_plots(gated_plots, draws, realisation, k, gate, rule.gate)
+        with_false = add_false_plots(gated_plots, draws, realisation, k, gate, rule.chi_square)
         if gate.settled:
             counts[FALSE_IN_GATE_COUNT] += with_false.false_count
-            counts[EXPECTED_FALSE_COUNT] += cells.density * gate_area(gate, det, rule.gate, cells)
+            counts[EXPECTED_FALSE_COUNT] += cells.density * gate_area(gate, det, rule.chi_square, cells)
         gated_plots = gated_plots if is_known else with_false
     if gate.settled:
         counts[GATE_COUNT] += 1.0

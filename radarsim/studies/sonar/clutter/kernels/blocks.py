@@ -52,7 +52,7 @@ def measure_target(world, first, k, plots, z, shift):
 @kernel
 def simulate_block(world, detections, field, trackers, work, first, total, sums):
     """Add the sums of the target's tracks in realisations first … first + total - 1 to sums, a TrackSums."""
-    F, K, status = trackers.gate.size, world.dt.size, work.status
+    F, K, status = trackers.chi_square.size, world.dt.size, work.status
     plots, shift, z = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK)), np.empty((2, CHUNK))
     detected, used, plot_counts = np.empty(CHUNK), np.ones(CHUNK), np.empty((F, CHUNK))
     counts, scratch, target = np.zeros(COUNTS), np.empty(7), Target(detected, z, True)
@@ -82,7 +82,7 @@ def simulate_block(world, detections, field, trackers, work, first, total, sums)
         for f in range(F):
             add_ratio(status[f, ENDS], status[f, CONFIRMED_SCANS], n, sums.ratios[f, ENDS_PER_SCAN])
             add_ratio(status[f, FALSE_WEIGHT], status[f, PLOTS_TAKEN], n, sums.ratios[f, WRONG_PER_PLOT])
-            add_scores(trackers.thresholds, n, status[f, FIRST], status[f, BEST], sums.scores[0, f])
+            add_scores(trackers.score_thresholds, n, status[f, FIRST], status[f, BEST], sums.scores[0, f])
 
 
 @kernel
@@ -95,7 +95,7 @@ def simulate_false_tracks(key, field, trackers, work, dt, first, total, sums):
         reset_tracks(work)
         n = min(CHUNK, total - done)
         draw_uniform_positions(key, field, first + done, n, z)
-        for f in range(trackers.gate.size):
+        for f in range(trackers.chi_square.size):
             tracks, status = tracks_of_tracker(work, f), work.status[f]
             if trackers.association[f] == KNOWN:
                 continue
@@ -104,4 +104,4 @@ def simulate_false_tracks(key, field, trackers, work, dt, first, total, sums):
                 step_tracker(trackers, f, field, Scan(first + done, n, k, dt[k]), tracks, target, work, counts)
                 if not judge_false_tracks(trackers, f, n, tracks, status, sums.begun[f, k]):
                     break
-            add_scores(trackers.thresholds, n, status[FIRST], status[BEST], sums.scores[1, f])
+            add_scores(trackers.score_thresholds, n, status[FIRST], status[BEST], sums.scores[1, f])

@@ -17,7 +17,7 @@ from radarsim.kernels.compiler import inline, kernel
 from radarsim.kernels.polynomials import log_polynomial
 
 MIN_DENSITY = 1e-9  # per m², in scores: without false plots a score would be infinite
-OPEN_GATE = 1e30  # χ² of a gate that contains everything
+OPEN_GATE = 1e30  # χ² of a gate that contains everything; kernels are compiled without infinities
 MIN_RANGE_M = 1.0  # of densities and gates, should a track pass through the sonar
 MIN_LIKELIHOOD = 1e-300  # the reciprocal of a smaller likelihood may be infinite
 NEAREST, PDA, KNOWN = range(3)
@@ -27,9 +27,9 @@ class AssociationRule(NamedTuple):
     """How a tracker chooses among the plots in its gate."""
 
     association: int  #: NEAREST, PDA or KNOWN
-    gate: float  #: χ² of two components
+    chi_square: float  #: of two components, on the border of the gate
     detection: float  #: P_D
-    inside: float  #: P_G
+    gate_probability: float  #: P_G
     density: float  #: of false plots per m², as the tracker assumes it
     speed: float  #: of targets in m/s, which widens the gate of a track of one plot
 
@@ -133,7 +133,7 @@ def associate_gated_plots(gated_plots, rule, r, S, settled):
     settled) takes the nearest."""
     r = max(r, MIN_RANGE_M)
     density, root = rule.density * r, 2.0 * math.pi * math.sqrt(S[0] * S[2] - S[1] * S[1])
-    miss_probability = 1.0 - rule.detection * rule.inside
+    miss_probability = 1.0 - rule.detection * rule.gate_probability
     ratio = miss_probability + rule.detection * gated_plots.weight / (root * max(density, MIN_DENSITY * r))
     score = log_polynomial(max(ratio, 1e-12))
     if gated_plots.count == 0.0:
@@ -163,7 +163,7 @@ def associate_innovations(rule, settled, r, S, nu_r, nu_b):
     irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
     gated_plots = empty_gate()
     for i in range(nu_r.size):
-        gated_plots = add_plot(gated_plots, nu_r[i], nu_b[i], 0.0, (irr, irb, ibb), rule.gate)
+        gated_plots = add_plot(gated_plots, nu_r[i], nu_b[i], 0.0, (irr, irb, ibb), rule.chi_square)
     return associate_gated_plots(gated_plots, rule, r, S, settled)
 
 

@@ -92,12 +92,12 @@ def associate_in_box(keys, rule, draw_index, gate, plot, box, law_probability, d
     p = -math.expm1(-box.mean)
     h = max(law_probability, p)
     gated_plots, any_in_box = draw_plots_in_gate(
-        keys, draw_index[0], draw_index[1], gate, rule.gate, box, p, max(drawn_probability, p)
+        keys, draw_index[0], draw_index[1], gate, rule.chi_square, box, p, max(drawn_probability, p)
     )
     if plot[0] > 0.0:
         irr, irb, ibb, _ = kernels_gate.inverse_two(gate.S[0], gate.S[1], gate.S[2])
         gated_plots = kernels_gate.add_plot(
-            gated_plots, plot[1] - gate.r, plot[2] - gate.b, 0.0, (irr, irb, ibb), rule.gate
+            gated_plots, plot[1] - gate.r, plot[2] - gate.b, 0.0, (irr, irb, ibb), rule.chi_square
         )
     association = kernels_gate.associate_gated_plots(gated_plots, rule, gate.r, gate.S, gate.settled)
     return association, h / p if any_in_box else (1.0 - h) / (1.0 - p), any_in_box

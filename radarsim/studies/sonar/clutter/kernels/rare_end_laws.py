@@ -177,7 +177,9 @@ def set_box_probabilities(field, laws, scan, tracks, status, predicted, sampling
         ):
             position, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
             reach = laws.rule.speed * (status[track_rules.TIME_SINCE_PLOT, i] + scan.dt)
-            mean = gate_box(cells, kernels_gate.track_gate(position, S, plots[i] > 1.5, reach), laws.rule.gate).mean
+            mean = gate_box(
+                cells, kernels_gate.track_gate(position, S, plots[i] > 1.5, reach), laws.rule.chi_square
+            ).mean
             sampling[BOX_PROBABILITY, i] = -math.expm1(-mean) if 0.0 < mean <= MAX_BOX_MEAN else 0.0
 
 
@@ -242,11 +244,11 @@ def detect_by_laws(detections, laws, scan, status, predicted, target, course, si
             S = (predicted[2, i], predicted[3, i], predicted[4, i])
             irr, irb, ibb, _ = kernels_gate.inverse_two(S[0], S[1], S[2])
             nu = (z[0, i] - predicted[0, i], z[1, i] - predicted[1, i])
-            in_gate = in_gate and kernels_gate.distance_squared(nu[0], nu[1], (irr, irb, ibb)) <= laws.rule.gate
+            in_gate = in_gate and kernels_gate.distance_squared(nu[0], nu[1], (irr, irb, ibb)) <= laws.rule.chi_square
             if not in_gate:
                 off_r = course.truth[0, 0] + course.shift[0, 0, i] - predicted[0, i]
                 off_b = course.truth[1, 0] + course.shift[1, 0, i] - predicted[1, i]
-                c = probability_outside_gate((off_r, off_b), S, laws.rule.gate, (sigma[0], sigma[1]))
+                c = probability_outside_gate((off_r, off_b), S, laws.rule.chi_square, (sigma[0], sigma[1]))
         for j in range(laws.length.size):
             h = undetected_probability(laws, j + 1, longest, misses, k, detection)
             factor = (1.0 - h) / detection if in_gate else (h + (1.0 - h) * c) / (1.0 - detection + detection * c)
@@ -294,7 +296,7 @@ def associate_young_tracks(field, detections, keys, laws, scan, tracks, status, 
         plot, realisation = (detected[i], z[0, i], z[1, i]), scan.first + i
         if sampling[BOX_PROBABILITY, i] > 0.0:
             certain = detections.certain[scan.k]
-            box = gate_box(draws.cells, gate, rule.gate)
+            box = gate_box(draws.cells, gate, rule.chi_square)
             is_detected = detected[i] > 0.0
             law_probability, drawn_probability, eta = false_plot_probabilities(
                 laws, scan.k, certain, miss_probability, is_detected, status, sampling, i

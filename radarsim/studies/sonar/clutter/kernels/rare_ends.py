@@ -76,7 +76,7 @@ def simulate_ends(world, detections, field, trackers, ends, work, first, total, 
     """Add the weighted ends of the target's first confirmed tracks to sums, an EndSums.
 
     Arguments as in `blocks.simulate_block`."""
-    F, K = trackers.gate.size, world.dt.size
+    F, K = trackers.chi_square.size, world.dt.size
     plots, shift = np.empty((2, 4, CHUNK)), np.zeros((2, 3, CHUNK))
     measured, z, detected = np.empty((2, CHUNK)), np.empty((2, CHUNK)), np.empty(CHUNK)
     sampling, plot_counts = np.empty((F, FIRST_RATIO + ends.shares.shape[1] - 1, CHUNK)), np.empty(CHUNK)

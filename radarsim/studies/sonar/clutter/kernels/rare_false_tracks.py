@@ -81,7 +81,10 @@ def associate_false_tracks(field, shift, trackers, f, scan, work, sampling, coun
         status[track_rules.TIME_SINCE_PLOT, i] += scan.dt
         position, S = (predicted[0, i], predicted[1, i]), (predicted[2, i], predicted[3, i], predicted[4, i])
         gate = kernels_gate.track_gate(position, S, plots[i] > 1.5, rule.speed * status[track_rules.TIME_SINCE_PLOT, i])
-        box, tentative = gate_box(draws.cells, gate, rule.gate), status[track_rules.STATE, i] == track_rules.TENTATIVE
+        box, tentative = (
+            gate_box(draws.cells, gate, rule.chi_square),
+            status[track_rules.STATE, i] == track_rules.TENTATIVE,
+        )
         if (tentative or holds) and 0.0 < box.mean <= MAX_BOX_MEAN:
             law_probability = (
                 (m - status[track_rules.HITS, i]) / (n - status[track_rules.AGE, i])
@@ -152,7 +155,7 @@ def simulate_false_tracks(seeds, field, shift, trackers, work, dt, first, total,
         tracker.reset_tracks(work)
         n = min(CHUNK, total - done)
         false_plots.draw_uniform_positions(seeds, field, first + done, n, z)
-        for f in range(trackers.gate.size):
+        for f in range(trackers.chi_square.size):
             tracks, status = tracker.tracks_of_tracker(work, f), work.status[f]
             if trackers.association[f] == kernels_gate.KNOWN:
                 continue
@@ -168,5 +171,5 @@ def simulate_false_tracks(seeds, field, shift, trackers, work, dt, first, total,
             for i in range(n):
                 add_realisation_weight(track_weight(shift.shares, sampling, i), sampling[LAW, i] == 0.0, sums.drawn[f])
             track_sums.add_scores(
-                trackers.thresholds, n, status[track_rules.FIRST], status[track_rules.BEST], scores[f]
+                trackers.score_thresholds, n, status[track_rules.FIRST], status[track_rules.BEST], scores[f]
             )

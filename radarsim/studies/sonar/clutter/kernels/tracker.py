@@ -23,8 +23,8 @@ class Trackers(NamedTuple):
     """F trackers."""
 
     association: np.ndarray  #: (F,)
-    gate: np.ndarray  #: (F,) as χ²
-    inside: np.ndarray  #: (F,) probability of the gate
+    chi_square: np.ndarray  #: (F,) on the border of the gate
+    gate_probability: np.ndarray  #: (F,) P_G
     m: np.ndarray  #: (F,) of the rule that confirms
     n: np.ndarray  #: (F,) likewise
     misses: np.ndarray  #: (F,) in a row that drop a track
@@ -35,7 +35,7 @@ class Trackers(NamedTuple):
     density: float  #: of false plots per m², likewise
     period: float  #: s
     sigma: np.ndarray  #: (2,) of a plot
-    thresholds: np.ndarray  #: (T,) of the score
+    score_thresholds: np.ndarray  #: (T,)
 
 
 class Workspace(NamedTuple):
@@ -95,8 +95,10 @@ def tracks_of_tracker(work, f):
 @inline
 def association_rule(trackers, f):
     """The rule by which tracker f chooses among plots."""
-    association, gate, inside, speed = trackers.association[f], trackers.gate[f], trackers.inside[f], trackers.speed[f]
-    return AssociationRule(association, gate, trackers.detection, inside, trackers.density, speed)
+    chi_square, gate_probability = trackers.chi_square[f], trackers.gate_probability[f]
+    return AssociationRule(
+        trackers.association[f], chi_square, trackers.detection, gate_probability, trackers.density, trackers.speed[f]
+    )
 
 
 @kernel_part
