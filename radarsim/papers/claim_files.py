@@ -15,6 +15,7 @@ several at once. An unknown argument is a fault with file and line, as in a conf
 
 import inspect
 import itertools
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -36,7 +37,7 @@ from radarsim.config.yaml_io import parse_yaml, read_document
 from radarsim.errors import AUTHOR_ERRORS, ConfigError, MeasureError, RadarsimError
 from radarsim.papers import expected_ranges
 from radarsim.papers.claim import Claim, Part
-from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownName, exact_number
+from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownName, exact_number, has_interval
 from radarsim.papers.interpretations import Alternative, Choice, ImpossibleInterpretation
 from radarsim.report.statistics import Estimate
 
@@ -164,6 +165,11 @@ class MeasureCall:
     def number(self, evidence: Any) -> float:
         """Its value alone."""
         return float(self(evidence).value)
+
+    def exact_number(self, evidence: Any) -> float:
+        """Its value where that is exact, else NaN."""
+        estimate = self(evidence)
+        return math.nan if has_interval(estimate) else float(estimate.value)
 
 
 def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
@@ -348,7 +354,7 @@ class _Reader:
             if fields[key] is not None:
                 fields[key] = self._call(fields[key], self.measures, cases, (*path, key)).number
         exactly = self.functions.get(f"exact_{measure.name}")
-        exact = replace(measure, name=f"exact_{measure.name}", function=exactly).number if exactly else None
+        exact = replace(measure, name=f"exact_{measure.name}", function=exactly).exact_number if exactly else None
         assert expected.function
         expected_range = expected.function(**expected.arguments)
         if not (expected_range.lo <= expected_range.hi and expected_range.margin > 0):

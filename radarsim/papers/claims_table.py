@@ -9,7 +9,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import MeasureError
 from radarsim.papers.claim import Claim, PaperClaims, Part
 from radarsim.papers.claim_outcome import ClaimOutcome, claim_outcome
-from radarsim.papers.evidence import Evidence, ExactNumber, MissingEvidence
+from radarsim.papers.evidence import Evidence, ExactNumber, MissingEvidence, has_interval
 from radarsim.papers.paper_cases import CaseKeys, ShippedCases, case_keys, key_differences, paper_members
 from radarsim.papers.verdict_rule import CONFIRMED, REFUTED, JudgedPart, judged_interval, miss_in_margins, part_verdict
 from radarsim.report import tables
@@ -229,13 +229,14 @@ def judged_part(part: Part, evidence: Evidence, measured: Estimate, n: int) -> J
 
 
 def exact_value(part: Part, evidence: Evidence, measured: Estimate) -> float:
-    """The exact value of a part, NaN where unknown."""
+    """The exact value of a part, NaN where unknown: an estimate with an interval is not exact, whatever it read."""
     try:
         if part.exact:
             return float(part.exact(evidence))
-        return float(part.measure(evidence.exactly()).value)
+        estimate = part.measure(evidence.exactly())
     except MissingEvidence:
-        return float(measured.value) if isinstance(measured, ExactNumber) else math.nan
+        estimate = measured if isinstance(measured, ExactNumber) else UNKNOWN
+    return math.nan if has_interval(estimate) else float(estimate.value)
 
 
 def disagreement_message(part: Part, judged: JudgedPart) -> str:
@@ -252,6 +253,7 @@ def disagreement_message(part: Part, judged: JudgedPart) -> str:
     )
 
 
+UNKNOWN = Estimate(math.nan, math.nan, math.nan)
 ROUNDING = 1e-3  # of a margin, for values without width: identities hold to the last bits
 MEASURE_FAILED = "its measure fails"
 DISAGREEMENT = f"exact value and simulation differ by more than {ERROR_OF_PROGRAM} standard errors"

@@ -1,8 +1,9 @@
 """Measured values for claims: tables of a result as curves, and points of them with their intervals."""
 
 import copy
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report import tables
 from radarsim.report.statistics import Estimate, difference
+
+
+INTERVAL_ROUNDING = 1e-12  # of a number: an interval that is narrower is rounding
 
 
 class MissingEvidence(KeyError):
@@ -144,9 +148,37 @@ def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
     )
 
 
+def has_interval(estimate: Estimate) -> bool:
+    """Whether an estimate has an interval wider than rounding, or an unknown one, so that its value is not exact.
+
+    The ends of a ratio of exact numbers are unknown where one of them is zero (`ratio`): that is no interval."""
+    value, lo, hi = (float(number) for number in estimate)
+    if math.isnan(lo) or math.isnan(hi):
+        return math.isfinite(value) and value != 0
+    return lo != hi and not hi - lo <= INTERVAL_ROUNDING * max(abs(lo), abs(hi))
+
+
 def exact_number(value: float) -> ExactNumber:
     """A number without noise: algebra, a count."""
     return ExactNumber(float(value), float(value), float(value))
+
+
+@dataclass(frozen=True, repr=False)
+class InterpretedCase(CaseResult):
+    """A case that was run under an interpretation: `spec` has the keys of the run, `shipped_spec` those of the paper's
+    own case, by which claims find it."""
+
+    shipped_spec: Any = None
+
+
+def interpreted_case(result: CaseResult, shipped_spec: Any) -> InterpretedCase:
+    """A result of a changed case, with the keys of the paper's own case."""
+    return InterpretedCase(**{f.name: getattr(result, f.name) for f in fields(result)}, shipped_spec=shipped_spec)
+
+
+def shipped_spec(result: CaseResult) -> Any:
+    """The keys by which claims find a case: under an interpretation those of the paper's own case, not of the run."""
+    return result.shipped_spec if isinstance(result, InterpretedCase) else result.spec
 
 
 class _WatchedTables(dict):
@@ -199,11 +231,13 @@ class Evidence:
     def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
         """The paper's members of a list of a case, each with its number; not the added ones."""
         return [
-            (i, member) for i, member in enumerate(getattr(result.spec, key)) if i in self._places[result.name][key]
+            (i, member) for i, member in enumerate(getattr(shipped_spec(result), key)) if i in self._places[result.name][key]
         ]
 
     def case(self, key: Any) -> CaseResult:
-        """The case for a key; raises MissingEvidence where the experiment does not hold it. Here: by name."""
+        """The case for a key; raises MissingEvidence where the experiment does not hold it. Here: by name.
+
+        A subclass compares keys with `shipped_spec(result)`; `result.spec` has those of the run."""
         for result in self.results:
             if result.name == key:
                 return result

@@ -14,6 +14,7 @@ from radarsim.engine.machine import available_cores
 from radarsim.engine.stopping import Signals
 from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.papers.claim import Claim
+from radarsim.papers.evidence import interpreted_case, shipped_spec
 from radarsim.papers.interpretations import ChangedResults, ImpossibleInterpretation, Interpretation
 from radarsim.papers.open_papers import JudgingRequest
 from radarsim.papers.verdict_rule import UNDECIDED
@@ -211,10 +212,10 @@ class InterpretationRuns:
     def _changed_results(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> ChangedResults:
         results = simulate_cases.collected_results(simulated)
         tables = result_content.measured_tables(results)
-        originals = [replace(changed, spec=case.spec) for changed, (case, _) in zip(results, pairs, strict=True)]
+        originals = [interpreted_case(changed, case.spec) for changed, (case, _) in zip(results, pairs, strict=True)]
         may_grow = self._paper.claims.may_grow
         places = {
-            changed.name: {key: set(range(len(getattr(changed.spec, key)))) for key in may_grow}
+            changed.name: {key: set(range(len(getattr(shipped_spec(changed), key)))) for key in may_grow}
             for changed in originals
         }
         return ChangedResults(originals, results, tables, places)

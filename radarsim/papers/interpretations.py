@@ -221,8 +221,8 @@ def with_spaces(name: str) -> str:
 class ChangedResults:
     """Results of the changed cases of a config, under the names and keys of that config.
 
-    results (in the order of the config) have the sums and axes of the run and the keys of the paper's own case, by
-    which claims find it; run_results has them with the keys of the run. tables and places are as in
+    results (in the order of the config) are those of the run, each with the keys of the paper's own case, by which
+    claims find it (`evidence.InterpretedCase`); run_results are without these. tables and places are as in
     `evidence.Evidence`."""
 
     results: Sequence[CaseResult]

@@ -13,7 +13,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.papers.evidence import Curve, MissingEvidence
+from radarsim.papers.evidence import Curve, MissingEvidence, shipped_spec
 from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.report.statistics import Estimate, difference, mean
 from radarsim.report.tables import realisation_counts
@@ -28,10 +28,10 @@ class Evidence(GeneralEvidence):
     def case(self, key: Any) -> CaseResult:
         if not isinstance(key, Mapping):
             return super().case(key)
-        if unknown := unknown_key(key, [result.spec for result in self.results]):
+        if unknown := unknown_key(key, [shipped_spec(result) for result in self.results]):
             raise ConfigError(f"of: {unknown}: there is no such key")
         for result in self.results:
-            if has_values(result.spec, key):
+            if has_values(shipped_spec(result), key):
                 return result
         raise MissingEvidence(key)
 

@@ -12,7 +12,7 @@ from radarsim.papers.claim import Claim, Part
 from radarsim.papers.claim_outcome import ClaimOutcome, claim_outcome, largest_needed, round_up
 from radarsim.papers.claims_table import exact_value as known
 from radarsim.papers.claims_table import judged_part
-from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownScans
+from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownScans, has_interval
 from radarsim.papers.interpretation_outcome import InterpretationOutcome, outcome_over_interpretations
 from radarsim.papers.interpretations import DEFAULT, Interpretation, PaperInterpretations
 from radarsim.papers.reasons import translate_reason
@@ -88,6 +88,7 @@ def _judge_part(part: Part, evidence: Evidence, exact: bool, n: int, shipped: bo
     exact: whether all evidence is exact. Otherwise the exact value is known where the run knows it; a part's own
     formula is of the shipped interpretation."""
     measured, nothing = part.measure(evidence), Estimate(*(math.nan,) * 3)
+    exact = exact and not has_interval(measured)
     default_part = replace(part, variant="", against_print=False)
     value = measured.value if exact else known(part if shipped else replace(part, exact=None), evidence, measured)
     return replace(judged_part(default_part, evidence, nothing if exact else measured, n), exact=float(value))

@@ -16,7 +16,7 @@ from radarsim.bursts import schedule_design
 from radarsim.bursts.burst import balanced_inverse
 from radarsim.engine.results import CaseResult
 from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.papers.evidence import MissingEvidence, exact_number
+from radarsim.papers.evidence import MissingEvidence, exact_number, shipped_spec
 from radarsim.report.statistics import Estimate, difference, root_mean_square
 from radarsim.studies.discriminator import lock_ceiling, scenario
 from radarsim.studies.discriminator.kernels.sums import LOCKS
@@ -41,7 +41,7 @@ class Evidence(GeneralEvidence):
             if isinstance(key, tuple):
                 if len(swept) == 1 and swept[0][0] == key[0] and math.isclose(swept[0][1], key[1]):
                     return result
-            elif not swept and result.spec.burst.noise_variance == INTERPRETATIONS[key][0]:
+            elif not swept and shipped_spec(result).burst.noise_variance == INTERPRETATIONS[key][0]:
                 return result
         raise MissingEvidence(key)
 

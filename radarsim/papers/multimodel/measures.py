@@ -10,7 +10,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.papers.evidence import MissingEvidence
+from radarsim.papers.evidence import MissingEvidence, shipped_spec
 from radarsim.report.statistics import Estimate
 from radarsim.studies.multimodel import cost, model_bank, tables
 
@@ -40,7 +40,8 @@ class Evidence(GeneralEvidence):
         """key: (name of the flight, scan period, filters that must be there)."""
         flight, period, filter_keys = key
         for result in self.results:
-            is_case = is_flight(result.spec.target, flight) and np.isclose(result.spec.sensor.scan_period_s, period)
+            spec = shipped_spec(result)
+            is_case = is_flight(spec.target, flight) and np.isclose(spec.sensor.scan_period_s, period)
             if is_case and all(self._index(result, filter_key) is not None for filter_key in filter_keys):
                 return result
         raise MissingEvidence(key)

@@ -10,7 +10,15 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import Curve, MissingEvidence, common_times, exact_number, ratio, subtract
+from radarsim.papers.evidence import (
+    Curve,
+    MissingEvidence,
+    common_times,
+    exact_number,
+    ratio,
+    shipped_spec,
+    subtract,
+)
 from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.report.statistics import Estimate, difference
@@ -41,14 +49,14 @@ class Evidence(GeneralEvidence):
     @staticmethod
     def _radar(result: CaseResult) -> int | None:
         """The number of the paper's radar that a case is."""
-        radar = result.spec.radar
+        radar = shipped_spec(result).radar
         settings = (radar.sigma_range_m, radar.sigma_velocity_mps, radar.scan_period_s)
         return next((number for number, row in RADARS.items() if all(map(math.isclose, settings, row))), None)
 
     @staticmethod
     def _variance(result: CaseResult) -> float:
         """The manoeuvre variance of the paper's two filters."""
-        variance: float = result.spec.filters[0].manoeuvre_variance
+        variance: float = shipped_spec(result).filters[0].manoeuvre_variance
         return variance
 
     def whole_sigma(self, key: Key, observes: tuple[str, ...], component: str) -> Curve:
@@ -61,7 +69,7 @@ class Evidence(GeneralEvidence):
 
     def filter(self, key: Key, observes: tuple[str, ...]) -> str:
         """The name of the filter that observes these."""
-        return next(f.name for f in self.case(key).spec.filters if f.observes == observes)
+        return next(f.name for f in shipped_spec(self.case(key)).filters if f.observes == observes)
 
     def k_gain(self, radar: Key, component: str) -> Curve:
         """The relative gain K (eq. 17), from the scan at which the filter with velocity has filtered, k ≥ 2. At k = 1

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.papers.evidence import MissingEvidence, ratio
+from radarsim.papers.evidence import MissingEvidence, ratio, shipped_spec
 from radarsim.physics.motion import transition
 from radarsim.report import statistics
 from radarsim.report.statistics import Estimate
@@ -47,7 +47,7 @@ class Evidence(GeneralEvidence):
 
 
 def _kinds(result: CaseResult) -> set[tuple[str, int]]:
-    return {(f.kind, f.degree) for f in result.spec.filters}
+    return {(f.kind, f.degree) for f in shipped_spec(result).filters}
 
 
 def _is_textbook(result: CaseResult) -> bool:
@@ -56,26 +56,26 @@ def _is_textbook(result: CaseResult) -> bool:
 
 
 def _is_fluctuating(result: CaseResult) -> bool:
-    walks = bool(getattr(result.spec.target, "fluctuation_mps2", 0.0))
+    walks = bool(getattr(shipped_spec(result).target, "fluctuation_mps2", 0.0))
     return walks and ("growing_memory", 1) in _kinds(result) and len(result.axes.k) >= 40
 
 
 def _is_turning(result: CaseResult) -> bool:
-    return result.spec.target.kind == "turning" and ("growing_memory", 1) in _kinds(result) and _has_equal_plots(result)
+    return shipped_spec(result).target.kind == "turning" and ("growing_memory", 1) in _kinds(result) and _has_equal_plots(result)
 
 
 def _has_gap(result: CaseResult) -> bool:
-    sensor = result.spec.sensor
+    sensor = shipped_spec(result).sensor
     return bool(sensor.missed_scans) and sensor.detection_probability == 1 and not sensor.further
 
 
 def _has_several_sonars(result: CaseResult) -> bool:
-    return bool(result.spec.sensor.further)
+    return bool(shipped_spec(result).sensor.further)
 
 
 def _has_equal_plots(result: CaseResult) -> bool:
     """Equal intervals and weights, no miss, long enough."""
-    sensor = result.spec.sensor
+    sensor = shipped_spec(result).sensor
     return (
         not (sensor.missed_scans or sensor.further) and sensor.detection_probability == 1 and len(result.axes.k) >= 20
     )
@@ -84,7 +84,7 @@ def _has_equal_plots(result: CaseResult) -> bool:
 def _first(matches: Callable[[CaseResult], bool]) -> Callable[[Sequence[CaseResult]], CaseResult | None]:
     """The first case in the polar frame that matches."""
     return lambda results: next(
-        (result for result in results if result.spec.frame == "polar" and matches(result)), None
+        (result for result in results if shipped_spec(result).frame == "polar" and matches(result)), None
     )
 
 
@@ -93,7 +93,7 @@ def _correlated(results: Sequence[CaseResult], rho: float) -> CaseResult | None:
     kinds = {("kalman_augmented", 1), ("kalman_differenced", 1)}
 
     def matches(result: CaseResult) -> bool:
-        return kinds <= _kinds(result) and result.spec.sensor.error_correlation == rho and _has_equal_plots(result)
+        return kinds <= _kinds(result) and shipped_spec(result).sensor.error_correlation == rho and _has_equal_plots(result)
 
     return _first(matches)(results)
 

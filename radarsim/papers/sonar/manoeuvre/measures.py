@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import Curve, MissingEvidence, ratio
+from radarsim.papers.evidence import Curve, MissingEvidence, ratio, shipped_spec
 from radarsim.papers.sonar.measures import CASE_FINDERS, Evidence, Key
 from radarsim.report.statistics import Z95, Estimate
 from radarsim.studies.sonar.filter_keys import Filter
@@ -19,10 +19,10 @@ FALSE_ALARM_RATE_AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a
 def _by_strength(results: Sequence[CaseResult]) -> list[CaseResult[ManoeuvreAxes]]:
     """The cases of an accelerating target with detectors in the polar frame, from the weakest manoeuvre on."""
     manoeuvres = [
-        r for r in results if r.spec.frame == "polar" and r.spec.detectors and r.spec.target.kind == "accelerating"
+        r for r in results if shipped_spec(r).frame == "polar" and shipped_spec(r).detectors and shipped_spec(r).target.kind == "accelerating"
     ]
     manoeuvres = [r for r in manoeuvres if r.axes.manoeuvre_s and (r.axes.phase == 1).any()]
-    return sorted(manoeuvres, key=lambda r: abs(r.spec.target.acceleration_mps2))
+    return sorted(manoeuvres, key=lambda r: abs(shipped_spec(r).target.acceleration_mps2))
 
 
 def _weakest(results: Sequence[CaseResult]) -> CaseResult[ManoeuvreAxes] | None:
@@ -45,7 +45,7 @@ CASE_FINDERS.update({WEAK: _weakest, STRONG: _strongest, EQUAL: _of_one_sigma})
 
 def _detector(result: CaseResult[ManoeuvreAxes], plots: int, threshold_key: str, value: float) -> tuple[int, int]:
     """Index of the detector of so many plots that tests at every scan, and of its threshold; else MissingEvidence."""
-    for d, detector in enumerate(result.spec.detectors):
+    for d, detector in enumerate(shipped_spec(result).detectors):
         thresholds = getattr(detector, threshold_key) or ()
         if detector.plots == plots and detector.test_every == 1 and value in thresholds:
             return d, thresholds.index(value)
@@ -71,7 +71,7 @@ def thresholds_ratio(evidence: Evidence, key: Key, more: int, few: int) -> float
     result, accelerations = evidence.case(key), []
     for plots in (more, few):
         d, _ = _detector(result, plots, "false_alarm_probability", USUAL_FALSE_ALARM_RATE)
-        name = result.spec.detectors[d].name
+        name = shipped_spec(result).detectors[d].name
         rows = evidence.tables["thresholds"]
         rows = rows[(rows["case"] == result.name) & (rows["filter"] == name) & (rows["component"] == "r")]
         nearest = (rows["false_alarm_probability"] - USUAL_FALSE_ALARM_RATE).abs().idxmin()
@@ -140,7 +140,7 @@ def fastest_detector(evidence: Evidence, key: Key, until: Until, rate: float) ->
 def _delays(evidence: Evidence, key: Key, until: Until, rate: float) -> dict[int, Estimate]:
     """Mean delays by plots, of the detectors that test at every scan at a rate of false alarms."""
     result = evidence.case(key)
-    detectors = (detector for detector in result.spec.detectors if detector.test_every == 1)
+    detectors = (detector for detector in shipped_spec(result).detectors if detector.test_every == 1)
     plot_counts = [detector.plots for detector in detectors if rate in (detector.false_alarm_probability or ())]
     return {plots: DELAYS[until](result, plots, rate) for plots in plot_counts}
 
@@ -159,7 +159,7 @@ def detected_at_one(evidence: Evidence, key: Key) -> Estimate:
 def _at_one(evidence: Evidence, key: Key) -> Mapping[str, Any]:
     result = evidence.case(key)
     d, _ = _detector(result, 5, "threshold_k", 1.0)
-    name, k = result.spec.detectors[d].name, int(result.axes.k[_last(result)])
+    name, k = shipped_spec(result).detectors[d].name, int(result.axes.k[_last(result)])
     return evidence.row("detections", case=result.name, filter=name, component="r", threshold_k=1.0, k=k)
 
 
