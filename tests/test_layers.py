@@ -127,7 +127,7 @@ ROOMS = {
     "papers": (  # adds itself by `extensions`; only the names for users import it
         *("api", "bursts", "cli", "config", "engine", "extensions", "kernels", "language", "physics"),
         *("report", "report.drawing", "report.user_filters"),
-        *("studies.interface", "studies.onefile", "studies.registry", "user_code_errors"),
+        *("studies.interface", "studies.onefile", "studies.registry", "studies.sources", "user_code_errors"),
     ),
     "cli": (
         *("__init__", "api", "api.design", "api.maintenance", "config", "engine", "extensions", "language"),

@@ -13,7 +13,6 @@ from radarsim.errors import ConfigError
 from radarsim.report import tables
 from radarsim.report.statistics import Estimate, difference
 
-
 INTERVAL_ROUNDING = 1e-12  # of a number: an interval that is narrower is rounding
 
 
@@ -231,7 +230,9 @@ class Evidence:
     def members(self, result: CaseResult, key: str = "filters") -> list[tuple[int, Any]]:
         """The paper's members of a list of a case, each with its number; not the added ones."""
         return [
-            (i, member) for i, member in enumerate(getattr(shipped_spec(result), key)) if i in self._places[result.name][key]
+            (i, member)
+            for i, member in enumerate(getattr(shipped_spec(result), key))
+            if i in self._places[result.name][key]
         ]
 
     def case(self, key: Any) -> CaseResult:

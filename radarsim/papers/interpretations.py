@@ -89,8 +89,14 @@ class PaperInterpretations(ABC):
 
     paper: str  # P1
     choices: tuple[Choice, ...]
+
     realisations: int = 1000  # of each run, by default
     max_realisations: int = 16_000  # of a run that is to decide a claim, by default
+
+    @property
+    def module(self) -> str:
+        """A module of the package that declares them, and the claims."""
+        return type(self).__module__
 
     def leaves_open(self, claim: Claim) -> bool:
         """Whether the paper leaves anything open that affects a claim of its own."""

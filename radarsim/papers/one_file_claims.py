@@ -48,7 +48,7 @@ def interpretations_of(study: OneFile) -> PaperInterpretations | None:
     if study.paper is None or not study.claims_yaml or not declarations(study)[1]:
         return None
     claims, choices = declarations(study)
-    return Interpretations(claims[0].paper, choices)
+    return Interpretations(claims[0].paper, choices, type(study).__module__)
 
 
 def claim_faults(study: OneFile, shipped: ShippedCases) -> Sequence[str]:
@@ -69,8 +69,12 @@ def _module_of(study: OneFile) -> Any:
 class Interpretations(PaperInterpretations):
     """Interpretations whose alternatives set keys of a case, by dotted names; a bare name applies to every filter."""
 
-    def __init__(self, paper: str, choices: tuple[Choice, ...]):
-        self.paper, self.choices = paper, choices
+    def __init__(self, paper: str, choices: tuple[Choice, ...], module: str = ""):
+        self.paper, self.choices, self._module = paper, choices, module
+
+    @property
+    def module(self) -> str:
+        return self._module or super().module
 
     def changed_case(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
         return replace(case, spec=_with_settings(case.spec, self.settings(interpretation)))

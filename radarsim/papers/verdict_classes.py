@@ -11,6 +11,7 @@ from typing import Any
 from radarsim.config.identity import digest
 from radarsim.language.translate import term, tr
 from radarsim.papers.claim import Claim
+from radarsim.papers.claim_sources import measure_calls, package_sources, plain_data
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN
 from radarsim.papers.interpretations import PaperInterpretations
 from radarsim.papers.verdict_rule import CLASSES, CONTRADICTORY, DEPENDS, FIXED_CLASSES, UNDECIDED
@@ -67,21 +68,31 @@ KnownClasses = Mapping[str, VerdictClass | None]
 
 
 def declaration_digest(interpretations: PaperInterpretations, claim: Claim) -> str:
-    """A mark of a claim's assertions and of the open choices that affect it: a changed mark means another claim."""
+    """A mark of all that a verdict follows from: a claim's assertions and what measures them, and the choices that
+    affect it, with what they set; see `claim_sources`. A changed mark means another claim."""
     part_declarations = [
         [
             *(part.what, part.unit, part.statement, part.number, part.variant, part.against_print, part.asserted),
             *(repr(end) for end in (part.expected.lo, part.expected.hi, part.expected.margin)),
             part.expected.kind,
+            plain_data(part.cases),
+            measure_calls(part),
         ]
         for part in claim.parts
     ]
     choice_declarations = [
-        [choice.key, choice.contradicts, *([alternative.name, alternative.kind] for alternative in choice.alternatives)]
+        [
+            *(choice.key, choice.contradicts),
+            *(
+                [alternative.name, alternative.kind, plain_data(alternative.sets)]
+                for alternative in choice.alternatives
+            ),
+        ]
         for choice in interpretations.choices
         if choice.affects(claim.id)
     ]
-    return digest([part_declarations, claim.judging_options, choice_declarations])[:16]
+    sources = package_sources(claim, interpretations.module)
+    return digest([part_declarations, claim.judging_options, choice_declarations, sources])[:16]
 
 
 def verdict_class(verdicts: ClaimVerdicts) -> VerdictClass | None:

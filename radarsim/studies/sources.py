@@ -146,3 +146,35 @@ def _folders(top: str) -> Iterator[Path]:
 def _installed_versions() -> list[tuple[str, str]]:
     every_metadata = (distribution.metadata for distribution in distributions())
     return sorted({(metadata["Name"], metadata["Version"]) for metadata in every_metadata})
+
+
+@cache
+def code_digest(packages: tuple[str, ...], ignored_name: str) -> str:
+    """SHA-256 of the code of user packages and of those that they import, without comments and docstrings.
+
+    ignored_name: of variables and attributes that do not count."""
+    first = [name for package in packages for name in (package, *_all_modules(package))]
+    modules = sorted(name for name in computing_modules(tuple(first)) if name.partition(".")[0] != RADARSIM)
+    texts = [f"{name}: {_plain_code(module_source(name), ignored_name)}" for name in modules]
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()
+
+
+def _plain_code(source: bytes, ignored_name: str) -> str:
+    """A module's code in one form, however it is written."""
+    try:
+        tree = ast.parse(source)
+    except (SyntaxError, ValueError):  # no Python: an extension
+        return hashlib.sha256(source).hexdigest()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = [line for line in node.body if not _is_text(line) and ignored_name not in _assigned_names(line)]
+    return ast.dump(tree)
+
+
+def _is_text(line: ast.stmt) -> bool:
+    return isinstance(line, ast.Expr) and isinstance(line.value, ast.Constant)
+
+
+def _assigned_names(line: ast.stmt) -> list[str]:
+    targets = line.targets if isinstance(line, ast.Assign) else [getattr(line, "target", None)]
+    return [target.id for target in targets if isinstance(target, ast.Name)]

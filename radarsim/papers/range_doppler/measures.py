@@ -10,15 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import (
-    Curve,
-    MissingEvidence,
-    common_times,
-    exact_number,
-    ratio,
-    shipped_spec,
-    subtract,
-)
+from radarsim.papers.evidence import Curve, MissingEvidence, common_times, exact_number, ratio, shipped_spec, subtract
 from radarsim.papers.evidence import Evidence as GeneralEvidence
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.report.statistics import Estimate, difference

@@ -61,7 +61,11 @@ def _is_fluctuating(result: CaseResult) -> bool:
 
 
 def _is_turning(result: CaseResult) -> bool:
-    return shipped_spec(result).target.kind == "turning" and ("growing_memory", 1) in _kinds(result) and _has_equal_plots(result)
+    return (
+        shipped_spec(result).target.kind == "turning"
+        and ("growing_memory", 1) in _kinds(result)
+        and _has_equal_plots(result)
+    )
 
 
 def _has_gap(result: CaseResult) -> bool:
@@ -93,7 +97,11 @@ def _correlated(results: Sequence[CaseResult], rho: float) -> CaseResult | None:
     kinds = {("kalman_augmented", 1), ("kalman_differenced", 1)}
 
     def matches(result: CaseResult) -> bool:
-        return kinds <= _kinds(result) and shipped_spec(result).sensor.error_correlation == rho and _has_equal_plots(result)
+        return (
+            kinds <= _kinds(result)
+            and shipped_spec(result).sensor.error_correlation == rho
+            and _has_equal_plots(result)
+        )
 
     return _first(matches)(results)
 

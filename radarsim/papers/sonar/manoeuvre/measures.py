@@ -19,7 +19,11 @@ FALSE_ALARM_RATE_AT_ONE = 0.31731050786291415  # false alarms a test at k = 1: a
 def _by_strength(results: Sequence[CaseResult]) -> list[CaseResult[ManoeuvreAxes]]:
     """The cases of an accelerating target with detectors in the polar frame, from the weakest manoeuvre on."""
     manoeuvres = [
-        r for r in results if shipped_spec(r).frame == "polar" and shipped_spec(r).detectors and shipped_spec(r).target.kind == "accelerating"
+        r
+        for r in results
+        if shipped_spec(r).frame == "polar"
+        and shipped_spec(r).detectors
+        and shipped_spec(r).target.kind == "accelerating"
     ]
     manoeuvres = [r for r in manoeuvres if r.axes.manoeuvre_s and (r.axes.phase == 1).any()]
     return sorted(manoeuvres, key=lambda r: abs(shipped_spec(r).target.acceleration_mps2))
