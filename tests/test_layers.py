@@ -53,7 +53,8 @@ ROOMS = {
     "studies": (),
     "studies.noise": ("config.experiment", "config.identity", "kernels.random"),
     "studies.radial_truth": ("constants", "physics"),
-    "studies.plot_arrays": (),
+    "studies.random_numbers": ("kernels.random",),
+    "studies.plot_arrays": ("studies.random_numbers",),
     "studies.recording_interface": ("config.experiment", "studies.plot_arrays"),
     "studies.floors": ("engine.results", "report", "studies.interface"),
     "studies.interface": (
@@ -90,8 +91,8 @@ ROOMS = {
         "user_code_errors",
     ),
     "studies.user_filters": (
-        *("config", *SUMS, "language", "module_sources", "studies.interface", "studies.plot_arrays"),
-        *("user_code_errors", "user_files"),
+        *("config", *SUMS, "language", "module_sources", "studies.interface", "studies.noise", "studies.plot_arrays"),
+        *("studies.random_numbers", "user_code_errors", "user_files"),
     ),
     "studies.registry": (
         *("config", "extensions", "report.quantities", "studies.interface", "studies.user_filters"),

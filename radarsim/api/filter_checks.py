@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -9,7 +10,9 @@ import numpy as np
 from radarsim.api.case_work import CaseWork
 from radarsim.api.estimate_files import UNIT_FACTORS
 from radarsim.config.experiment import Case
+from radarsim.config.seeds import OTHER_NOISE, other_seed
 from radarsim.errors import ConfigError
+from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
 from radarsim.report import statistics
 from radarsim.studies.user_filters import estimates, sums
@@ -18,8 +21,12 @@ from radarsim.studies.user_filters.sums import Plan
 
 TRIAL_REALISATIONS = 256  # realisations on which a filter is checked before it is judged
 MATERIAL_CHANGE = 1e-3  # of a component's rms error; smaller changes are rounding, even that of float32
+TRAINED = 4.5  # standard errors of a rank sum: by chance once in 300,000 filters
 MIN_FOLLOW_REALISATIONS = 50  # below it, it is not tested whether errors follow the plots
 MIN_ORDER_FACTOR = 10.0  # errors that another order or unit divides by it show that this is the right one
+
+
+Errors = tuple[np.ndarray, np.ndarray]  # of a user filter (n, K, C), and of the config's filters (F, n, K, C)
 
 
 def check_user_filter(case: Case, member: UserFilter) -> list[str]:
@@ -47,6 +54,7 @@ def check_user_filter(case: Case, member: UserFilter) -> list[str]:
         if any(not np.array_equal(plots[name], columns[name], equal_nan=True) for name in columns):
             lines.append(tr("{name}: changes the plots it is given; it gets copies", name=member.name))
         lines += _check_repeatable(plan, member, x, MATERIAL_CHANGE * rms)
+        lines += _check_training(case, plan, member, (errors.error, inner))
     return lines
 
 
@@ -106,10 +114,8 @@ def _check_repeatable(plan: Plan, member: Any, x: np.ndarray, tolerance: np.ndar
             name=name,
         )
         return
-    rows = slice(n // 4, n // 4 + max(n // 2, 1))  # neither the first nor the last, on which such a filter may rely
-    some_plots = sums.plots_of(plan, plan.draw(rows.start, rows.stop - rows.start))
-    if n > 1 and _differ(_repeated_estimates(plan, member, some_plots), x[rows], tolerance):
-        yield tr("{name}: its estimates of a realisation depend on the others in the batch", name=name)
+    if n > 1 and (warning := _batch_warning(plan, member, x, tolerance)):
+        yield warning
         return
     if hasattr(member.target, "step") or K < 2 or n < 2:
         return
@@ -120,6 +126,63 @@ def _check_repeatable(plan: Plan, member: Any, x: np.ndarray, tolerance: np.ndar
     if _differ(_repeated_estimates(plan, member, plots)[:, :cut], x[:, :cut], tolerance):
         yield tr("{name}: uses later plots: its estimates up to scan {k} change with the plots after it; compare it "
                  "with smoothers, not with filters", name=name, k=cut)  # fmt: skip
+
+
+def _batch_warning(plan: Plan, member: Any, x: np.ndarray, tolerance: np.ndarray) -> str:
+    """A warning where estimates depend on the other realisations in the batch; none for random numbers that differ
+    from block to block."""
+    n = len(x)
+    rows = slice(n // 4, n // 4 + max(n // 2, 1))  # neither the first nor the last, on which such a filter may rely
+    some_plots = sums.plots_of(plan, plan.draw(rows.start, rows.stop - rows.start))
+    if not _differ(_repeated_estimates(plan, member, some_plots), x[rows], tolerance):
+        return ""
+    if member.name in plan.repeating:
+        return tr(
+            "{name}: draws the same random numbers in every block of {block} realisations: intervals do not hold then, "
+            "and are shown of one block alone; plots.normals(m) and plots.uniforms(m) give it others",
+            name=member.name,
+            block=plan.block,
+        )
+    source = some_plots.world.random
+    is_declared = source is not None and source.generator_used  # random numbers of `plots.generator`
+    other_block = replace(sums.plots_of(plan, plan.draw(0, n)), first=plan.block)
+    if is_declared or _differ(_repeated_estimates(plan, member, other_block), x, tolerance):
+        return ""
+    return tr("{name}: its estimates of a realisation depend on the others in the batch", name=member.name)
+
+
+def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) -> Iterator[str]:
+    """A warning where errors are larger on noise of another seed than chance explains (Mann and Whitney's test)."""
+    n = len(judged[0])
+    other_plan = sums.with_other_noise(plan, case, other_seed(case.seed, OTHER_NOISE))
+    plots = other_plan.draw(0, n)
+    inner = sums.inner_errors(other_plan, 0, n)
+    answer = member.estimates(sums.plots_of(other_plan, plots))
+    errors = sums.filter_errors(other_plan, member, answer, plots, sums.greatest_errors(inner))
+    here, there = _mean_squares(judged, (errors.error, inner))
+    smaller = (here[:, None] < there).mean() + (here[:, None] == there).mean() / 2
+    if not smaller - 0.5 > TRAINED * np.sqrt((2 * n + 1) / (12 * n * n)):
+        return
+    ratios = [float(np.sqrt(average(there[np.isfinite(there)]) / average(here[np.isfinite(here)])))
+              for average in (np.mean, np.median) if np.isfinite(there).any() and np.isfinite(here).any()]  # fmt: skip
+    ratio = max(ratios, default=np.inf)
+    member.note_training(ratio)
+    yield tr(
+        "{name}: on noise of another seed its σ is {ratio} times as large: it seems to have been trained on the "
+        'realisations by which it is judged; radarsim.plots(…, purpose="training") draws others',
+        name=member.name,
+        ratio=numeral(f"{ratio:.3g}"),
+    )
+
+
+def _mean_squares(*trials: Errors) -> list[np.ndarray]:
+    """For each trial, the mean square (n,) of a realisation's errors, over scans and components, each over that of the
+    config's best filter; infinite where there is none, as of a failure."""
+    with np.errstate(all="ignore"):
+        squares = np.concatenate([_mean(np.square(inner), 1) for _, inner in trials])
+        best = np.where(squares > 0, squares, np.inf).min(0)
+        means = [_mean((np.square(error) / best).reshape(len(error), -1), 1) for error, _ in trials]
+    return [np.where(np.isfinite(values), values, np.inf) for values in means]
 
 
 def _check_order(

@@ -130,6 +130,37 @@ def fill_uniform_pairs(key, first, pair, a, b):
 
 
 @kernel
+def fill_normal_rows(key, realisations, calls, rows):
+    """Unit normals into rows (R, m), four of each call from calls[r] on of realisation realisations[r]; both uint64."""
+    k0, k1, m = key[0], key[1], rows.shape[1]
+    for r in range(rows.shape[0]):
+        for call in range((m + 3) >> 2):
+            x, y = threefry(realisations[r], calls[r] + U(call), k0, k1)
+            j = call << 2
+            a, b = normal_pair(x)
+            c, d = normal_pair(y)
+            rows[r, j] = a
+            if j + 1 < m:
+                rows[r, j + 1] = b
+            if j + 2 < m:
+                rows[r, j + 2] = c
+            if j + 3 < m:
+                rows[r, j + 3] = d
+
+
+@kernel
+def fill_uniform_rows(key, realisations, calls, rows):
+    """Uniform numbers in (0, 1) into rows (R, m), two for each call, as `fill_normal_rows`."""
+    k0, k1, m = key[0], key[1], rows.shape[1]
+    for r in range(rows.shape[0]):
+        for call in range((m + 1) >> 1):
+            x, y = threefry(realisations[r], calls[r] + U(call), k0, k1)
+            rows[r, call << 1] = uniform(x)
+            if (call << 1) + 1 < m:
+                rows[r, (call << 1) + 1] = uniform(y)
+
+
+@kernel
 def words_to_normals(a, b):
     """Unit normals in place, flat a and b of pairs × LANES numbers: the words of call c stand in row c of either."""
     x, first_words, second_words = a.view(np.uint64), address(a), address(b)

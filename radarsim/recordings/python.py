@@ -43,7 +43,12 @@ def simulate(config: Config, realisation: int = 0, overrides: Overrides = ()) ->
 
 
 def plots(
-    config: Config, n: int = 1000, first: int = 0, overrides: Overrides = (), chunk: int | None = None
+    config: Config,
+    n: int = 1000,
+    first: int = 0,
+    overrides: Overrides = (),
+    chunk: int | None = None,
+    purpose: str = "judging",
 ) -> "SimulatedPlots | Iterator[SimulatedPlots]":
     """Return the plots of realisations first … first + n - 1, exactly those of a run, with the truth, as arrays.
 
@@ -51,6 +56,9 @@ def plots(
     truth (n, K, C) the true state, whose components are named with their units. Where a scan may have several plots,
     columns are (n, K, M), filled up with NaN. With chunk, an iterator of as many realisations at a time, in flat
     memory; a filter over all of them may take 10 million.
+
+    purpose="training" draws the same world with another seed, for a filter that learns: judged on the realisations that
+    it has learned, it would be better than it is.
 
     Raises ConfigError for an invalid config, a config of several cases, or a study without plots.
 
@@ -62,8 +70,10 @@ def plots(
     ((500, 15), (500, 15, 3))
     >>> [part.n for part in radarsim.plots("rls2", n=500, chunk=200)]
     [200, 200, 100]
+    >>> bool((radarsim.plots("rls2", n=500, purpose="training")["range_m"] == made["range_m"]).any())
+    False
     """
-    parts = simulate_plots.plot_batches(load(config, overrides), n, first, chunk)
+    parts = simulate_plots.plot_batches(load(config, overrides), n, first, chunk, purpose)
     return next(parts) if chunk is None else parts
 
 

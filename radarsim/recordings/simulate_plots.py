@@ -9,11 +9,14 @@ import numpy as np
 
 from radarsim.config.common_keys import LARGEST_REALISATIONS
 from radarsim.config.experiment import Case, Experiment
+from radarsim.config.seeds import TRAINING, other_seed
 from radarsim.errors import ConfigError, argument
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.studies.plot_arrays import SimulatedPlots
 from radarsim.studies.registry import study
 from radarsim.studies.user_filters import plots as user_filters_plots
+
+JUDGING = "judging"  # the purpose of plots that are those of a run
 
 
 def simulate_realisation(experiment: Experiment, realisation: int = 0) -> dict[str, np.ndarray]:
@@ -33,15 +36,23 @@ def case_with_plots(experiment: Experiment) -> Case:
     return case
 
 
-def plot_batches(experiment: Experiment, n: int, first: int = 0, chunk: int | None = None) -> Iterator[SimulatedPlots]:
+def plot_batches(
+    experiment: Experiment, n: int, first: int = 0, chunk: int | None = None, purpose: str = JUDGING
+) -> Iterator[SimulatedPlots]:
     """The plots of n realisations of an experiment's one case from number `first` on, chunk by chunk, in flat memory.
-    Raises ConfigError, at once, for realisations that no run has."""
+    Raises ConfigError, at once, for realisations that no run has.
+
+    purpose: `training` draws with another seed than that of a run."""
+    if purpose not in (JUDGING, TRAINING):
+        raise ConfigError(f"{argument('purpose')}: must be {JUDGING} or {TRAINING}, got {purpose!r}")
     counts = {"n": (n, 1), "first": (first, 0), "chunk": (n if chunk is None else chunk, 1)}
     n, first, size = (_whole_number(name, *count) for name, count in counts.items())
     if first + n > LARGEST_REALISATIONS:
         argument_name = argument("first + n", "--realisations: STOP")
         raise ConfigError(f"{argument_name}: must be at most {LARGEST_REALISATIONS}, got {first + n}")
     case = case_with_plots(experiment)
+    if purpose == TRAINING:
+        case = replace(case, seed=other_seed(case.seed, TRAINING))
     plots, last, case_study = recording_interface(case), first + n, study(case.study)
     world = cache(
         lambda: user_filters_plots.make_world(

@@ -55,8 +55,12 @@ def interval(low: str, high: str) -> str:
 
 
 def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
-    """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]."""
-    value, low, high = (numeral(format(number, form)).replace("inf", "∞") for number in values)
+    """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]; without an
+    interval where the ends are not known."""
+    numbers = tuple(values)
+    value, low, high = (numeral(format(number, form)).replace("inf", "∞") for number in numbers)
+    if all(math.isnan(end) for end in numbers[1:]):
+        return " ".join(filter(None, (value, unit)))
     return f"{' '.join(filter(None, (value, unit)))} {interval(low, high)}"
 
 

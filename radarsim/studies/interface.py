@@ -207,6 +207,11 @@ class Study(ABC):
         """The answer: sentences with numbers and 95 % intervals. A `Sentence` names the intervals that it rests on,
         for warnings; a plain text is taken to rest on σ and gain of every filter at the last scan."""
 
+    def answer_points(self, result: "CaseResult") -> Sequence[tuple[str, float]]:
+        """The components, and times in s, by which a user filter is judged: those that the answer is about. Default:
+        the first component at the last scan."""
+        return [(result.axes.components[0][0], float(result.axes.t_s[-1]))]
+
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
         """Settings that are allowed but hardly intended, a line each; the run continues. Default: none."""
         return ()

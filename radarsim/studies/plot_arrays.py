@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from radarsim.errors import ConfigError
+from radarsim.studies.random_numbers import RandomNumbers, RandomSource
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,7 +29,7 @@ class World:
 
     t_s (K,) times of the scans, s; columns: what is measured, units in the names; sigma: its standard deviations, where
     the config states them; components: names and units of the state; keys: the config, as YAML has it;
-    case: what the case is called.
+    case: what the case is called; random: where the random numbers that go with the plots come from.
     """
 
     t_s: "np.ndarray"
@@ -36,6 +38,36 @@ class World:
     components: tuple[tuple[str, str], ...]
     keys: Mapping[str, Any]
     case: str = ""
+    random: RandomSource | None = field(default=None, repr=False, compare=False)
+
+
+class RandomPlots:
+    """Plots with random numbers of their own, for filters that draw: see `radarsim.studies.random_numbers`.
+
+    They are fixed by the seed of the run, the realisation, the scan and the order of calls, and the same for every
+    filter. A call gives numbers that no earlier call gave."""
+
+    def normals(self, m: int | tuple[int, ...]) -> "np.ndarray":
+        """m independent unit normals for each realisation: (n, m) at one scan, (n, K, m) of all scans, (K, m) of one
+        realisation. m may be a shape."""
+        return self._random_numbers.normals(m)
+
+    def uniforms(self, m: int | tuple[int, ...]) -> "np.ndarray":
+        """m independent uniform numbers in (0, 1) for each realisation, as `normals`."""
+        return self._random_numbers.uniforms(m)
+
+    def generator(self) -> "np.random.Generator":
+        """A generator of NumPy's for a library that draws by itself, seeded by the run, the batch and the scan.
+
+        Its numbers depend on how realisations are put into batches; those of `normals` do not."""
+        return self._random_numbers.generator()
+
+    @cached_property
+    def _random_numbers(self) -> RandomNumbers:
+        return self._make_random_numbers()
+
+    def _make_random_numbers(self) -> RandomNumbers:
+        raise NotImplementedError
 
 
 def plot_column(columns: "Mapping[str, np.ndarray]", name: str) -> "np.ndarray":
@@ -46,7 +78,7 @@ def plot_column(columns: "Mapping[str, np.ndarray]", name: str) -> "np.ndarray":
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SimulatedPlots:
+class SimulatedPlots(RandomPlots):
     """The plots of n realisations from number `first` on, exactly those of a run, and the truth at times t_s (K,), s.
 
     columns (n, K)  what is measured, by name and unit, not-a-number where missing; (n, K, M) where a scan may have
@@ -83,6 +115,12 @@ class SimulatedPlots:
     def several(self) -> bool:
         """Whether a scan may have several plots."""
         return any(column.ndim == 3 for column in self.columns.values())
+
+    def _make_random_numbers(self) -> RandomNumbers:
+        source = self.world.random
+        assert source is not None  # a case has made the world
+        n, K = self.truth.shape[:2]
+        return RandomNumbers(source, self.first, n, range(K), (n, K))
 
     def __repr__(self) -> str:
         names = ", ".join(f"{name} ({unit})" for name, unit in self.components)

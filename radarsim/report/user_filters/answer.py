@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from radarsim.language.translate import join_names, shorten_names, term, tr
 from radarsim.report import key_labels, sentences, wording
 from radarsim.report import tables as common
 from radarsim.report.sentences import Sentence
+from radarsim.report.statistics import Estimate
 from radarsim.report.user_filters.tables import IMPROPER, REASONS, TablesByName, user_filter_cases
 
 if TYPE_CHECKING:
@@ -22,6 +24,9 @@ if TYPE_CHECKING:
 TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
 GAIN = ("gain_percent", "gain_lo", "gain_hi")
 SIGMA = ("sigma", "sigma_lo", "sigma_hi")
+NARROWER = 2.0  # times: a σ from a paired ratio is told in place of the measured one where it is so much narrower
+MATERIAL_LOSS = 1.0  # per cent: a smaller one in another component is not told in the first sentence
+NEGLIGIBLE = 1e-3  # of the largest σ of a filter's component over time: what is below is known, not estimated
 UNBIASED = term("the Cramér-Rao bound of unbiased estimators")
 ANY = term("the posterior Cramér-Rao bound")
 
@@ -53,6 +58,7 @@ class _Comparison:
     unit: str
     gains: "pd.DataFrame"  # against every other filter
     sigma: "pd.Series[Any]"  # of `curves`: the user filter's
+    exact_sigmas: Mapping[str, float]  # of the config's filters for which it is known
     best_sigma: "pd.Series[Any]"  # of `curves`: that of the config's best filter
     rivals: Mapping[str, float]  # the config's best filter, then its best tuned one, if any; their σ, exact first
 
@@ -63,6 +69,19 @@ class _Comparison:
     def gain_against(self, baseline: str) -> "pd.Series[Any]":
         return self.gains[self.gains["baseline"] == baseline].iloc[0]
 
+    @cached_property
+    def best_estimate(self) -> tuple[Estimate, tuple[sentences.MeasuredInterval, ...]]:
+        """σ of the user filter, with the interval that it rests on: the measured one or, where that is far wider, the
+        exact σ of another filter times the paired ratio of the two."""
+        estimate = Estimate(*(float(self.sigma[key]) for key in SIGMA))
+        intervals = sentences.intervals("curves", "sigma", self.sigma)
+        for baseline, exact_sigma in self.exact_sigmas.items():
+            row = self.gain_against(baseline)
+            paired = Estimate(*(exact_sigma * (1 - row[key] / 100) for key in (GAIN[0], *GAIN[:0:-1])))
+            if NARROWER * (paired.hi - paired.lo) < estimate.hi - estimate.lo:
+                estimate, intervals = paired, sentences.intervals("gains", "gain", row)
+        return estimate, intervals
+
 
 def _filter_sentences(result: CaseResult, name: str, prefix: str, tables_by_name: TablesByName) -> list[Sentence]:
     """Whether a user filter is better than the config's best, how often it fails, then all gains at that scan."""
@@ -72,8 +91,10 @@ def _filter_sentences(result: CaseResult, name: str, prefix: str, tables_by_name
         no_estimate = tr("{name} has no estimate that could be compared", name=name)
         return [clause.with_text(f"{prefix}{clause.text}.") for clause in failing or [Sentence(no_estimate)]]
 
-    comparison = _compare(result, name, gains, tables_by_name)
-    verdict = _verdict_sentence(comparison)
+    comparison = _worst_comparison(result, name, gains, tables_by_name)
+    verdict = _training_clause(
+        result, name, _verdict_sentence(comparison, _losses(result, comparison, gains, tables_by_name))
+    )
     if failing:
         text = tr("{failing}, and in the others ", failing=failing[0].text)
         verdict = sentences.compose(text + verdict.text, [*failing, verdict])
@@ -81,7 +102,7 @@ def _filter_sentences(result: CaseResult, name: str, prefix: str, tables_by_name
         verdict.with_text(prefix + verdict.text),
         *_floor_sentence(comparison),
         *_further_gains(comparison),
-        *_extreme_gains(gains, comparison),
+        *_extreme_gains(_comparable(gains, result, tables_by_name), comparison),
         *_nees_sentences(result, name, tables_by_name),
     ]
 
@@ -103,11 +124,26 @@ def _failing_clause(failures: "pd.DataFrame", name: str) -> list[Sentence]:
     return [Sentence(text, sentences.intervals("failures", "share", total))]
 
 
-def _compare(result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_name: TablesByName) -> _Comparison:
-    """The rows of the component and scan that the answer is about: those asked for, else the first and the last."""
-    components = [component for component in result.axes.components if component[0] in set(gains["component"])]
-    requested, t_s = user_filter_cases(result)[0].axes.answer_at or (components[0][0], np.inf)
-    component, unit = next((c for c in components if c[0] == requested), components[0])
+def _worst_comparison(
+    result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_name: TablesByName
+) -> _Comparison:
+    """The comparison by which a filter is judged: at the point asked for, else at the worst of those that the study's
+    answer is about."""
+    axes = user_filter_cases(result)[0].axes
+    points = [axes.answer_at] if axes.answer_at else axes.answer_points
+    known = [point for point in points if point[0] in set(gains["component"])]
+    comparisons = [
+        _compare(result, name, gains, tables_by_name, point)
+        for point in known or [(gains["component"].iloc[0], np.inf)]
+    ]
+    return min(comparisons, key=lambda comparison: comparison.gain_against(comparison.best)["gain_percent"])
+
+
+def _compare(
+    result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_name: TablesByName, point: tuple[str, float]
+) -> _Comparison:
+    """The rows of a component at the scan next to a time."""
+    (component, unit), t_s = next(c for c in result.axes.components if c[0] == point[0]), point[1]
     gains = gains[gains["component"] == component]
     distance_s = (gains["t_s"] - min(t_s, gains["t_s"].max())).abs()
     gains = gains[gains["k"] == gains["k"][distance_s.idxmin()]]
@@ -119,16 +155,63 @@ def _compare(result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_nam
     rivals = [best, *sorted(tuned, key=lambda baseline: sigma[baseline])[:1]]
     rows = {row["filter"]: row for _, row in curves.iterrows()}
     unit = key_labels.unit_label(unit)
-    return _Comparison(name, unit, gains, rows[name], rows[best], {rival: sigma[rival] for rival in rivals})
+    exact = {row["filter"]: float(row["exact_sigma"]) for row in rows.values() if row["exact_sigma"] > 0}
+    exact = {baseline: exact[baseline] for baseline in baselines if baseline in exact}
+    return _Comparison(name, unit, gains, rows[name], exact, rows[best], {rival: sigma[rival] for rival in rivals})
 
 
-def _verdict_sentence(comparison: _Comparison) -> Sentence:
-    """Whether a filter is better than the config's best one, and than its best tuned one; its σ, and theirs."""
+def _losses(
+    result: CaseResult, comparison: _Comparison, gains: "pd.DataFrame", tables_by_name: TablesByName
+) -> list[_Comparison]:
+    """The other components in which a filter that is not worse at the point of the answer is surely worse than the
+    config's best one, at the same scan."""
+    row = comparison.gain_against(comparison.best)
+    if not row["gain_hi"] >= 0:
+        return []
+    others = [name for name in dict.fromkeys(gains["component"]) if name != row["component"]]
+    rows = gains[(gains["k"] == row["k"]) & gains["component"].isin(others)]
+    compared = [
+        _compare(result, comparison.name, rows, tables_by_name, (name, np.inf))
+        for name in others
+        if (rows["component"] == name).any()
+    ]
+    return [other for other in compared if other.gain_against(other.best)["gain_hi"] < -MATERIAL_LOSS]
+
+
+def _training_clause(result: CaseResult, name: str, verdict: Sentence) -> Sentence:
+    """The verdict after the warning that a filter seems to know the realisations by which it is judged."""
+    ratio = dict(user_filter_cases(result)[0].axes.training_ratios).get(name)
+    if ratio is None:
+        return verdict
+    text = tr(
+        "{name} seems to have been trained on these realisations: on other noise its σ is {ratio} times as large; "
+        "here ",
+        name=name,
+        ratio=numeral(f"{ratio:.3g}"),
+    )
+    return verdict.with_text(text + verdict.text)
+
+
+def _comparable(gains: "pd.DataFrame", result: CaseResult, tables_by_name: TablesByName) -> "pd.DataFrame":
+    """The gains that compare errors: not where a baseline has next to none, as of a component that is known."""
+    curves = common.select_rows(tables_by_name["curves"], case=result.name)
+    largest = curves.groupby(["filter", "component"])["sigma"].transform("max")
+    keys = ["filter", "component", "k"]
+    erring = curves.loc[curves["sigma"] > NEGLIGIBLE * largest, keys].rename(columns={"filter": "baseline"})
+    comparable = set(erring.itertuples(index=False, name=None))
+    rows = zip(gains["baseline"], gains["component"], gains["k"], strict=True)
+    return gains[[row in comparable for row in rows] & np.isfinite(gains["gain_percent"].to_numpy(dtype=float))]
+
+
+def _verdict_sentence(comparison: _Comparison, losses: Sequence[_Comparison] = ()) -> Sentence:
+    """Whether a filter is better than the config's best one, and than its best tuned one; where it is worse; its σ, and
+    theirs."""
     best, *tuned = comparison.rivals
     clauses = [_against_best(comparison, best), *(_against_tuned(comparison, rival) for rival in tuned)]
-    sigma = wording.estimate((comparison.sigma[key] for key in SIGMA), comparison.unit)
+    clauses += [_loss(other) for other in losses]
+    estimate, intervals = comparison.best_estimate
+    sigma = wording.estimate(estimate, comparison.unit)
     text = tr("its σ is {sigma}, {floor}.", sigma=sigma, floor=_best_sigma(comparison))
-    intervals = sentences.intervals("curves", "sigma", comparison.sigma)
     if np.isnan(comparison.best_sigma["exact_sigma"]):
         intervals += sentences.intervals("curves", "sigma", comparison.best_sigma)
     verdict = sentences.join("", clauses)
@@ -144,7 +227,13 @@ def _against_best(comparison: _Comparison, best: str) -> Sentence:
         "t": numeral(f"{row['t_s']:g}"),
         "gain": _gain(row),
     }
-    if row["gain_lo"] > 0:
+    if np.isnan(row["gain_lo"]):
+        text = tr(
+            "{name} cannot be judged against {best}, the config's best in {component} at {t} s, as its random numbers "
+            "repeat in every block and no interval holds: gain {gain}",
+            **fields,
+        )
+    elif row["gain_lo"] > 0:
         text = tr("{name} is better than {best}, the config's best in {component} at {t} s: gain {gain}", **fields)
     elif row["gain_hi"] < 0:
         text = tr("{name} is worse than {best}, the config's best in {component} at {t} s: gain {gain}", **fields)
@@ -156,10 +245,19 @@ def _against_best(comparison: _Comparison, best: str) -> Sentence:
     return Sentence(text, sentences.intervals("gains", "gain", row))
 
 
+def _loss(comparison: _Comparison) -> Sentence:
+    row = comparison.gain_against(comparison.best)
+    text = tr(", but worse than {best} in {component} there: gain {gain}",
+              best=comparison.best, component=row["component"], gain=_gain(row))  # fmt: skip
+    return Sentence(text, sentences.intervals("gains", "gain", row))
+
+
 def _against_tuned(comparison: _Comparison, rival: str) -> Sentence:
     row = comparison.gain_against(rival)
     fields = {"best": rival, "gain": _gain(row)}
-    if row["gain_lo"] > 0:
+    if np.isnan(row["gain_lo"]):
+        text = tr(", nor against {best}: gain {gain}", **fields)
+    elif row["gain_lo"] > 0:
         text = tr(", and better than {best}: gain {gain}", **fields)
     elif row["gain_hi"] < 0:
         text = tr(", and worse than {best}: gain {gain}", **fields)
@@ -188,22 +286,30 @@ def _floor_sentence(comparison: _Comparison) -> list[Sentence]:
     lowest = float(comparison.sigma["floor"])
     if np.isnan(lowest):
         return []
-    above = wording.estimate((100 * (comparison.sigma[key] / lowest - 1) for key in SIGMA), "%", ".3g")
+    estimate, intervals = comparison.best_estimate
+    above = wording.estimate((100 * (number / lowest - 1) for number in estimate), "%", ".3g")
     rivals = [
         f"{name} {wording.number(round(100 * (sigma / lowest - 1), 2), 3)} %"
         for name, sigma in comparison.rivals.items()
     ]
+    is_of_unbiased = comparison.sigma["floor_kind"].startswith("CRB")
     text = tr(
         "The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.",
-        kind=tr(UNBIASED if comparison.sigma["floor_kind"].startswith("CRB") else ANY),
+        kind=tr(UNBIASED if is_of_unbiased else ANY),
         floor=f"{wording.number(lowest)} {comparison.unit}".rstrip(),
         name=comparison.name,
         own=above,
         others=join_names(rivals),
     )
-    if comparison.sigma["sigma_hi"] < lowest:
+    if estimate.hi < lowest and is_of_unbiased:
         text += " " + tr("Below it is only what is biased, or knows more than these plots.")
-    return [Sentence(text, sentences.intervals("curves", "sigma", comparison.sigma))]
+    elif estimate.hi < lowest:
+        text += " " + tr(
+            "Below it no estimator can be, biased or not, as it holds on the mean over all truths drawn: {name} "
+            "knows more than these plots; was it trained on their truth?",
+            name=comparison.name,
+        )
+    return [Sentence(text, intervals)]
 
 
 def _further_gains(comparison: _Comparison) -> list[Sentence]:
@@ -218,9 +324,10 @@ def _further_gains(comparison: _Comparison) -> list[Sentence]:
 
 def _extreme_gains(gains: "pd.DataFrame", comparison: _Comparison) -> list[Sentence]:
     """The least and the largest gain against the config's best over all components and scans, if there are several."""
-    if len(gains) <= len(comparison.gains):
+    rows = gains[gains["baseline"] == comparison.best].sort_values("gain_percent")
+    if len(rows) < 2:
         return []
-    extremes = gains[gains["baseline"] == comparison.best].sort_values("gain_percent").iloc[[0, -1]]
+    extremes = rows.iloc[[0, -1]]
     smallest, largest = (
         tr("{gain} ({component} at {t} s)", gain=_gain(row), component=row["component"], t=numeral(f"{row['t_s']:g}"))
         for _, row in extremes.iterrows()

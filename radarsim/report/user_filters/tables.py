@@ -143,7 +143,9 @@ def with_user_filters(
     rows["failures"] = common.join_columns(map(failure_columns, results_with_filters))
     rows["nees"] = common.join_columns(map(nees_columns, results_with_filters))
     appended = {
-        name: append(tables_by_name[name], table) if name in tables_by_name else table
+        name: append(tables_by_name[name], without_intervals(table, results_with_filters))
+        if name in tables_by_name
+        else without_intervals(table, results_with_filters)
         for name, table in rows.items()
         if len(table)
     }
@@ -167,9 +169,25 @@ def measured_rows(results: Sequence[CaseResult]) -> TablesByName:
         return {}
     user_cases = [case for result in results_with_filters for case in user_filter_cases(result)]
     return {
-        "curves": common.curves(user_cases),
-        "gains": common.join_columns(map(gains, results_with_filters), common.GAINS),
+        "curves": without_intervals(common.curves(user_cases), results_with_filters),
+        "gains": without_intervals(
+            common.join_columns(map(gains, results_with_filters), common.GAINS), results_with_filters
+        ),
     }
+
+
+def without_intervals(table: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
+    """A table without the ends of intervals that do not hold: of filters whose random numbers repeat in each block."""
+    cases = [case for result in results for case in user_filter_cases(result)]
+    names = {(case.name, name) for case in cases for name in case.axes.repeating}
+    if not names or not len(table):
+        return table
+    rows = np.full(len(table), False)
+    for label in ("filter", "baseline"):
+        if label in table:
+            rows |= [pair in names for pair in zip(table["case"], table[label], strict=True)]
+    ends = [str(column) for column in table if str(column).endswith(("_lo", "_hi"))]
+    return table.assign(**{end: table[end].mask(rows) for end in ends})
 
 
 def tables_for_claims(tables_by_name: TablesByName, measured_rows: TablesByName) -> TablesByName:
@@ -184,14 +202,8 @@ def table_with_user_filters(name: str, table: "Callable[[Sequence[CaseResult]], 
     def make_table(results: Sequence[CaseResult]) -> "pd.DataFrame":
         results_with_filters = [result for result in results if result.user_filters is not None]
         study_rows = table(results)
-        if name == "curves":
-            return append(
-                study_rows,
-                common.curves([case for result in results_with_filters for case in user_filter_cases(result)]),
-            )
-        if name == "gains":
-            return append(study_rows, common.join_columns(map(gains, results_with_filters), common.GAINS))
-        return study_rows
+        rows = measured_rows(results_with_filters)
+        return append(study_rows, rows[name]) if name in rows else study_rows
 
     return make_table
 

@@ -105,6 +105,11 @@ class MultiModel(Study):
 
         return answer.answer(results, tables)
 
+    def answer_points(self, result: "CaseResult") -> Sequence[tuple[str, float]]:
+        from radarsim.studies.multimodel import answer
+
+        return answer.answer_points(result)
+
     def recording_interface(self) -> "FlightRecordedPlots":
         from radarsim.studies.multimodel.recorded_plots import FlightRecordedPlots
 

@@ -8,6 +8,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language.translate import plural, shorten_names, term, tr
 from radarsim.report import case_selection, key_labels, sentences, tables, wording
 from radarsim.report.sentences import Sentence
+from radarsim.studies.multimodel.tables import stage_bounds
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +40,13 @@ def answer(results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataF
     quantities = [("y", term("the height")), *([("vy", term("the rate of climb"))] if len(results) == 1 else [])]
     stage_sentences = [_least_sigma(result, stages, *quantity) for result in reported for quantity in quantities]
     return [*closest, *stage_sentences, *map(Sentence, remark)]
+
+
+def answer_points(result: CaseResult) -> list[tuple[str, float]]:
+    """The height at the last scan of each stage."""
+    times = result.axes.t_s
+    within = [times[(times >= begin) & (times <= end)] for _, begin, end in stage_bounds(result)]
+    return [("y", float(stage_times[-1])) for stage_times in within if stage_times.size]
 
 
 def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") -> list[Sentence]:

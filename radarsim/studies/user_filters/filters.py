@@ -22,7 +22,8 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
-from radarsim.studies.plot_arrays import World, plot_column
+from radarsim.studies.plot_arrays import RandomPlots, World, plot_column
+from radarsim.studies.random_numbers import RandomNumbers
 from radarsim.studies.user_filters.estimates import (
     Estimates,
     check_estimates,
@@ -33,18 +34,30 @@ from radarsim.studies.user_filters.estimates import (
 
 
 @dataclass(frozen=True)
-class Plots:
+class Plots(RandomPlots):
     """Plots of n realisations from number `first` on, not-a-number where missing: `plots["range_m"]`, (n, K). Of one
-    scan these are (n,), and t_s is its time; of one realisation (K,)."""
+    scan these are (n,), and t_s is its time; of one realisation (K,). scan: the number of the one scan, from 0.
+
+    A filter that draws takes `plots.normals(m)`, `plots.uniforms(m)` or `plots.generator()`."""
 
     t_s: Any
     columns: Mapping[str, np.ndarray]
     world: World
     first: int
     n: int
+    scan: int | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return plot_column(self.columns, name)
+
+    def _make_random_numbers(self) -> RandomNumbers:
+        source = self.world.random
+        assert source is not None  # a case has made the world
+        if self.scan is not None:
+            return RandomNumbers(source, self.first, self.n, [self.scan], (self.n,))
+        K = len(self.t_s)
+        is_one_realisation = all(column.ndim == 1 for column in self.columns.values())
+        return RandomNumbers(source, self.first, self.n, range(K), (K,) if is_one_realisation else (self.n, K))
 
 
 class UserFilter(ABC):
@@ -58,6 +71,7 @@ class UserFilter(ABC):
     written: Mapping[str, Any] | None = None  #: its keys, where a config has it
     baseline: bool = False  #: whether gains of the others are against it too
     answer_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
+    training_ratio: float | None = None  #: σ on other noise over σ on the judged one, where that is beyond chance
 
     @abstractmethod
     def estimates(self, plots: Plots) -> Any:
@@ -66,6 +80,10 @@ class UserFilter(ABC):
     def bound_to(self, case: Case) -> "UserFilter":
         """The filter as one of a case."""
         return self
+
+    def note_training(self, ratio: float) -> None:
+        """Note that its σ on other noise is so many times as large: it knows the realisations that it is judged on."""
+        vars(self)["training_ratio"] = ratio
 
     def warnings(self) -> list[str]:
         """Warnings about its numbers, from what has run so far."""
@@ -122,7 +140,7 @@ def run_steps(name: str, target: Any, plots: Plots) -> Any:
     estimates = []
     for k, t in enumerate(plots.t_s):
         columns = {column: np.ascontiguousarray(v[:, k]) for column, v in plots.columns.items()}
-        answer = target.step(replace(plots, t_s=float(t), columns=columns))
+        answer = target.step(replace(plots, t_s=float(t), columns=columns, scan=k))
         estimates.append(copy_estimates(answer))
         if (shape := estimates[-1][0].shape)[:1] != (plots.n,):
             got = f"shape {shape}" if shape else type(answer).__name__

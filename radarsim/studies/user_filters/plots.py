@@ -9,12 +9,17 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
+from radarsim.studies.noise import noise_key
 from radarsim.studies.plot_arrays import World
+from radarsim.studies.random_numbers import RandomSource
 from radarsim.studies.user_filters.filters import Plots
 
 if TYPE_CHECKING:
     from radarsim.studies.interface import Study
     from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
+
+
+RANDOM_STREAM = "user filters"  # of the numbers that filters draw
 
 
 def drawing_setup(study: "Study", case: Case, inner: Any) -> tuple["DrawPlots", World, np.ndarray]:
@@ -54,11 +59,13 @@ def make_world(study: "Study", case: Case, plots: "SimulatedPlots", components: 
     keys = {} if interface is None else interface.sigmas(case.spec)
     keys_by_number = {key.rpartition("sigma_")[2]: key for key_names in keys.values() for key in key_names}
     sigma = {name: attrgetter(keys_by_number[name])(case.spec) for name in plots.columns if name in keys_by_number}
-    return World(plots.t_s, tuple(plots.columns), sigma, components, case.keys, case.name)
+    random = RandomSource(noise_key(case, RANDOM_STREAM))
+    return World(plots.t_s, tuple(plots.columns), sigma, components, case.keys, case.name, random)
 
 
 def plots_for_filter(world: World, plots: "SimulatedPlots") -> Plots:
     """Plots as a filter sees them: copies of arrays and keys, which it may change."""
     columns = {name: np.array(values, order="C") for name, values in plots.columns.items()}  # as C code takes them
-    world = replace(world, t_s=np.array(world.t_s), keys=deepcopy(world.keys))
+    random = None if world.random is None else RandomSource(world.random.key)
+    world = replace(world, t_s=np.array(world.t_s), keys=deepcopy(world.keys), random=random)
     return Plots(np.array(plots.t_s), columns, world, plots.first, plots.n)

@@ -10,6 +10,7 @@ counted."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from radarsim.studies.plot_arrays import World
 from radarsim.studies.user_filters.estimates import check_estimates, columns_of
 from radarsim.studies.user_filters.filters import Plots, UserFilter
 from radarsim.studies.user_filters.plots import drawing_setup, plots_for_filter
+from radarsim.studies.user_filters.repeated_numbers import repeats_numbers
 
 if TYPE_CHECKING:
     from radarsim.studies.interface import Study
@@ -42,6 +44,9 @@ class UserFilterAxes(Axes):
     baselines: tuple[str, ...] = ()
     identities: tuple[str, ...] = ()
     answer_at: tuple[str, float] | None = None
+    answer_points: tuple[tuple[str, float], ...] = ()  #: see `Study.answer_points`
+    training_ratios: tuple[tuple[str, float], ...] = ()  #: by the name of a filter: see `UserFilter.training_ratio`
+    repeating: tuple[str, ...] = ()  #: filters whose random numbers repeat in each block: their intervals do not hold
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ class Plan:
     world: World
     scans: np.ndarray  #: (K,) places of the axes' scans among all scans
     members: tuple[UserFilter, ...]
-    axes: Axes
+    axes: UserFilterAxes
     layout: Layout
 
     gaussian = False
@@ -66,6 +71,11 @@ class Plan:
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(name for name, _ in self.axes.components)
+
+    @cached_property
+    def repeating(self) -> tuple[str, ...]:
+        """The filters whose random numbers repeat in each block."""
+        return tuple(member.name for member in self.members if repeats_numbers(self, member))
 
 
 def prepare(study: "Study", case: Case, inner: Any) -> Plan:
@@ -89,6 +99,14 @@ def prepare(study: "Study", case: Case, inner: Any) -> Plan:
     answer_at = next((member.answer_at for member in case.user_filters if member.answer_at), None)
     user_axes = UserFilterAxes(*labels, baselines, tuple(member.identity for member in case.user_filters), answer_at)
     return Plan(study, inner, draw, world, scans, case.user_filters, user_axes, layout)
+
+
+def with_other_noise(plan: Plan, case: Case, seed: int) -> Plan:
+    """The plan of a case's user filters with the noise of another seed."""
+    other_case = replace(case, seed=seed, user_filters=())
+    inner = plan.study.prepare(other_case)
+    draw, world, _ = drawing_setup(plan.study, other_case, inner)
+    return replace(plan, inner=inner, draw=draw, world=world)
 
 
 def plots_of(plan: Plan, plots: "SimulatedPlots") -> Plots:
@@ -210,5 +228,13 @@ def error_powers(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def result(plan: Plan, study_result: CaseResult, sums: Mapping[str, np.ndarray]) -> CaseResult:
     """The user filters as a case of their own: available only where some realisation has an estimate."""
-    axes = replace(plan.axes, available=sums["estimates"] > 0)
+    repeating = plan.repeating if study_result.count > plan.block else ()
+    ratios = tuple((member.name, member.training_ratio) for member in plan.members if member.training_ratio)
+    axes = replace(
+        plan.axes,
+        available=sums["estimates"] > 0,
+        answer_points=tuple(plan.study.answer_points(study_result)),
+        training_ratios=ratios,
+        repeating=repeating,
+    )
     return replace(study_result, sums=sums, axes=axes, further_baselines=())
