@@ -8,7 +8,7 @@
         def world(self, spec): …                    # the numbers of a case that its truth and plots need, a record
         def known(self, spec, t_s): …               # what is known at times t_s (K,), columns (K,)
         def begin(self, c, w): …                    # the first state, of the world's numbers c and normals w
-        def move(self, x, dt, c, w): …              # the state after dt seconds
+        def move(self, x, dt, c, w): …              # the state after dt seconds; (self, x, dt, c, w, t): at time t, s
         def plot(self, x, u, c, w): …               # the numbers of a plot; u: what is known at the scan
         def truth(self, x, u, c): …                 # the components of the state; where not given, the state itself
 
@@ -30,6 +30,7 @@ The first plot is always there; `detection` is the probability of each later one
 `believed_sigma` in `curves` and the table `consistency` say how it agrees with the errors. A study that knows σ exactly
 gives `exact_sigma`."""
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
 
 MAX_DIFFERENCE = 1e-9  # of the largest truth: permitted difference between plain Python and the kernel
 NO_COVARIANCE = -1e100  # stands for the variances and the NEES of a matrix that is not positive
+MOVE_PARAMETERS = 4  # of `move` without the time: x, dt, c, w
 BLOCK = 512  # realisations in a block
 MAX_ROWS = 20_000  # rows of plots and errors at once, 1.3 MB: fits a processor's cache
 
@@ -232,7 +234,7 @@ class StepStudy(OneFile):
             )
         if not np.array_equal(values, repeated_values):
             raise user_code_error(self.known, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
-        columns = [np.diff(t_s, prepend=t_s[0]), *values]
+        columns = [np.diff(t_s, prepend=t_s[0]), *values, *([t_s] if self._moves_by_time else [])]
         padded = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
         padded[:, : len(columns)] = np.transpose(columns)
         return padded
@@ -252,7 +254,8 @@ class StepStudy(OneFile):
             if state is None:
                 x = traced_step(self.begin, c, state_normals)
             else:
-                x = traced_step(self.move, trace.rows(steps.STATE, state), dt, c, state_normals)
+                time = [self._time(trace)] if self._moves_by_time else []
+                x = traced_step(self.move, trace.rows(steps.STATE, state), dt, c, state_normals, *time)
                 check_same_shape(self.move, x, state)
             state = x
             z, true = traced_step(self.plot, x, u, c, plot_normals), traced_step(self.truth, x, u, c)
@@ -271,6 +274,17 @@ class StepStudy(OneFile):
 
         dt, *u = trace.plain(steps.KNOWN, (0.0,) * (1 + len(self.known_columns)))
         return dt, tuple(u)
+
+    def _time(self, trace: tracing.Trace) -> Any:
+        """The time of a scan, in the column after the known quantities."""
+        from radarsim.kernels import steps
+
+        return trace.plain(steps.KNOWN, (0.0,) * (2 + len(self.known_columns)))[-1]
+
+    @property
+    def _moves_by_time(self) -> bool:
+        """Whether `move` takes the time."""
+        return len(inspect.signature(self.move).parameters) > MOVE_PARAMETERS
 
     def _compiled(self, spec: Any, filter_keys: Any, scene: "Scene", missed: bool) -> CompiledFilter:
         """A filter's kernel and numbers."""

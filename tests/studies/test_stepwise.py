@@ -152,6 +152,19 @@ def test_errors_are_the_exact_ones():
     assert_rounded(sums["paired"][0], sums["error"][0, ..., 3], operations=SUMMED)
 
 
+def test_a_move_takes_the_time_of_its_scan():
+    class Driven(Walk):
+        def begin(self, c, w):
+            return (0 * w[0],)
+
+        def move(self, x, dt, c, w, t):
+            return (x[0] + 0 * w[0] + t * t,)
+
+    study = Driven()
+    plots = study.recording_interface().drawing(case_of(study))(3, 9)
+    np.testing.assert_allclose(plots.truth[..., 0], np.tile(np.cumsum(plots.t_s**2), (9, 1)), rtol=1e-14)
+
+
 def test_a_realisation_is_itself_in_any_block(monkeypatch):
     study = Walk()
     case = case_of(study, detection_probability=0.7)
