@@ -1,6 +1,7 @@
 """Checks of a user filter before it is judged: repeatable, causal, of the right shape and order."""
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, cast
@@ -163,16 +164,24 @@ def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) 
     smaller = (here[:, None] < there).mean() + (here[:, None] == there).mean() / 2
     if not smaller - 0.5 > TRAINED * np.sqrt((2 * n + 1) / (12 * n * n)):
         return
-    ratios = [float(np.sqrt(average(there[np.isfinite(there)]) / average(here[np.isfinite(here)])))
-              for average in (np.mean, np.median) if np.isfinite(there).any() and np.isfinite(here).any()]  # fmt: skip
-    ratio = max(ratios, default=np.inf)
+    ratio = _error_ratio(there, here)
     member.note_training(ratio)
     yield tr(
         "{name}: on noise of another seed its σ is {ratio} times as large: it seems to have been trained on the "
         'realisations by which it is judged; radarsim.plots(…, purpose="training") draws others',
         name=member.name,
-        ratio=numeral(f"{ratio:.3g}"),
+        ratio=numeral(f"{ratio:.3g}").replace("inf", "∞"),
     )
+
+
+def _error_ratio(there: np.ndarray, here: np.ndarray) -> float:
+    """How many times as large errors are there as here, from their mean squares; from medians where few decide."""
+    there, here = there[np.isfinite(there)], here[np.isfinite(here)]
+    if not there.size or not here.size:
+        return math.inf
+    means, medians = ((average(there), average(here)) for average in (np.mean, np.median))
+    numerator, denominator = means if means[0] > means[1] else medians
+    return math.sqrt(numerator / denominator) if denominator > 0 else math.inf
 
 
 def _mean_squares(*trials: Errors) -> list[np.ndarray]:

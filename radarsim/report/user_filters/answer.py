@@ -187,7 +187,7 @@ def _training_clause(result: CaseResult, name: str, verdict: Sentence) -> Senten
         "{name} seems to have been trained on these realisations: on other noise its σ is {ratio} times as large; "
         "here ",
         name=name,
-        ratio=numeral(f"{ratio:.3g}"),
+        ratio=numeral(f"{ratio:.3g}").replace("inf", "∞"),
     )
     return verdict.with_text(text + verdict.text)
 

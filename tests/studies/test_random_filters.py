@@ -1,0 +1,226 @@
+"""Filters with random numbers: by counter, in any batch; repeated ones, and learned realisations, are detected."""
+
+import numpy as np
+import pytest
+
+import radarsim
+
+BLOCK = 4096  # realisations of `rls2`
+NOISE_M = 1000.0
+
+
+class Own:
+    """The measured range and noise of a generator of its own, seeded anew where it starts."""
+
+    def __init__(self, seed=1):
+        self.seed = seed
+
+    def start(self, world):
+        self.rng = np.random.default_rng(self.seed)
+
+    def step(self, plots):
+        return (plots["range_m"] + NOISE_M * self.rng.standard_normal(plots.n))[:, None]
+
+
+class OneByOne(Own):
+    """Numbers taken realisation by realisation, of a number that depends on the plots."""
+
+    def step(self, plots):
+        return np.array([[z + 30 * self.rng.random(1 + int(abs(z)) % 3).sum()] for z in plots["range_m"]])
+
+
+class BySeedOfBlock(Own):
+    def start(self, world):
+        self.rng = None
+
+    def step(self, plots):
+        self.rng = self.rng or np.random.default_rng([self.seed, plots.first])
+        return super().step(plots)
+
+
+class ByGenerator(Own):
+    def start(self, world):
+        self.rng = None
+
+    def step(self, plots):
+        self.rng = self.rng or plots.generator()
+        return super().step(plots)
+
+
+class ByCounter:
+    def start(self, world):
+        pass
+
+    def step(self, plots):
+        return (plots["range_m"] + NOISE_M * plots.normals(1)[:, 0])[:, None]
+
+
+def of_all_scans(plots):
+    return plots["range_m"] + NOISE_M * plots.normals(1)[..., 0]
+
+
+def legacy(plots):
+    np.random.seed(3)  # noqa: NPY002  (as older libraries draw)
+    return plots["range_m"] + np.random.standard_normal(plots["range_m"].shape)  # noqa: NPY002
+
+
+def beside(plots):
+    return plots["range_m"] + 0.1 * (plots["range_m"] - plots["range_m"][0])
+
+
+def judged(target, realisations=BLOCK + 100, **options):
+    return radarsim.judge("rls2", target, realisations=realisations, figures=False, threads=1, **options)
+
+
+def own_rows(result):
+    return result.curves.query("filter == 'mine'")
+
+
+def test_numbers_are_the_same_in_any_batch_and_however_a_filter_is_called():
+    results = [
+        judged(target, realisations=300, one_by_one=alone)
+        for target, alone in ((ByCounter, False), (of_all_scans, False), (lambda p: of_all_scans(p), True))
+    ]
+    for result in results[1:]:
+        assert result.curves.equals(results[0].curves)
+    assert [result.warnings for result in results] == [[], [], []]
+    plots = radarsim.plots("rls2", n=300)
+    sigma = np.sqrt(np.mean((of_all_scans(plots) - plots.truth[..., 0]) ** 2, axis=0))
+    np.testing.assert_allclose(own_rows(results[0])["sigma"], sigma, rtol=1e-9)
+
+
+def test_calls_give_further_independent_numbers():
+    plots = radarsim.plots("rls2", n=4000)
+    first, second, uniform = plots.normals(3), plots.normals((2, 2)), plots.uniforms(3)
+    assert (first.shape, second.shape, uniform.shape) == ((4000, 15, 3), (4000, 15, 2, 2), (4000, 15, 3))
+    numbers = np.concatenate([x.reshape(4000, -1) for x in (first, second, np.sqrt(12) * (uniform - 0.5))], axis=1)
+    pairs = numbers.shape[1] ** 2 / 2  # of correlations, each normal with σ = 1/√n
+    limit = np.sqrt(2 * np.log(pairs) + 8) / np.sqrt(4000)
+    assert np.abs(np.corrcoef(numbers.T) - np.eye(numbers.shape[1])).max() < limit
+    assert np.abs(numbers.mean(0)).max() < limit
+    assert np.abs(numbers.var(0) - 1).max() < np.sqrt(2) * limit
+    other = radarsim.plots("rls2", n=4000, overrides={"seed": 3}).normals(3)
+    assert abs(np.mean(first * other)) < 4 / np.sqrt(first.size)
+    later = radarsim.plots("rls2", n=10, first=100)
+    assert np.array_equal(later.normals(3), first[100:110])
+
+
+@pytest.mark.parametrize("wrong", [-1, 1.5, "3", (2, -1)])
+def test_a_count_that_is_none_is_refused(wrong):
+    with pytest.raises(radarsim.ConfigError, match="must be a whole number"):
+        radarsim.plots("rls2", n=2).normals(wrong)
+
+
+@pytest.mark.parametrize("target", [Own, OneByOne, legacy])
+def test_numbers_that_repeat_in_each_block_are_said_and_their_intervals_not_shown(target):
+    result = judged(target)
+    assert result.warnings[0].startswith("mine: draws the same random numbers in every block of 4096 realisations")
+    assert own_rows(result)[["sigma_lo", "sigma_hi"]].isna().all(axis=None)
+    gains = result.gains.query("filter == 'mine'")
+    assert gains[["gain_lo", "gain_hi"]].isna().all(axis=None)
+    others = result.curves.query("filter != 'mine'")
+    assert others[["sigma_lo", "sigma_hi"]].notna().all(axis=None)
+    assert result.answer[0].startswith("mine cannot be judged against r+Vr")
+    assert "nan" not in " ".join(result.answer)
+
+
+def test_one_block_alone_repeats_nothing():
+    result = judged(Own, realisations=400)
+    assert own_rows(result)[["sigma_lo", "sigma_hi"]].notna().all(axis=None)
+
+
+@pytest.mark.parametrize("target", [BySeedOfBlock, ByGenerator, ByCounter, of_all_scans])
+def test_numbers_that_differ_from_block_to_block_get_no_word(target):
+    result = judged(target)
+    assert result.warnings == []
+    assert own_rows(result)["sigma_lo"].notna().all()
+
+
+def test_a_filter_that_mixes_realisations_draws_nothing():
+    (warning,) = judged(beside).warnings
+    assert "depend on the others in the batch" in warning
+
+
+class Learned:
+    """The true range, but for a metre, of 150 realisations that it knows by their first plot; of others the plots."""
+
+    def __init__(self, **options):
+        plots = radarsim.plots("rls2", n=150, overrides={"target": "turn"}, **options)
+        self.plots, self.true = plots["range_m"], plots.truth[..., 0]
+
+    def __call__(self, plots):
+        nearest = np.abs(plots["range_m"][:, None, 0] - self.plots[None, :, 0]).argmin(1)
+        known = self.plots[nearest, :1] == plots["range_m"][:, :1]
+        return np.where(known, self.true[nearest] + 1, plots["range_m"])
+
+
+def test_a_filter_that_has_learned_the_judged_realisations_is_said_in_the_first_sentence():
+    result = judged(Learned(), realisations=300, overrides={"target": "turn"})
+    assert result.answer[0].startswith(
+        "mine seems to have been trained on these realisations: on other noise its σ is "
+    )
+    assert 'purpose="training"' in result.warnings[0]
+    sound = judged(Learned(purpose="training"), realisations=300, overrides={"target": "turn"})
+    assert sound.warnings == []
+    assert sound.answer[0].startswith("mine is ")
+
+
+def test_plots_for_training_are_of_the_same_world_and_another_seed():
+    plots, training = (radarsim.plots("rls2", n=20, purpose=purpose) for purpose in ("judging", "training"))
+    assert plots.seed != training.seed
+    assert np.array_equal(plots.truth, training.truth)  # of a target that is not drawn
+    assert not (plots["range_m"] == training["range_m"]).any()
+    with pytest.raises(radarsim.ConfigError, match="purpose: must be judging or training"):
+        radarsim.plots("rls2", n=20, purpose="test")
+
+
+class Bootstrap:
+    """A bootstrap particle filter of range and velocity, with systematic resampling."""
+
+    particles = 40
+
+    def start(self, world):
+        self.x = None
+
+    def step(self, plots):
+        z, v = plots["range_m"], plots["velocity_mps"]
+        w = plots.normals((2, self.particles))
+        if self.x is None:
+            self.x = np.stack([z[:, None] + 250 * w[:, 0], v[:, None] + 15 * w[:, 1]])
+        else:
+            dt = plots.t_s - self.t_s
+            speed = self.x[1] + 15 * w[:, 1]
+            self.x = np.stack([self.x[0] + dt * (self.x[1] + speed) / 2 + 60 * w[:, 0], speed])
+            score = -(((z[:, None] - self.x[0]) / 250) ** 2 + ((v[:, None] - self.x[1]) / 15) ** 2) / 2
+            weight = np.exp(score - score.max(1, keepdims=True))
+            weight /= weight.sum(1, keepdims=True)
+            estimate = (weight * self.x[0]).sum(1)
+            steps = (np.arange(self.particles) + plots.uniforms(1)) / self.particles
+            total = np.cumsum(weight, axis=1)
+            total[:, -1] = 1.0
+            rows = np.arange(plots.n)[:, None]
+            flat = np.searchsorted((total + rows).ravel(), (steps + rows).ravel()).reshape(steps.shape)
+            chosen = np.clip(flat - rows * self.particles, 0, self.particles - 1)
+            self.x = np.take_along_axis(self.x, chosen[None], axis=2)
+            self.t_s = plots.t_s
+            return estimate[:, None]
+        self.t_s = plots.t_s
+        return self.x[0].mean(1, keepdims=True)
+
+
+@pytest.mark.slow
+def test_intervals_of_a_particle_filter_hold_the_truth_in_95_percent_of_200_seeds():
+    """Two blocks of realisations each, σ at the last scan; the truth is the mean square over all seeds."""
+    rows = [
+        judged(Bootstrap, realisations=BLOCK + 904, seed=seed, overrides={"scans": 5}).curves.query(
+            "filter == 'mine' and k in [2, 3, 4, 5]"
+        )
+        for seed in range(200)
+    ]
+    sigma, low, high = (
+        np.array([row[name] for row in rows], dtype=float) for name in ("sigma", "sigma_lo", "sigma_hi")
+    )
+    truth = np.sqrt(np.mean(sigma**2, axis=0))
+    covered = ((low <= truth) & (truth <= high)).mean(axis=0)
+    assert 0.93 <= covered[-1] <= 0.97, covered
+    assert 0.93 <= covered.mean() <= 0.97, covered
