@@ -154,7 +154,9 @@ def has_interval(estimate: Estimate) -> bool:
     value, lo, hi = (float(number) for number in estimate)
     if math.isnan(lo) or math.isnan(hi):
         return math.isfinite(value) and value != 0
-    return lo != hi and not hi - lo <= INTERVAL_ROUNDING * max(abs(lo), abs(hi))
+    if lo == hi:
+        return False
+    return math.isinf(lo) or math.isinf(hi) or hi - lo > INTERVAL_ROUNDING * max(abs(lo), abs(hi))
 
 
 def exact_number(value: float) -> ExactNumber:
