@@ -63,7 +63,8 @@ def judge(
     unsound: a function that looks ahead, that gives other estimates when called again, single precision.
 
     against="tuned": the config's filters stand there tuned too, each by `radarsim.tune` with noise of another seed,
-    over all cases, for `wanted`, by default σ of the first component at the last scan.
+    over all cases, for `wanted`, by default σ of the first component at the last scan. The answer is about the
+    component and scan of `wanted`; without it, about those that the answer of the study is about.
 
     The other arguments are those of `run`; blocks are not stored, and results are in out/CONFIG_NAME. Raises
     ConfigError for estimates of another shape, order or seed.
@@ -128,11 +129,11 @@ def add_user_filter(
     tuning_warnings, judged_at = list[str](), None
     if against not in (None, "tuned"):
         raise ConfigError(f"{argument('against', '--against')}: must be tuned, got {against!r}")
-    if wanted is not None and not against:
-        raise ConfigError(f"{argument('wanted', '--for')}: needs {argument('against', '--against')} tuned")
-    if against:
+    if against or wanted:
         from radarsim.api.design import tune
-
+    if wanted and not against:
+        judged_at = tune.judged_point(experiment, wanted)
+    elif against:
         experiment, tuning_warnings, judged_at = tune.tune_baseline(experiment, wanted, realisations=realisations)
     _check_name(name)
     n, cases = arguments.whole_number(realisations), experiment.cases

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     help="Also judge it against the config's filters as `radarsim tune` tunes them.",
 )
 @click.option(
-    "--for", "tuned_quantity", metavar="TEXT", help="What they are tuned for; default: σ of the first component."
+    "--for",
+    "tuned_quantity",
+    metavar="TEXT",
+    help="What the answer is about, and what they are tuned for; default: as the study's own answer.",
 )
 @options.realisations_option
 @options.seed_option

@@ -313,8 +313,13 @@ def test_what_cannot_be_tuned_is_said():
 def test_where_no_filter_can_be_tuned_nothing_is_judged():
     with pytest.raises(ConfigError, match=r"r is not tuned: no component 'q'.*\nr\+Vr is not tuned"):
         radarsim.judge("rls2", rival(1e-3), against="tuned", wanted="sigma q", realisations=300)
-    with pytest.raises(ConfigError, match="wanted: needs against tuned"):
-        radarsim.judge("rls2", rival(1e-3), wanted="sigma r", realisations=300)
+
+
+def test_the_answer_is_about_what_is_asked_for_without_tuning_too():
+    answer = radarsim.judge("rls2", rival(1e-3), wanted="sigma r at 60 s", realisations=300).answer
+    assert "the config's best in r at 60 s: " in answer[0]
+    with pytest.raises(ConfigError, match="no component 'q'"):
+        radarsim.judge("rls2", rival(1e-3), wanted="sigma q", realisations=300)
 
 
 def test_against_is_tuned_or_nothing():

@@ -47,7 +47,7 @@ from radarsim.config.identity import all_keys
 from radarsim.config.labels import label
 from radarsim.config.overrides import override_origin
 from radarsim.config.yaml_text import one_line_yaml
-from radarsim.engine.results import CaseResult
+from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import plural, tr
 from radarsim.report.user_filters.answer import TUNED
@@ -619,8 +619,21 @@ def tune_baseline(
         spec = family_case.spec
         members = [*map(all_keys, spec.members), *(result.member(family_case) for result in results)]
         tuned_cases.append(case_with_filters(family_case, members, getattr(spec, "baseline", None)))
-    quantity = results[0].quantity
+    return replace(experiment, cases=tuple(tuned_cases)), left_out, _point_of(results[0].quantity, axes)
+
+
+def judged_point(experiment: Experiment, target: str) -> tuple[str, float] | None:
+    """The component, and the time in s, of a quantity such as `sigma y at 60 s`; None where it has no component.
+    Raises ConfigError for an unknown one."""
+    case = experiment.cases[0]
+    quantity = quantities.check_quantity(parse_target(target, case.spec.members[0].name), case)
+    axes = registry.study(case.study).prepare(case).axes
+    if quantity.component is not None:
+        quantities.check_name(quantity.component, [name for name, _ in axes.components], "component")
+    return _point_of(quantity, axes)
+
+
+def _point_of(quantity: MeasuredQuantity, axes: Axes) -> tuple[str, float] | None:
     at_s = axes.t_s[-1] if quantity.at_s is None else quantity.at_s
     at_s = at_s if quantity.at_k is None else axes.t_s[list(axes.k).index(quantity.at_k)]
-    judged_at = (quantity.component, float(at_s)) if quantity.component else None
-    return replace(experiment, cases=tuple(tuned_cases)), left_out, judged_at
+    return (quantity.component, float(at_s)) if quantity.component else None

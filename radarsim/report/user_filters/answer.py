@@ -131,11 +131,10 @@ def _worst_comparison(
     answer is about."""
     axes = user_filter_cases(result)[0].axes
     points = [axes.answer_at] if axes.answer_at else axes.answer_points
-    known = [point for point in points if point[0] in set(gains["component"])]
-    comparisons = [
-        _compare(result, name, gains, tables_by_name, point)
-        for point in known or [(gains["component"].iloc[0], np.inf)]
-    ]
+    present = set(gains["component"])
+    first = next(component for component, _ in result.axes.components if component in present)
+    known = [point for point in points if point[0] in present] or [(first, points[-1][1])]
+    comparisons = [_compare(result, name, gains, tables_by_name, point) for point in known]
     return min(comparisons, key=lambda comparison: comparison.gain_against(comparison.best)["gain_percent"])
 
 
