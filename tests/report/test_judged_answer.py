@@ -1,0 +1,84 @@
+"""Sentences on a judged filter: one number for equal filters, no loss left unsaid, no number that says nothing."""
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import radarsim
+from radarsim.report.user_filters import answer
+from tests.api.test_judge import twin
+
+DRAWN_TARGET = {  # σ has a posterior bound
+    "kind": "turn", "range_m": 60e3, "speed_mps": 250, "aspect_deg": 180, "start_s": 50, "acceleration_g": 3,
+    "duration_s": 20, "sigma_position_m": 3000, "sigma_velocity_mps": 60,
+}  # fmt: skip
+
+
+def judged(target, **options):
+    return radarsim.judge("rls2", target, figures=False, threads=1, **({"realisations": 1000} | options))
+
+
+def test_an_equal_filter_has_the_exact_number_and_no_other():
+    first, floor, *_ = (str(sentence) for sentence in judged(twin).answer)
+    assert re.search(r"its σ is 154\.7 m \[154\.7, 154\.7\], that of r\+Vr 154\.7 m exactly", first)
+    assert re.search(r"mine is 5\.18 % \[5\.1\d, 5\.\d+\] above it, r\+Vr 5\.18 %", floor)
+
+
+def test_a_filter_that_errs_otherwise_keeps_the_measured_number():
+    result = judged(lambda plots: plots["range_m"])
+    row = result.curves.query("filter == 'mine' and component == 'r'").iloc[-1]
+    assert f"its σ is {row['sigma']:.4g} m [{row['sigma_lo']:.4g}, {row['sigma_hi']:.4g}]" in result.answer[0]
+
+
+def test_a_loss_in_another_component_is_in_the_first_sentence():
+    def rough_velocity(plots):
+        x = twin(plots)
+        x[..., 1] += 20 * plots.normals(1)[..., 0]
+        return x
+
+    first = judged(rough_velocity).answer[0]
+    assert "cannot be distinguished from r+Vr" in first
+    assert ", but worse than r+Vr in Vr there: gain −" in first
+    assert "but worse" not in judged(twin).answer[0]
+
+
+def test_below_a_posterior_bound_is_nothing_that_sees_only_the_plots():
+    plots = radarsim.plots("rls2", n=300, overrides={"target": DRAWN_TARGET})
+    knowing = plots.truth[..., 0] + 0.1 * (plots["range_m"] - plots.truth[..., 0])
+    result = judged(knowing, realisations=300, overrides={"target": DRAWN_TARGET})
+    assert "the posterior Cramér-Rao bound" in result.answer[1]
+    assert "Below it no estimator can be, biased or not" in result.answer[1]
+    assert "biased, or knows" not in result.answer[1]
+
+
+def test_of_gains_over_all_scans_those_are_left_out_that_compare_nothing():
+    curves = pd.DataFrame(
+        {"case": "a", "filter": "best", "component": "x", "k": [1, 2, 3, 4], "sigma": [0.0, 1e-6, 2.0, 1.0]}
+    )
+    gains = pd.DataFrame(
+        {"baseline": "best", "component": "x", "k": [1, 2, 3, 4], "gain_percent": [np.nan, -8e7, -3.0, -np.inf]}
+    )
+    kept = answer._comparable(gains, SimpleNamespace(name="a"), {"curves": curves})
+    assert kept["k"].tolist() == [3]
+
+
+@pytest.mark.parametrize("point", [(("y", 20.0),), (("y", 20.0), ("x", 30.0))])
+def test_a_filter_is_judged_at_the_worst_point_of_the_studys_own_answer(point):
+    rows = [
+        {"baseline": "best", "component": c, "k": k, "t_s": 10.0 * k, "gain_percent": gain}
+        for (c, k, gain) in (("x", 2, 5.0), ("x", 3, -7.0), ("y", 2, -4.0), ("y", 3, 9.0))
+    ]
+    curves = [
+        {"case": "a", "filter": name, "component": c, "k": k, "sigma": 1.0, "exact_sigma": np.nan}
+        for name in ("best", "mine")
+        for c in "xy"
+        for k in (2, 3)
+    ]
+    axes = SimpleNamespace(components=(("x", "m"), ("y", "m")), filters=("best",), answer_at=None, answer_points=point)
+    result = SimpleNamespace(name="a", axes=axes, user_filters=SimpleNamespace(axes=axes))
+    worst = answer._worst_comparison(result, "mine", pd.DataFrame(rows), {"curves": pd.DataFrame(curves)})
+    row = worst.gain_against("best")
+    assert (row["component"], row["k"]) == (("x", 3) if len(point) > 1 else ("y", 2))
