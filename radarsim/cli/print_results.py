@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,7 +85,7 @@ def print_last_scan_rows(stem: str, last_scan: "pd.DataFrame", names: Mapping[st
         (
             *(names[row.case], row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
             f"{significant_digits(row.sigma)} {tr(unit_of(row.unit))}",
-            f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}"
+            ("" if isnan(row.sigma_lo) else f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}")
             + narrow_interval_mark(row, "note"),
             format_if_known(row.exact_sigma),
             format_if_known(row.gain_percent, ".2f", " %"),
