@@ -8,11 +8,12 @@ from typing import Any, cast
 
 import numpy as np
 
+from radarsim import user_code_errors
 from radarsim.api.case_work import CaseWork
 from radarsim.api.estimate_files import UNIT_FACTORS
 from radarsim.config.experiment import Case
 from radarsim.config.seeds import OTHER_NOISE, other_seed
-from radarsim.errors import ConfigError
+from radarsim.errors import AUTHOR_ERRORS, ConfigError
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
 from radarsim.report import statistics
@@ -158,7 +159,16 @@ def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) 
     other_plan = sums.with_other_noise(plan, case, other_seed(case.seed, OTHER_NOISE))
     plots = other_plan.draw(0, n)
     inner = sums.inner_errors(other_plan, 0, n)
-    answer = member.estimates(sums.plots_of(other_plan, plots))
+    try:
+        answer = member.estimates(sums.plots_of(other_plan, plots))
+    except AUTHOR_ERRORS as error:  # whatever the user's code raises: on the judged noise it did not
+        member.note_training(math.inf)
+        yield tr(
+            "{name}: fails on noise of another seed ({error}): it seems to know the realisations by which it is judged",
+            name=member.name,
+            error=user_code_errors.error_text(error),
+        )
+        return
     errors = sums.filter_errors(other_plan, member, answer, plots, sums.greatest_errors(inner))
     here, there = _mean_squares(judged, (errors.error, inner))
     smaller = (here[:, None] < there).mean() + (here[:, None] == there).mean() / 2

@@ -13,6 +13,7 @@ from radarsim.errors import ConfigError
 from radarsim.report import tables
 from radarsim.report.statistics import Estimate, difference
 
+REPEATED_NUMBERS = "a filter's random numbers repeat in every block: no interval holds"
 INTERVAL_ROUNDING = 1e-12  # of a number: an interval that is narrower is rounding
 
 
@@ -277,6 +278,9 @@ class Evidence:
         self.tables_read.add((table, component))
         if rows is None:
             raise self._lacking(result, filter_name, component, *base)
+        axes: Any = result.user_filters and result.user_filters.axes
+        if axes and {filter_name, *base} & set(axes.repeating):
+            raise MissingEvidence(REPEATED_NUMBERS)
         value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
         if self._exact:
             if np.isnan(exact).any():

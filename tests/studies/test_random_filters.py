@@ -165,6 +165,22 @@ def test_a_filter_that_has_learned_the_judged_realisations_is_said_in_the_first_
     assert sound.answer[0].startswith("mine is ")
 
 
+def test_a_filter_that_fails_on_other_noise_is_judged_and_said():
+    plots = radarsim.plots("rls2", n=300)
+    known = {float(z): x for z, x in zip(plots["range_m"][:, 0], plots.truth[..., 0], strict=True)}
+    result = judged(lambda p: np.array([known[float(z)] + 1 for z in p["range_m"][:, 0]]), realisations=300)
+    assert "mine: fails on noise of another seed (KeyError: " in result.warnings[-1]
+    assert result.answer[0].startswith("mine seems to have been trained on these realisations")
+
+
+def test_a_filter_that_cannot_take_equal_plots_is_judged():
+    def whitened(plots):
+        x = plots["range_m"]
+        return x + 1e6 * np.linalg.inv(np.cov(x[:, 2:4].T))[0, 0]
+
+    assert "depend on the others in the batch" in judged(whitened, realisations=300).warnings[0]
+
+
 def test_plots_for_training_are_of_the_same_world_and_another_seed():
     plots, training = (radarsim.plots("rls2", n=20, purpose=purpose) for purpose in ("judging", "training"))
     assert plots.seed != training.seed

@@ -133,8 +133,8 @@ def _worst_comparison(
     points = [axes.answer_at] if axes.answer_at else axes.answer_points
     present = set(gains["component"])
     first = next(component for component, _ in result.axes.components if component in present)
-    known = [point for point in points if point[0] in present] or [(first, points[-1][1])]
-    comparisons = [_compare(result, name, gains, tables_by_name, point) for point in known]
+    usable_points = [point for point in points if point[0] in present] or [(first, points[-1][1])]
+    comparisons = [_compare(result, name, gains, tables_by_name, point) for point in usable_points]
     return min(comparisons, key=lambda comparison: comparison.gain_against(comparison.best)["gain_percent"])
 
 
@@ -167,14 +167,12 @@ def _losses(
     row = comparison.gain_against(comparison.best)
     if not row["gain_hi"] >= 0:
         return []
-    others = [name for name in dict.fromkeys(gains["component"]) if name != row["component"]]
-    rows = gains[(gains["k"] == row["k"]) & gains["component"].isin(others)]
-    compared = [
-        _compare(result, comparison.name, rows, tables_by_name, (name, np.inf))
-        for name in others
-        if (rows["component"] == name).any()
+    rows = gains[(gains["k"] == row["k"]) & (gains["component"] != row["component"])]
+    comparisons = [
+        _compare(result, comparison.name, rows, tables_by_name, (component, np.inf))
+        for component in dict.fromkeys(rows["component"])
     ]
-    return [other for other in compared if other.gain_against(other.best)["gain_hi"] < -MATERIAL_LOSS]
+    return [loss for loss in comparisons if loss.gain_against(loss.best)["gain_hi"] < -MATERIAL_LOSS]
 
 
 def _training_clause(result: CaseResult, name: str, verdict: Sentence) -> Sentence:
@@ -207,7 +205,7 @@ def _verdict_sentence(comparison: _Comparison, losses: Sequence[_Comparison] = (
     theirs."""
     best, *tuned = comparison.rivals
     clauses = [_against_best(comparison, best), *(_against_tuned(comparison, rival) for rival in tuned)]
-    clauses += [_loss(other) for other in losses]
+    clauses += [_loss_clause(loss) for loss in losses]
     estimate, intervals = comparison.best_estimate
     sigma = wording.estimate(estimate, comparison.unit)
     text = tr("its σ is {sigma}, {floor}.", sigma=sigma, floor=_best_sigma(comparison))
@@ -244,7 +242,7 @@ def _against_best(comparison: _Comparison, best: str) -> Sentence:
     return Sentence(text, sentences.intervals("gains", "gain", row))
 
 
-def _loss(comparison: _Comparison) -> Sentence:
+def _loss_clause(comparison: _Comparison) -> Sentence:
     row = comparison.gain_against(comparison.best)
     text = tr(", but worse than {best} in {component} there: gain {gain}",
               best=comparison.best, component=row["component"], gain=_gain(row))  # fmt: skip

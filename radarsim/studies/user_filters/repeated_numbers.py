@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from radarsim.errors import AUTHOR_ERRORS
 from radarsim.studies.user_filters.estimates import check_estimates, columns_of
 from radarsim.studies.user_filters.filters import EstimateChunks, StoredEstimates, UserFilter
 from radarsim.studies.user_filters.plots import plots_for_filter
@@ -20,16 +21,24 @@ MATERIAL_CHANGE = 1e-3  # of the rms error of a component; smaller changes are r
 
 
 def repeats_numbers(plan: "Plan", member: UserFilter) -> bool:
-    """Whether the random numbers of a filter's own repeat in each block; False for estimates that are there already."""
+    """Whether the random numbers of a filter's own repeat in each block; False for estimates that are there already,
+    and for a filter that cannot take the same plots in all rows."""
     if isinstance(member, StoredEstimates | EstimateChunks) or plan.block < 2:
         return False
+    try:
+        return _repeats_numbers(plan, member)
+    except AUTHOR_ERRORS:  # whatever the user's code raises: its run on the plots themselves says so
+        return False
+
+
+def _repeats_numbers(plan: "Plan", member: UserFilter) -> bool:
     plots = plan.draw(0, 1)
     n = min(plan.block, TRIAL_REALISATIONS)
 
     def estimates(first: int) -> np.ndarray:
-        given = plots_for_filter(plan.world, plots)
-        columns = {name: np.repeat(column, n, axis=0) for name, column in given.columns.items()}
-        answer = member.estimates(replace(given, columns=columns, first=first, n=n))
+        first_plots = plots_for_filter(plan.world, plots)
+        columns = {name: np.repeat(column, n, axis=0) for name, column in first_plots.columns.items()}
+        answer = member.estimates(replace(first_plots, columns=columns, first=first, n=n))
         return check_estimates(member.name, answer, n, len(plan.world.t_s), plan.names, member.components)[0]
 
     reference = estimates(0)
