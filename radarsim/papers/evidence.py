@@ -151,10 +151,13 @@ def ratio(a: Estimate, b: Estimate, scale: float = 1.0) -> Estimate:
 def has_interval(estimate: Estimate) -> bool:
     """Whether an estimate has an interval wider than rounding, or an unknown one, so that its value is not exact.
 
-    The ends of a ratio of exact numbers are unknown where one of them is zero (`ratio`): that is no interval."""
+    The ends of a ratio of exact numbers are unknown where one of them is zero (`ratio`): that is no interval. Nor are
+    those of an infinite value, such as a time to something that does not come within the run."""
     value, lo, hi = (float(number) for number in estimate)
+    if not math.isfinite(value):
+        return False
     if math.isnan(lo) or math.isnan(hi):
-        return math.isfinite(value) and value != 0
+        return value != 0
     if lo == hi:
         return False
     return math.isinf(lo) or math.isinf(hi) or hi - lo > INTERVAL_ROUNDING * max(abs(lo), abs(hi))

@@ -41,6 +41,7 @@ ANY_EVIDENCE = SimpleNamespace(exactly=lambda: None)  # of a measure that reads 
         (Estimate(1e9, 1e9, 1e9 * (1 + 2e-16)), False),
         (Estimate(0.0, math.nan, math.nan), False),  # a ratio of exact errors that are zero
         (Estimate(math.inf, math.inf, math.inf), False),
+        (Estimate(math.inf, 14.0, math.inf), False),  # a settling time of a filter that does not settle
         (exact_number(3), False),
     ],
 )
