@@ -244,7 +244,7 @@ class Evidence:
     def case(self, key: Any) -> CaseResult:
         """The case for a key; raises MissingEvidence where the experiment does not hold it. Here: by name.
 
-        A subclass compares keys with `shipped_spec(result)`; `result.spec` has those of the run."""
+        A subclass compares keys with `shipped_spec(result)`; the case's `spec` has those of the run."""
         for result in self.results:
             if result.name == key:
                 return result

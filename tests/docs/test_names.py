@@ -32,6 +32,9 @@ OTHERS = (
     "scans.errors",
     "STUDY.filters",
     "claims.CLAIMS",
+    "plots.generator",  # of the argument of a filter, `radarsim.studies.plot_arrays.RandomPlots`
+    "plots.normals",
+    "plots.uniforms",
     "docs/making/measured_STUDY.py",
     "w2_c.py",
 )
