@@ -9,6 +9,7 @@ import pytest
 
 import radarsim
 from radarsim.report.user_filters import answer
+from radarsim.studies import registry
 from tests.api.test_judge import twin
 
 DRAWN_TARGET = {  # σ has a posterior bound
@@ -82,3 +83,12 @@ def test_a_filter_is_judged_at_the_worst_point_of_the_studys_own_answer(point):
     worst = answer._worst_comparison(result, "mine", pd.DataFrame(rows), {"curves": pd.DataFrame(curves)})
     row = worst.gain_against("best")
     assert (row["component"], row["k"]) == (("x", 3) if len(point) > 1 else ("y", 2))
+
+
+def test_a_flight_is_judged_by_the_height_at_the_end_of_each_stage():
+    stages = [SimpleNamespace(name=name) for name in ("start", "manoeuvre", "after")]
+    target = SimpleNamespace(stages=stages, stage_ends_s=(20.0, 45.0))
+    axes = SimpleNamespace(t_s=np.arange(3.0, 70.0, 10.0), stage_scans=np.array([2, 3, 2]))
+    flight = SimpleNamespace(spec=SimpleNamespace(target=target), axes=axes)
+    points = registry.study("multimodel").answer_points(flight)
+    assert points == [("y", 13.0), ("y", 43.0), ("y", 63.0)]
