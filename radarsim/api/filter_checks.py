@@ -8,7 +8,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from radarsim import user_code_errors
 from radarsim.api.case_work import CaseWork
 from radarsim.api.estimate_files import UNIT_FACTORS
 from radarsim.config.experiment import Case
@@ -166,7 +165,7 @@ def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) 
         yield tr(
             "{name}: fails on noise of another seed ({error}): it seems to know the realisations by which it is judged",
             name=member.name,
-            error=user_code_errors.error_text(error),
+            error=f"{type(error).__name__}: {error}",
         )
         return
     errors = sums.filter_errors(other_plan, member, answer, plots, sums.greatest_errors(inner))
