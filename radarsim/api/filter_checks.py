@@ -161,7 +161,7 @@ def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) 
     try:
         answer = member.estimates(sums.plots_of(other_plan, plots))
     except AUTHOR_ERRORS as error:  # whatever the user's code raises: on the judged noise it did not
-        member.note_training(math.inf)
+        member.note_training(case.name, math.inf)
         yield tr(
             "{name}: fails on noise of another seed ({error}): it seems to know the realisations by which it is judged",
             name=member.name,
@@ -174,7 +174,7 @@ def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) 
     if not smaller - 0.5 > TRAINED * np.sqrt((2 * n + 1) / (12 * n * n)):
         return
     ratio = _error_ratio(there, here)
-    member.note_training(ratio)
+    member.note_training(case.name, ratio)
     yield tr(
         "{name}: on noise of another seed its σ is {ratio} times as large: it seems to have been trained on the "
         'realisations by which it is judged; radarsim.plots(…, purpose="training") draws others',

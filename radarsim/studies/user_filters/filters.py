@@ -16,6 +16,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ class UserFilter(ABC):
     written: Mapping[str, Any] | None = None  #: its keys, where a config has it
     baseline: bool = False  #: whether gains of the others are against it too
     answer_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
-    training_ratio: float | None = None  #: σ on other noise over σ on the judged one, where that is beyond chance
+    training_ratios: Mapping[str, float] = MappingProxyType({})  #: by case, see `note_training`
 
     @abstractmethod
     def estimates(self, plots: Plots) -> Any:
@@ -81,9 +82,10 @@ class UserFilter(ABC):
         """The filter as one of a case."""
         return self
 
-    def note_training(self, ratio: float) -> None:
-        """Note that its σ on other noise is so many times as large: it knows the realisations that it is judged on."""
-        vars(self)["training_ratio"] = ratio
+    def note_training(self, case: str, ratio: float) -> None:
+        """Note that its σ on other noise is so many times as large, beyond chance: it knows the realisations of a case
+        that it is judged on."""
+        vars(self)["training_ratios"] = {**self.training_ratios, case: ratio}
 
     def warnings(self) -> list[str]:
         """Warnings about its numbers, from what has run so far."""

@@ -45,7 +45,7 @@ class UserFilterAxes(Axes):
     identities: tuple[str, ...] = ()
     answer_at: tuple[str, float] | None = None
     answer_points: tuple[tuple[str, float], ...] = ()  #: see `Study.answer_points`
-    training_ratios: tuple[tuple[str, float], ...] = ()  #: by the name of a filter: see `UserFilter.training_ratio`
+    training_ratios: tuple[tuple[str, float], ...] = ()  #: by the name of a filter: see `UserFilter.note_training`
     repeating: tuple[str, ...] = ()  #: filters whose random numbers repeat in each block: their intervals do not hold
 
 
@@ -229,7 +229,8 @@ def error_powers(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 def result(plan: Plan, study_result: CaseResult, sums: Mapping[str, np.ndarray]) -> CaseResult:
     """The user filters as a case of their own: available only where some realisation has an estimate."""
     repeating = plan.repeating if study_result.count > plan.block else ()
-    ratios = tuple((member.name, member.training_ratio) for member in plan.members if member.training_ratio)
+    case = plan.world.case
+    ratios = tuple((m.name, m.training_ratios[case]) for m in plan.members if case in m.training_ratios)
     axes = replace(
         plan.axes,
         available=sums["estimates"] > 0,
