@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 from radarsim.api import arguments
 from radarsim.api.configs import Config, Overrides, load
 from radarsim.api.executor import open_executor
-from radarsim.api.load_experiments import combine_overrides, user_code_lines
+from radarsim.api.load_experiments import combine_overrides
 from radarsim.api.precision_target import check_precision
 from radarsim.api.progress import Progress
 from radarsim.api.repeat_command import repeat_command
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, simulate
-from radarsim.api.stored_runs import make_result
+from radarsim.api.stored_runs import config_filter_warnings, make_result
 from radarsim.api.writing_time import writing_seconds
 from radarsim.config.experiment import Experiment
 from radarsim.engine import stopping
@@ -93,7 +93,7 @@ def run(
         rule.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
     started, writing_s = time.perf_counter(), None
-    filter_warnings = _filter_warnings(experiment)
+    filter_warnings = config_filter_warnings(experiment)
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.remaining_s >= MIN_MEASURED_LIMIT_S:
         limit = limit.with_reserve(writing_s := writing_seconds(experiment, figures, width_mm))
     with open_executor(workers, scheduler) if executor is None else nullcontext(executor) as pool:
@@ -124,16 +124,6 @@ def run(
     else:
         result.write(out, figures, width_mm)
     return result
-
-
-def _filter_warnings(experiment: Experiment) -> list[str]:
-    """Warnings on the user filters that the config names, from checks before the run."""
-    if not user_code_lines([experiment]):
-        return []
-    from radarsim.api.filter_checks import check_user_filter
-
-    user_filters = [(case, member) for case in experiment.cases for member in case.user_filters if member.written]
-    return list(dict.fromkeys(line for case, member in user_filters for line in check_user_filter(case, member)))
 
 
 def required_stop_rule() -> StopRule:

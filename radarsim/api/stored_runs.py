@@ -10,7 +10,7 @@ from radarsim.api import arguments, configs
 from radarsim.api import repeat_command as api_repeat_command
 from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import Config, Overrides, load
-from radarsim.api.load_experiments import combine_overrides
+from radarsim.api.load_experiments import combine_overrides, user_code_lines
 from radarsim.api.repeat_command import command, repeat_command
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import SimulatedCases, collected_results
@@ -102,7 +102,20 @@ def stored_result(
             overrides = combine_overrides(overrides, counts.pop(), None)
         raise ConfigError(*missing, f"`{command(configured, overrides, out)}` computes them")
     repeat = repeat_command(configured, stored.done, overrides, None)
-    return make_result(experiment, stored, run_facts(stored, 0, 0.0), repeat)
+    filter_warnings = config_filter_warnings(experiment)  # of which the answer's first sentence takes some
+    result = make_result(experiment, stored, run_facts(stored, 0, 0.0), repeat)
+    result.facts["warnings"] += filter_warnings
+    return result
+
+
+def config_filter_warnings(experiment: Experiment) -> list[str]:
+    """Warnings on the user filters that the config names, from a trial on a few realisations."""
+    if not user_code_lines([experiment]):
+        return []
+    from radarsim.api.filter_checks import check_user_filter
+
+    user_filters = [(case, member) for case in experiment.cases for member in case.user_filters if member.written]
+    return list(dict.fromkeys(line for case, member in user_filters for line in check_user_filter(case, member)))
 
 
 def missing_blocks_line(name: str, stock: Inventory, store: Store) -> str:

@@ -165,6 +165,31 @@ def test_a_filter_that_has_learned_the_judged_realisations_is_said_in_the_first_
     assert sound.answer[0].startswith("mine is ")
 
 
+MEMO = """
+import numpy as np
+import radarsim
+
+plots = radarsim.plots("rls2", n=200)
+true = {float(z): x for z, x in zip(plots["range_m"][:, 0], plots.truth[..., 0])}
+
+
+def memo(plots):
+    found = [true.get(float(z[0]), z) for z in plots["range_m"]]
+    return np.array(found) + 1
+"""
+
+
+def test_a_stored_run_keeps_the_warning_on_training(tmp_path):
+    (tmp_path / "memo.py").write_text(MEMO)
+    filters = "filters: [{name: r, observes: [range], manoeuvre_variance: 1e-3}, {name: memo, python: 'memo.py:memo'}]"
+    (tmp_path / "mine.yaml").write_text(f"include: [rls2]\n{filters}\nrealisations: 300\n")
+    ran = radarsim.run(tmp_path / "mine.yaml", out=tmp_path / "results", figures=False, threads=1)
+    stored = radarsim.load(tmp_path / "mine.yaml", out=tmp_path / "results")
+    assert ran.answer[0].startswith("memo seems to have been trained on these realisations")
+    assert stored.answer == ran.answer
+    assert any('purpose="training"' in line for line in stored.warnings)
+
+
 def test_a_filter_that_fails_on_other_noise_is_judged_and_said():
     plots = radarsim.plots("rls2", n=300)
     known = {float(z): x for z, x in zip(plots["range_m"][:, 0], plots.truth[..., 0], strict=True)}
