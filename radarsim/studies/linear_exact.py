@@ -36,15 +36,50 @@ def limit(truth: tuple[np.ndarray, ...], model: Matrices, probability: float) ->
     """The limit of σ (n,) of a filter's errors, at scans of the phase of its last one; NaN where there is none, or
     where it depends on the truth: by a wrong F or H.
 
-    Of a filter's own gains the last ones are kept. The covariance of the errors goes over a period as S → T S + W, with
-    S as a vector, and stays at (1 - T)⁻¹ W."""
-    F, Q, mean, _ = truth
+    Of a filter's own gains the last ones are kept. The second moments of the errors go over a period as S → T S + W,
+    with S as a vector, and stay at (1 - T)⁻¹ W. Those of constant errors keep their value, and those of components
+    without error are zero; the others must settle."""
+    F, Q, mean, P = truth
     n = mean.size
     p = period(model.H, model.R, model.see, model.sigma)
     if not (np.array_equal(model.F, F) and np.array_equal(model.H, model.see)) or 2 * p > len(model.H):
         return np.full(n, np.nan)
     scans = np.arange(len(model.H) - p, len(model.H))  # a period that ends with the last one
     gains = model.gains[scans] if model.has_own_gains else steady(model)[0][scans % p]
+    T, W = _second_moments_over(scans, gains, F, Q, model, probability)
+    if not np.isfinite(T).all():
+        return np.full(n, np.nan)
+    start = P + np.outer(model.x - mean, model.x - mean)
+    gain_columns = np.hstack([model.gains.reshape(-1, n).T, gains.reshape(-1, n).T])
+    reached, constant = _components_with_errors(F, np.hstack([Q, gain_columns]), start)
+    both_constant = np.outer(constant, constant).ravel()
+    settling = np.flatnonzero(np.outer(reached, reached).ravel() & ~both_constant)
+    T_settling = T[np.ix_(settling, settling)]
+    if settling.size and np.abs(np.linalg.eigvals(T_settling)).max() >= 1:
+        return np.full(n, np.nan)
+    S = np.where(both_constant, start.ravel(), 0.0)
+    constant_inflow = T[np.ix_(settling, both_constant)] @ S[both_constant]
+    S[settling] = np.linalg.solve(np.eye(settling.size) - T_settling, W[settling] + constant_inflow)
+    return np.sqrt(S.reshape(n, n).diagonal())
+
+
+def _components_with_errors(F: np.ndarray, noise: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which components (n,) ever have an error, and which of them one that never changes.
+
+    noise (n, m): the columns that noise and plots move the errors by; start (n, n): the errors' second moments at
+    first."""
+    moved = (noise != 0).any(axis=1)
+    reached = moved | (start.diagonal() > 0)
+    for _ in range(len(F)):
+        reached = reached | (F[:, reached] != 0).any(axis=1)
+    return reached, reached & ~moved & (np.eye(len(F)) == F).all(axis=1)
+
+
+def _second_moments_over(
+    scans: np.ndarray, gains: np.ndarray, F: np.ndarray, Q: np.ndarray, model: Matrices, probability: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """T (n², n²) and W (n²,): over these scans the second moments of the errors, as a vector, go as S → T S + W."""
+    n = len(F)
     T, W = np.eye(n * n), np.zeros(n * n)
     for g, k in zip(gains, scans, strict=True):
         moved, added = np.kron(F, F), Q.ravel()
@@ -54,6 +89,4 @@ def limit(truth: tuple[np.ndarray, ...], model: Matrices, probability: float) ->
             retained, noise = A @ retained, A @ noise @ A.T + s**2 * np.outer(gain, gain)
         take = probability * np.kron(retained, retained) + (1 - probability) * np.eye(n * n)
         T, W = take @ moved @ T, take @ (moved @ W + added) + probability * noise.ravel()
-    if not np.isfinite(T).all() or np.abs(np.linalg.eigvals(T)).max() >= 1:
-        return np.full(n, np.nan)
-    return np.sqrt(np.linalg.solve(np.eye(n * n) - T, W).reshape(n, n).diagonal())
+    return T, W
