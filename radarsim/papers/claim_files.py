@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from string import Template
-from types import ModuleType, UnionType
+from types import ModuleType, NoneType, UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from radarsim import user_code_errors
@@ -38,7 +38,13 @@ from radarsim.errors import AUTHOR_ERRORS, ConfigError, MeasureError, RadarsimEr
 from radarsim.papers import expected_ranges
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownName, exact_number, has_interval
-from radarsim.papers.interpretations import Alternative, Choice, ImpossibleInterpretation
+from radarsim.papers.interpretations import (
+    LEADING_COLUMNS,
+    TRAILING_COLUMNS,
+    Alternative,
+    Choice,
+    ImpossibleInterpretation,
+)
 from radarsim.report.statistics import Estimate
 
 RANGE_NAMES = (
@@ -47,6 +53,8 @@ RANGE_NAMES = (
 )
 KeysModel = TypeVar("KeysModel", bound=Model)
 Declaration = TypeVar("Declaration", Claim, Choice)
+# The last is the name of a column of interpretations.csv in earlier versions.
+RESERVED_CHOICE_KEYS = (*LEADING_COLUMNS, *TRAILING_COLUMNS, "reading")
 TYPE_WORDS = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}
 
 
@@ -284,7 +292,15 @@ class _Reader:
     def choices(self, keys: ChoicesKeys | FileKeys) -> Iterator[Choice]:
         """The choices in their order."""
         names = self._read_names(keys.names)
+        taken: set[str] = set()
         for i, choice_keys in enumerate(keys.choices):
+            if choice_keys.key in RESERVED_CHOICE_KEYS:
+                columns = ", ".join(RESERVED_CHOICE_KEYS)
+                message = f"is a column of interpretations.csv already; not allowed: {columns}"
+                self._add(("choices", i, "key"), message, choice_keys.key)
+            if choice_keys.key in taken:
+                self._add(("choices", i, "key"), "stands there already", choice_keys.key)
+            taken.add(choice_keys.key)
             claims = self._filled(choice_keys.claims, names, ("choices", i, "claims"))
             claim_ids = [
                 claim_id
@@ -349,14 +365,19 @@ class _Reader:
             self._add((*path, "of"), "must be a list of cases", keys.of)
             raise _UnknownNameError
         measure = self._call(fields.pop("measure"), self.measures, cases, (*path, "measure"))
-        expected = self._call(fields.pop("expected"), self.ranges, (), (*path, "expected"))
+        words = fields.pop("expected")
+        expected = self._call(_with_further_arguments(words), self.ranges, (), (*path, "expected"))
         for key in ("scale", "ceiling"):
             if fields[key] is not None:
                 fields[key] = self._call(fields[key], self.measures, cases, (*path, key)).number
         exactly = self.functions.get(f"exact_{measure.name}")
         exact = replace(measure, name=f"exact_{measure.name}", function=exactly).exact_number if exactly else None
         assert expected.function
-        expected_range = expected.function(**expected.arguments)
+        try:
+            expected_range = expected.function(**expected.arguments)
+        except ValueError as error:
+            self._add((*path, "expected"), f"{expected.name}: {error}", words)
+            raise _UnknownNameError from None
         if not (expected_range.lo <= expected_range.hi and expected_range.margin > 0):
             self._add((*path, "expected"), "must be a range from low to high with a margin > 0", expected_range.words)
             raise _UnknownNameError
@@ -421,6 +442,17 @@ class _Reader:
         self.faults.add(self.document.origin(path), path, message, got)
 
 
+def _with_further_arguments(expected: Any) -> Any:
+    """A range with arguments beside its own, `{printed: "0.374", runs: 100, variance: 0.015}`, as one call."""
+    names = [name for name in expected if name in RANGE_NAMES] if isinstance(expected, dict) else []
+    if len(names) != 1 or len(expected) < 2:
+        return expected
+    (name,) = names
+    values = expected[name] if isinstance(expected[name], tuple) else (expected[name],)
+    own_arguments = dict(zip(_parameters_of(getattr(expected_ranges, name)), values, strict=False))
+    return {name: own_arguments | {key: value for key, value in expected.items() if key != name}}
+
+
 @cache
 def _parameters_of(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
     return inspect.signature(function).parameters
@@ -442,7 +474,8 @@ def _wrong_type(annotation: Any, value: Any) -> str:
         allowed = get_args(annotation)
         return "" if value in allowed else f"one of {', '.join(map(str, allowed))}"
     if isinstance(annotation, UnionType):
-        wrong_types = [_wrong_type(member, value) for member in get_args(annotation)]
+        members = [member for member in get_args(annotation) if value is None or member is not NoneType]
+        wrong_types = [_wrong_type(member, value) for member in members]
         return "" if not all(wrong_types) else " or ".join(wrong_types)
     if annotation not in TYPE_WORDS:
         return ""

@@ -11,7 +11,15 @@ from radarsim.papers.claim import Claim, PaperClaims, Part
 from radarsim.papers.claim_outcome import ClaimOutcome, claim_outcome
 from radarsim.papers.evidence import Evidence, ExactNumber, MissingEvidence, has_interval
 from radarsim.papers.paper_cases import CaseKeys, ShippedCases, case_keys, key_differences, paper_members
-from radarsim.papers.verdict_rule import CONFIRMED, REFUTED, JudgedPart, judged_interval, miss_in_margins, part_verdict
+from radarsim.papers.verdict_rule import (
+    CONFIRMED,
+    REFUTED,
+    UNDECIDED,
+    JudgedPart,
+    judged_interval,
+    miss_in_margins,
+    part_verdict,
+)
 from radarsim.report import tables
 from radarsim.report.statistics import ERROR_OF_PROGRAM, MIN_TRUSTED_REALISATIONS, Estimate, standard_errors
 
@@ -23,6 +31,7 @@ if TYPE_CHECKING:
 
 UNCLEAR, NOT_RUN, NOT_JUDGED = "not distinguishable", "not run", "not judged here"
 MAX_REASON_ITEMS, MAX_KEYS_OF_ONE_CASE = 3, 8  # keys and cases in a reason; keys in a reason on one case
+NO_NUMBER = "its measure gives no number"
 ANOTHER_EXPERIMENT = "not the paper's experiment: {changed}"
 
 
@@ -184,10 +193,19 @@ def _claim_rows(claim: Claim, paper: str, papers: _PaperEvidence, of_config: boo
     is_complete = all(measured_part.judged is not None for measured_part in asserted) or (
         outcome is not None and outcome.kind == REFUTED
     )
+    is_complete = is_complete and not (
+        outcome is not None and lacks_number(outcome, [judged for _, judged in judged_parts])
+    )
     return [
         _part_row(claim, paper, measured_part, outcome if is_complete else None, sampled_parts)
         for measured_part in measured_parts
     ]
+
+
+def lacks_number(outcome: ClaimOutcome, parts: Sequence[JudgedPart]) -> bool:
+    """Whether a claim is undecided for want of a number, which no run of any length would give."""
+    asserted = [part for part in parts if part.asserted] or parts
+    return outcome.kind == UNDECIDED and not all(part.has_number for part in asserted)
 
 
 def _measure_part(part: Part, evidence: Evidence | None, changed: str) -> _MeasuredPart:
@@ -212,7 +230,8 @@ def _measure_part(part: Part, evidence: Evidence | None, changed: str) -> _Measu
     judged = replace(judged, exact=exact_value(part, evidence, measured))
     names = ", ".join(dict.fromkeys(case.name for case in cases))
     old = old_verdict(measured, part.expected.strict)
-    return _MeasuredPart(part, names, judged, old, disagreement_message(part, judged), tables_read)
+    why = disagreement_message(part, judged) if judged.has_number else NO_NUMBER
+    return _MeasuredPart(part, names, judged, old, why, tables_read)
 
 
 def judged_part(part: Part, evidence: Evidence, measured: Estimate, n: int) -> JudgedPart:
@@ -294,7 +313,8 @@ def _part_row(
     return row | {
         **{name: getattr(judged, name) for name in ("measured", "lo", "hi", "exact", "ceiling", "n")},
         **{"margin": _table_number(judged.margin), "miss": _table_number(miss_in_margins(judged))},
-        **{"verdict": part_verdict(judged, sampled_parts), "old_verdict": measured_part.old},
+        "verdict": part_verdict(judged, sampled_parts) if judged.has_number else NOT_JUDGED,
+        "old_verdict": measured_part.old,
         **dict(zip(("judged_lo", "judged_hi"), judged_interval(judged, sampled_parts), strict=True)),
     }
 

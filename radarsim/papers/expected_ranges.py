@@ -3,7 +3,8 @@
 import math
 from typing import NamedTuple
 
-from radarsim.papers.verdict_rule import ABOUT, GRID, LIMIT, MATERIAL, PRINT, SAME
+from radarsim.papers.verdict_rule import ABOUT, GRID, LIMIT, MATERIAL, PRINT, SAME, SAMPLE, Z95
+from radarsim.report.statistics import student
 
 
 class ExpectedRange(NamedTuple):
@@ -24,9 +25,41 @@ def last_digit_unit(text: str) -> float:
     return 10.0 ** -len(text.partition(".")[2])
 
 
-def printed(text: str, step: float | None = None) -> ExpectedRange:
-    """A printed number; step: its resolution where numbers are read off a graph. Default: its last digit."""
-    return _inclusive_range(text, text, text, step, PRINT)
+def printed(
+    text: str,
+    step: float | None = None,
+    runs: int | None = None,
+    variance: float | None = None,
+    se: float | None = None,
+) -> ExpectedRange:
+    """A printed number; step: its resolution where numbers are read off a graph. Default: its last digit.
+
+    Of a number that is itself a mean over simulated runs: how many, and the variance over the runs, or its standard
+    error se. Its margin is then the half-width of its own 95 % interval, rounding included; the sampling error of what
+    is measured is in the interval that is judged, so that both samples count. Raises ValueError where these do not
+    fit together."""
+    if runs is variance is se is None:
+        return _inclusive_range(text, text, text, step, PRINT)
+    factor, error = _printed_standard_error(runs, variance, se)
+    rounding = (last_digit_unit(text) if step is None else step) / math.sqrt(12)  # of a number within half a step
+    margin = factor * math.hypot(error, rounding)
+    value = float(text)
+    return ExpectedRange(value, value, f"{text} ± {margin:.2g}", margin, SAMPLE, (value - margin, value + margin))
+
+
+def _printed_standard_error(runs: int | None, variance: float | None, se: float | None) -> tuple[float, float]:
+    """Half-width of a 95 % interval in standard errors, and the standard error of a printed mean over runs."""
+    if se is not None:
+        if runs is not None or variance is not None:
+            raise ValueError("takes se alone, or runs and variance")
+        if not 0 < se < math.inf:
+            raise ValueError("se must be > 0")
+        return Z95, float(se)
+    if runs is None or variance is None:
+        raise ValueError("needs both runs and variance, the variance over the runs")
+    if runs < 2 or not 0 < variance < math.inf:
+        raise ValueError("needs at least 2 runs, and a variance > 0")
+    return float(student(runs - 1)), math.sqrt(variance / runs)
 
 
 def between(low: str, high: str, step: float | None = None) -> ExpectedRange:

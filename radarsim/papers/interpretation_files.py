@@ -32,16 +32,18 @@ def write_files(verdicts: InterpretationVerdicts, figures: bool, forecast: Timed
 
 
 def _interpretations_csv(verdicts: InterpretationVerdicts) -> str:
-    columns = verdict_columns(paper.interpretations for paper in open_papers().values())
+    """The rows of these claims and the stored rows of others, with the choices of the papers of both."""
+    judged = {claim.claim.id for claim in verdicts.claims}
+    stored_rows = [row for row in stored_interpretations(verdicts.folder.parent) if row["claim"] not in judged]
+    papers = {claim.partition(".")[0] for claim in (*judged, *(row["claim"] for row in stored_rows))}
+    columns = verdict_columns(paper.interpretations for key, paper in open_papers().items() if key in papers)
     rows = [
         row
         for claim in verdicts.claims
         for verdict in claim.verdicts
         for row in verdict_rows(verdict, columns, claim.outcome)
     ]
-    return _merged_csv(
-        columns, stored_interpretations(verdicts.folder.parent), rows, {claim.claim.id for claim in verdicts.claims}
-    )
+    return _merged_csv(columns, stored_rows, rows, judged)
 
 
 def _classes_csv(verdicts: InterpretationVerdicts) -> str:

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 
 KINDS = (EQUIVALENT, UNSTATED, AGAINST)  # an interpretation is of the last kind among its alternatives
 DEFAULT = "as shipped"
+# Of interpretations.csv: before and after a column for each choice, by its key, which may not be called like one.
+LEADING_COLUMNS = ("claim", "part", "interpretation", "kind")
+TRAILING_COLUMNS = (
+    *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
+    *("unit", "what", "outcome", "miss", "n", "needed", "reason", "over"),
+)
 
 
 class ImpossibleInterpretation(Exception):

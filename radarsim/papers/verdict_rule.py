@@ -13,11 +13,12 @@ UNDECIDED, DEPENDS = "not yet decided", "depends on"
 VOID = "void"  # of a part: the truth itself would fail it
 CLASSES = (CONFIRMED, REFUTED, DEPENDS, IMMATERIAL, CONTRADICTORY, UNJUDGEABLE, UNDECIDED)
 FIXED_CLASSES = (CONTRADICTORY, UNJUDGEABLE)
-# Kinds of margin. Of the first four the margin belongs to the words: a value within it is what the paper says.
+# Kinds of margin. Of the first five the margin belongs to the words: a value within it is what the paper says.
 PRINT, ABOUT, GRID, SAME = "print", "about", "grid", "same"
+SAMPLE = "sample"  # a printed result of simulated runs, which has a sampling error of its own
 LIMIT = "limit"  # "more than 50 %": just outside, within the margin, is no material difference
 MATERIAL = "material"  # "better": within the margin of equality, on either side, is no material difference
-INCLUSIVE_MARGINS = (PRINT, ABOUT, GRID, SAME)
+INCLUSIVE_MARGINS = (PRINT, ABOUT, GRID, SAME, SAMPLE)
 EQUIVALENT, UNSTATED, AGAINST = "E", "U", "N"  # kinds of interpretations; the last contradicts the print
 Z95 = NormalDist().inv_cdf(0.975)
 ROUNDING = 1e-12  # of a margin
@@ -64,6 +65,11 @@ class JudgedPart:
     def value(self) -> float:
         """The judged value: the exact one, or the measured one."""
         return self.exact if self.is_known_exactly else self.measured
+
+    @property
+    def has_number(self) -> bool:
+        """Whether there is a value to judge; of a measure that gives NaN there is none."""
+        return not math.isnan(self.value)
 
     @property
     def is_void(self) -> bool:

@@ -10,11 +10,17 @@ from radarsim.errors import MeasureError
 from radarsim.language.translate import term, tr
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.claim_outcome import ClaimOutcome, claim_outcome, largest_needed, round_up
+from radarsim.papers.claims_table import NO_NUMBER, judged_part, lacks_number
 from radarsim.papers.claims_table import exact_value as known
-from radarsim.papers.claims_table import judged_part
 from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownScans, has_interval
 from radarsim.papers.interpretation_outcome import InterpretationOutcome, outcome_over_interpretations
-from radarsim.papers.interpretations import DEFAULT, Interpretation, PaperInterpretations
+from radarsim.papers.interpretations import (
+    DEFAULT,
+    LEADING_COLUMNS,
+    TRAILING_COLUMNS,
+    Interpretation,
+    PaperInterpretations,
+)
 from radarsim.papers.reasons import translate_reason
 from radarsim.papers.verdict_rule import (
     AGAINST,
@@ -30,11 +36,6 @@ from radarsim.report.statistics import Estimate
 
 DEPENDS_ON = term("depends on {choices}")
 NOTHING_TO_MEASURE = "there is nothing to measure it with"
-LEADING_COLUMNS = ("claim", "part", "interpretation", "kind")
-TRAILING_COLUMNS = (
-    *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
-    *("unit", "what", "outcome", "miss", "n", "needed", "reason", "over"),
-)
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ def judge_claim(
             raise
         return InterpretationVerdict(claim, interpretation, name, kind, why=error.__cause__.why)
     outcome = claim_outcome([judged for _, judged in parts], **claim.judging_options)
+    if lacks_number(outcome, [judged for _, judged in parts]):
+        return InterpretationVerdict(claim, interpretation, name, kind, why=NO_NUMBER)
     return InterpretationVerdict(claim, interpretation, name, kind, parts, outcome)
 
 

@@ -1,11 +1,14 @@
 """Claims in YAML: what they become, and what is said of a mistake in one."""
 
+import math
 import re
 import subprocess
 import sys
 from types import ModuleType
 
+import numpy as np
 import pytest
+from scipy import stats
 
 from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
@@ -16,6 +19,7 @@ from radarsim.papers.evidence import ExactNumber
 from radarsim.papers.expected_ranges import above, printed
 from radarsim.papers.sonar.measures import CASE_FINDERS
 from radarsim.papers.study_claims import claims_of, interpretations_of, paper_claims
+from radarsim.papers.verdict_rule import REFUTED, SAMPLE, JudgedPart, part_verdict
 from radarsim.report.statistics import Estimate
 from radarsim.studies import registry
 
@@ -217,3 +221,66 @@ def test_how_long_fast_radars_are_watched_bears_on_all_claims_that_look_at_one()
         looked[claim.id] = {case[0] if isinstance(case, tuple) else case for case in cases}
     algebra, level = {"P1.16", "P1.31", "P1.34", "P1.36"}, {"P1.20"}  # what a curve converges to
     assert set(points.claims) == {one for one, radars in looked.items() if radars & {3, 5}} - algebra - level
+
+
+def test_a_printed_mean_over_runs_has_the_margin_of_its_own_sampling_error(claims):
+    words = 'printed: "0.374", runs: 100, variance: 0.015'
+    ((part,),) = (claim.parts for claim in claims(HEAD + CLAIM + PART.replace("above: 0", words)))
+    se = math.sqrt(0.015 / 100 + 0.001**2 / 12)
+    assert part.expected.margin == pytest.approx(stats.t.ppf(0.975, 99) * se, rel=1e-6)
+    assert (part.expected.lo, part.expected.hi, part.expected.kind) == (0.374, 0.374, SAMPLE)
+    assert part.expected.words == "0.374 ± 0.024"
+
+
+def test_a_printed_number_may_have_a_standard_error_and_a_resolution(claims):
+    words = 'se: 0.02, printed: ["3.5", 0.5]'  # in any order
+    (claim,) = claims(HEAD + CLAIM + PART.replace("above: 0", words))
+    assert claim.parts[0].expected.margin == pytest.approx(1.959964 * math.hypot(0.02, 0.5 / math.sqrt(12)))
+
+
+def test_the_print_of_a_true_value_is_refuted_as_seldom_as_its_interval_misses():
+    """A measured value without error of its own, against prints of ten runs each, rounded to a digit."""
+    rng, refuted, trials = np.random.default_rng(5), 0, 4000
+    for _ in range(trials):
+        runs = rng.normal(2.0, 0.3, 10)
+        words = printed(f"{runs.mean():.1f}", runs=10, variance=float(runs.var(ddof=1)))
+        part = JudgedPart(2.0, 2.0, 2.0, words.lo, words.hi, words.margin, words.kind)
+        refuted += part_verdict(part) == REFUTED
+    assert refuted / trials < 0.05 + 4 * math.sqrt(0.05 * 0.95 / trials)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ('printed: "1", runs: 100', "expected: printed: needs both runs and variance"),
+        ('printed: "1", variance: 0.1', "expected: printed: needs both runs and variance"),
+        ('printed: "1", runs: 1, variance: 0.1', "needs at least 2 runs, and a variance > 0"),
+        ('printed: "1", runs: 10, variance: -1', "needs at least 2 runs, and a variance > 0"),
+        ('printed: "1", se: 0', "se must be > 0"),
+        ('printed: "1", se: 0.1, runs: 10', "takes se alone, or runs and variance"),
+        ('printed: "1", runz: 10', "printed(text, step, runs, variance, se): got an unexpected keyword argument"),
+        ('printed: "1", runs: many', "expected.printed.runs: must be a whole number, got 'many'"),
+        ('printed: "1", about: "2"', "expected: must be one of them; allowed: printed"),
+        ('about: "1", runs: 10', "about(low, high, margin, kind): got an unexpected keyword argument 'runs'"),
+        ("printed: one", "expected: printed: could not convert string to float: 'one'"),
+    ],
+)
+def test_what_a_printed_sample_lacks_is_named(claims, words, said):
+    with pytest.raises(ConfigError) as raised:
+        claims(HEAD + CLAIM + PART.replace("above: 0", words))
+    assert said in str(raised.value)
+    assert "claims.yaml:9:" in str(raised.value)
+
+
+CHOICE = "choices:\n- {key: KEY, asks: how, original: nothing, alternatives: [{name: a, kind: U, reason: b}]}\n"
+
+
+@pytest.mark.parametrize("key", ["measured", "kind", "n", "reading"])
+def test_a_choice_is_not_called_like_a_column(tmp_path, key):
+    file = tmp_path / "interpretations.yaml"
+    file.write_text("paper: P9\n" + CHOICE.replace("KEY", key), encoding="utf-8")
+    with pytest.raises(ConfigError, match=rf"choices.0.key: is a column of interpretations.csv .*, got '{key}'"):
+        load_choices(file)
+    file.write_text("paper: P9\n" + CHOICE.replace("KEY", "start") + CHOICE.partition("\n")[2].replace("KEY", "start"))
+    with pytest.raises(ConfigError, match=r"choices.1.key: stands there already"):
+        load_choices(file)
