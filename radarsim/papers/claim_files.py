@@ -409,7 +409,7 @@ class _Reader:
     ) -> MeasureCall:
         """The call of `name` or `{name: arguments}`: arguments by name, or, for a range, in their order."""
         name, arguments = next(iter(value.items())) if isinstance(value, dict) and len(value) == 1 else (value, {})
-        if name not in functions:
+        if not isinstance(name, str) or name not in functions:
             self._add(path, f"must be one of them{_allowed_names(str(name), functions)}", value)
             raise _UnknownNameError
         function, path = functions[name], (*path, name) if value is not name else path
