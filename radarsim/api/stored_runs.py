@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from radarsim.api.load_experiments import combine_overrides, user_code_lines
 from radarsim.api.repeat_command import command, repeat_command
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import SimulatedCases, collected_results
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.blocks import Total
 from radarsim.engine.collect import read_stored
 from radarsim.engine.store.inventory import Inventory, take_inventory
@@ -60,6 +61,19 @@ def missing_realisations(stock: Inventory) -> str:
     numbers, share_count = stock.shares
     share = tr("share {number} of {of}", number=join_names([str(number) for number in numbers]), of=share_count)
     return tr("realisations {runs}; perhaps {share} was not copied", runs=runs, share=share)
+
+
+def stored_realisations(cases: Sequence[Case], out: str | os.PathLike[str] | None) -> int:
+    """The most realisations that a run under `out` has reported of each of these cases; 0 where one has none."""
+    if out is None or not cases or not (Path(out) / ".blocks").is_dir():
+        return 0
+    counts: set[int] | None = None
+    for case in cases:
+        totals = {piece.count for piece in Store(out, CaseWork(case)).pieces() if isinstance(piece, Total)}
+        counts = totals if counts is None else counts & totals
+        if not counts:
+            return 0
+    return max(counts or {0})
 
 
 def stored_result(

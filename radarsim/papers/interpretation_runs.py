@@ -9,6 +9,7 @@ from radarsim.api import configs, result_content, simulate_cases
 from radarsim.api.case_work import CaseWork
 from radarsim.api.progress import Progress, TimedProgress, estimate_seconds
 from radarsim.api.simulate_cases import RunOptions, SimulatedCases
+from radarsim.api.stored_runs import stored_realisations
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores
 from radarsim.engine.stopping import Signals
@@ -20,6 +21,7 @@ from radarsim.papers.open_papers import JudgingRequest
 from radarsim.papers.verdict_rule import UNDECIDED
 from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts, InterpretationVerdict, judge_claim
 from radarsim.report.precision import look_counts
+from radarsim.report.user_filters import tables as user_filters_tables
 
 # Expected seconds of judging a run, of an exact verdict and of a figure, until some are measured.
 RUN_JUDGED_S, VERDICT_S, FIGURE_S = 0.05, 0.001, 0.13
@@ -28,7 +30,8 @@ LATER_LOOK_SHARE = 0.5  # of the time of all first runs, expected of each later 
 
 class InterpretationRuns:
     """The runs that a paper's interpretations need, each once, and the verdicts from them. A run is judged as soon as
-    it is done and then dropped: memory is that of one run, however many interpretations there are."""
+    it is done and then dropped: memory is that of one run, however many interpretations there are. Where a larger run
+    is stored, it is judged in place of a smaller one."""
 
     def __init__(self, request: JudgingRequest, realisations: int):
         self._request, self._paper, self._realisations = request, request.paper, realisations
@@ -202,8 +205,10 @@ class InterpretationRuns:
     def _run(
         self, key: tuple[str, ...], pairs: Sequence[tuple[Case, Case]], options: RunOptions, progress: Progress
     ) -> SimulatedCases:
-        changed_cases = tuple(changed_case for _, changed_case in pairs)
-        experiment = replace(self._experiment(key[0]), cases=changed_cases, realisations=self._realisations)
+        changed_cases = [changed_case for _, changed_case in pairs]
+        n = max(self._realisations, stored_realisations(changed_cases, options.out))
+        changed_cases = [replace(case, realisations=max(n, case.realisations)) for case in changed_cases]
+        experiment = replace(self._experiment(key[0]), cases=tuple(changed_cases), realisations=n)
         simulated = simulate_cases.simulate(experiment, options, progress=progress)
         if simulated.stopped:
             raise TargetUnmet(f"interpretations: {simulated.stopped}: the same command continues")
@@ -211,7 +216,8 @@ class InterpretationRuns:
 
     def _changed_results(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> ChangedResults:
         results = simulate_cases.collected_results(simulated)
-        tables = result_content.measured_tables(results)
+        user_rows = user_filters_tables.measured_rows(results)
+        tables = user_filters_tables.tables_for_claims(result_content.measured_tables(results), user_rows)
         originals = [interpreted_case(changed, case.spec) for changed, (case, _) in zip(results, pairs, strict=True)]
         may_grow = self._paper.claims.may_grow
         places = {
