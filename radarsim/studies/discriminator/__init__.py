@@ -52,6 +52,11 @@ class Discriminator(Study):
 
         return study.simulate(plan, first, count)
 
+    def errors(self, plan: "Plan", first: int, count: int) -> "np.ndarray":
+        from radarsim.studies.discriminator import study
+
+        return study.errors(plan, first, count)
+
     def floor(self, spec: "Keys", axes: Any) -> "Floor | None":
         from radarsim.studies.discriminator import floor
 

@@ -256,6 +256,24 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     return values
 
 
+def errors(plan: Plan, first: int, count: int) -> np.ndarray:
+    """The errors (F, count, K, C) of locked bursts in the units of the axes; not-a-number where a burst does not lock,
+    and of bursts that importance sampling draws."""
+    is_plain = np.ones(count, dtype=bool)
+    if plan.mixture is None:
+        turns, _ = estimate(plan, first, count)
+    else:
+        turns, _, _, is_plain = weighted_estimates(plan, first, count)
+    size = len(plan.axes.components)
+    lock_flags = np.zeros((len(plan.options), count, turns.shape[2], len(kernels_sums.LOCKS)))
+    for f, options in enumerate(plan.options):
+        bounds = plan.potential[f, :, :size], plan.posterior[f, :, :size]
+        kernels_sums.judge(turns[:, f], *bounds, options["windows"], lock_flags[f])
+    is_locked = (lock_flags[..., kernels_sums.LOCKS.index("lock")] > 0) & is_plain[:, None]
+    errors_in_units = turns[..., :size] / model.turns_per_parameter(size, plan.axes.burst_s)
+    return np.where(is_locked[..., None], np.moveaxis(errors_in_units, 1, 0), np.nan)
+
+
 def estimate(plan: Plan, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Errors (count, F, K, 6) in turns over the burst and passes (count, F) of bursts first, first + 1, …."""
     shape = plan.windows.shape

@@ -76,6 +76,21 @@ class Plan:
             part_sums |= ended._asdict()
         return block_sums.pack_sums(self.layout, sums, **part_sums)
 
+    def errors(self, first: int, count: int) -> np.ndarray:
+        """The errors (F, count, K, C S) of the confirmed tracks on the target, not-a-number where there is none."""
+        axes, (F, K, values) = self.axes, self.axes.available.shape
+        work, errors = workspace(F), np.full((F, count, K, values), np.nan)
+        shapes = kernels_track_sums.shapes(F, K, len(axes.thresholds))
+        for i in range(count):
+            sums = block_sums.empty_sums(F, K, COORDINATES)
+            track_sums = kernels_track_sums.TrackSums(sums, **{name: np.zeros(shape) for name, shape in shapes.items()})
+            blocks.simulate_block(
+                axes.world, axes.detections, axes.field, self.trackers, work, first + i, 1, track_sums
+            )
+            error, estimates = (part[:, :, :, :SIZE].reshape(F, K, values, -1) for part in (sums.error, sums.estimates))
+            errors[:, i] = np.where(estimates[..., 0] > 0, error[..., 0], np.nan)
+        return errors
+
 
 def prepare(case: Case) -> Plan:
     """Design the trackers of a case, and compute the exact laws of their errors and of initiation."""
