@@ -24,7 +24,7 @@ def case_result(case: Case, work: CaseWork, collected: CollectedSums) -> CaseRes
                 plan_case.name, plan_case.study, plan_case.spec, plan_case.swept_values, count, sums, axes, seconds
             )
         )
-    result = replace(results[0], further_baselines=tuple(results[1:]))
+    result = replace(results[0], further_baselines=tuple(results[1:]), case=replace(case, realisations=count))
     if not case.user_filters:
         return result
     from radarsim.studies.user_filters import sums as user_filters_sums

@@ -1,7 +1,7 @@
 """The result of a finished experiment: tables, figures, answer, run record and report, in memory and in files."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cached_property, partial
 from pathlib import Path
@@ -21,6 +21,7 @@ from radarsim.report.row_notes import with_note_texts
 from radarsim.studies.registry import quantities, study
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
     from radarsim.api.result_content import Answer
@@ -130,6 +131,30 @@ class Result(Displayable):
         gains = with_first_baseline({"gains": self.gains}, self.cases)["gains"]
         gains = gains.groupby(keys, sort=False).tail(1).rename(columns={"note": "gain_note"})
         return last.merge(gains, on=[*keys, "k", "t_s"], how="left")
+
+    def errors(
+        self, filter: str, component: str, case: str | None = None, realisations: int | None = None
+    ) -> "Iterator[np.ndarray]":
+        """The errors (n, K) of a filter's estimates in a component, realisation by realisation, a block at a time.
+
+        They are drawn again, not-a-number where there is no estimate; `case` is a name, by default the first;
+        `realisations` how many, from the first on. Raises ConfigError for an unknown name.
+
+        >>> import radarsim
+        >>> result = radarsim.run("rls2", realisations=2000)
+        >>> sum(len(errors) for errors in result.errors("r", "r"))
+        2000
+        """
+        from radarsim.api import run_errors
+
+        return run_errors.result_errors(self, filter, component, case, realisations)
+
+    def add_runs_table(self, span: str = "all") -> None:
+        """Add the table `runs`: of each run's root mean square over the scans of a span, `2:60`, the mean, median,
+        variance and quantiles over the runs. Raises ConfigError for an impossible span."""
+        from radarsim.api import run_errors
+
+        self._tables["runs"] = run_errors.runs_table(self, span)
 
     @cached_property
     def _figures_by_name(self) -> "dict[str, Figure]":

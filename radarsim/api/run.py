@@ -13,6 +13,7 @@ from radarsim.api.load_experiments import combine_overrides
 from radarsim.api.precision_target import check_precision
 from radarsim.api.progress import Progress
 from radarsim.api.repeat_command import repeat_command
+from radarsim.api.run_errors import parse_span
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, simulate
 from radarsim.api.stored_runs import config_filter_warnings, make_result
@@ -50,6 +51,7 @@ def run(
     out: str | os.PathLike[str] | None = None,
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
+    runs: str | None = None,
     progress: Progress | None = None,
     stop: Signals | None = None,
 ) -> "Result":
@@ -65,8 +67,9 @@ def run(
     end at the first of these numbers at which every claim of the config is decided. time_limit is in seconds, including
     tables and figures, or a condition that is already running. `result.unmet` names the targets that were not reached.
     workers: number of processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already
-    open. width_mm: width of the figures, instead of their own. progress is called with the realisations that are done,
-    are to be done, and were stored, where cases are weighed by their time.
+    open. width_mm: width of the figures, instead of their own. runs: scans, `2:60` or `all`, for the table `runs` of
+    each run's root-mean-square error over them (`Result.add_runs_table`). progress is called with the realisations that
+    are done, are to be done, and were stored, where cases are weighed by their time.
 
     Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
     TargetUnmet if the time did not suffice for a single block, and Interrupted on a signal; finished blocks are then
@@ -86,6 +89,8 @@ def run(
     checked_arguments |= {"executor": executor, "out": out, "figures": figures, "width_mm": width_mm}
     overrides = combine_overrides(arguments.check_arguments(overrides, **checked_arguments), realisations, seed)
     experiment = load(config, overrides)
+    if runs is not None:
+        parse_span(runs)
     if precision is not None:
         check_precision([experiment], precision, of)
     rule = required_stop_rule() if decide else None
@@ -119,6 +124,9 @@ def run(
     result = make_result(experiment, simulated, facts, repeat)
     run_warnings = (line for case in experiment.cases for member in case.user_filters for line in member.warnings())
     result.facts["warnings"] += dict.fromkeys((*filter_warnings, *run_warnings))
+    if runs is not None:
+        with limited(threads):
+            result.add_runs_table(runs)
     if out is None:
         result.check()
     else:

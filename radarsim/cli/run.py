@@ -36,6 +36,7 @@ STOP_RULE = stop_rule()
 @click.option("--scheduler", metavar="ADDR", help="Address of a Dask scheduler whose workers compute: tcp://host:8786.")
 @options.out_option
 @options.drawing_options
+@click.option("--runs", metavar="K1:K2|all", help="Also write runs.csv: each run's rms error over scans K1 to K2.")
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 @options.json_option
 def run(
@@ -53,6 +54,7 @@ def run(
     scheduler: str | None,
     out: str,
     drawing: options.Drawing,
+    runs: str | None,
     quiet: bool,
     as_json: bool,
 ) -> None:
@@ -74,12 +76,15 @@ def run(
       radarsim run discriminator_paper -n 1e6 --decide  names undecided claims and the N that they need: exit code 3
       radarsim run rls2 -n 1e8 --shard 2/3              on the second of three machines
       radarsim run rls2 -n 1e8 --workers 8              or --scheduler tcp://host:8786
+      radarsim run rls2 --runs 3:15                     with each run's rms error over scans 3 to 15
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
     _refuse_incompatible(shard, precision, workers or scheduler, threads)
     refuse_quantity_without_precision(of, precision)
     if decide and (shard or precision):
         raise click.UsageError("--decide goes with neither --shard nor --precision: claims are judged on all blocks")
+    if shard and runs:
+        raise click.UsageError("--shard and --runs do not go together: a share has no tables")
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler do not go together: give one of them")
     from radarsim.engine import stopping
@@ -98,7 +103,7 @@ def run(
             compute_arguments: dict[str, Any] = {"out": out, "threads": threads, "executor": pool}
             compute_arguments |= {"time_limit": limit, "stop": stop}
             compute: Callable[..., Result | Shares]
-            run_and_draw = partial(api_run.run, **drawing.arguments)
+            run_and_draw = partial(api_run.run, runs=runs, **drawing.arguments)
             compute = partial(run_and_draw, overrides=overrides, precision=precision, of=of, decide=decide)
             if shard:
                 compute = partial(api_run.run_share, share=shard)

@@ -4,14 +4,18 @@ import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report import tables
+from radarsim.report.run_statistics import ScanSpan
 from radarsim.report.statistics import Estimate, difference
+
+if TYPE_CHECKING:
+    from radarsim.api.run_errors import CaseErrors
 
 REPEATED_NUMBERS = "a filter's random numbers repeat in every block: no interval holds"
 INTERVAL_ROUNDING = 1e-12  # of a number: an interval that is narrower is rounding
@@ -215,6 +219,7 @@ class Evidence:
         self._places = places
         self._exact = False
         self._groups: dict[str, Mapping] = {}
+        self._run_rms: dict[tuple[str, ScanSpan], np.ndarray] = {}
 
     def exactly(self) -> "Evidence":
         """The same with exact values in place of measured ones; values that are not known exactly are missing. Curves
@@ -315,6 +320,44 @@ class Evidence:
             Estimate(curve.value, curve.lo, curve.hi), Estimate(base_curve.value, base_curve.lo, base_curve.hi)
         )
         return Curve(curve.k, curve.t, ratios.value, ratios.lo, ratios.hi)
+
+    def errors(self, key: Any, filter_name: str, component: str, realisations: int | None = None) -> np.ndarray:
+        """The errors (n, K) of a filter's estimates in the realisations of a case, not-a-number where there is none.
+
+        They are drawn again, and held in memory: `realisations` takes only so many, the first ones. K counts the scans
+        of `case(key).axes.k`."""
+        errors = self._case_errors(key, filter_name, component)
+        if realisations is not None:
+            errors.realisations = min(realisations, errors.realisations)
+        return np.concatenate(list(errors.of(filter_name, component)))
+
+    def run_rms(
+        self, key: Any, filter_name: str, component: str, first: int | None = None, last: int | None = None
+    ) -> np.ndarray:
+        """Each run's root-mean-square error (n,) over the scans first to last; default: all of them."""
+        errors = self._case_errors(key, filter_name, component)
+        k = self.case(key).axes.k
+        span = ScanSpan(int(k[0]) if first is None else first, int(k[-1]) if last is None else last)
+        if not span.is_among(np.asarray(k)):
+            raise UnknownScans("no such scans", f"there are {k[0]} to {k[-1]}")
+        name = (self.case(key).name, span)
+        if name not in self._run_rms:
+            self._run_rms[name] = errors.run_rms(span)
+        return self._run_rms[name][errors.filter_index(filter_name), :, errors.component_index(component)]
+
+    def _case_errors(self, key: Any, filter_name: str, component: str) -> "CaseErrors":
+        """The errors of a case. Raises MissingEvidence where they are not to be seen, or a name is unknown."""
+        from radarsim.api.run_errors import CaseErrors
+
+        result = self.case(key)
+        if self._exact:
+            raise MissingEvidence("not known exactly")
+        if result.case is None:
+            raise MissingEvidence("the errors of its realisations are not stored")
+        errors = CaseErrors(result.case, result.count)
+        if filter_name not in errors.filters or component not in dict(errors.components):
+            raise self._lacking(result, filter_name, component)
+        return errors
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:
         """The one row of a table with these values; raises MissingEvidence, or ConfigError where there is no such

@@ -7,7 +7,7 @@ default the last one."""
 import math
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.papers.evidence import Curve, MissingEvidence, shipped_spec
 from radarsim.papers.evidence import Evidence as GeneralEvidence
+from radarsim.report.run_statistics import STATISTICS
 from radarsim.report.statistics import Estimate, difference, mean
 from radarsim.report.tables import realisation_counts
 
@@ -98,6 +99,19 @@ def over_believed(evidence: Evidence, case: Any, filter: str, component: str, at
     if np.isnan(row["believed_sigma"]):
         raise ConfigError(f"filter {filter!r} predicts no σ: it gives no covariance")
     return Estimate(*(row[end] / row["believed_sigma"] for end in ("sigma", "sigma_lo", "sigma_hi")))
+
+
+def run_rms(
+    evidence: Evidence,
+    case: Any,
+    filter: str,
+    component: str,
+    first: int | None = None,
+    last: int | None = None,
+    statistic: Literal["mean", "median", "variance"] = "mean",
+) -> Estimate:
+    """A statistic over the runs of each run's root-mean-square error over the scans first to last, by default all."""
+    return STATISTICS[statistic](evidence.run_rms(case, filter, component, first, last))
 
 
 def _error_index(result: CaseResult, filter: str, component: str, scan: int | None) -> tuple[int, int, int]:
