@@ -134,6 +134,12 @@ class FileKeys(Model):
     choices: tuple[ChoiceKeys, ...] = ()
 
 
+class OwnFileKeys(FileKeys):
+    """Claims of a user on a config that is named elsewhere, or on a table."""
+
+    config: Stem | None = None  # type: ignore[assignment]
+
+
 @dataclass(frozen=True)
 class MeasureCall:
     """A function by name, or a method of the evidence where function is None, with its cases and arguments."""
@@ -209,6 +215,21 @@ def parse_claims(text: str, source: str, *measures: ModuleType) -> tuple[tuple[C
     return claims, _declarations(document, faults, FileKeys, lambda keys, reader: reader.choices(keys))
 
 
+def parse_own_claims(text: str, source: str, *measures: ModuleType) -> tuple[Claim, ...]:
+    """The claims of a user's text like claims.yaml, whose config may be left open: it is then empty."""
+    faults = ErrorList()
+    document = parse_yaml(text, source, faults)
+
+    def convert(keys: OwnFileKeys, reader: _Reader) -> Iterator[Claim]:
+        if keys.choices:
+            reader.fault(
+                ("choices",), "need runs of a study in a package: `radarsim interpretations` judges under each"
+            )
+        yield from reader.claims(keys)
+
+    return _declarations(document, faults, OwnFileKeys, convert, measures)
+
+
 def load_choices(file: Path) -> tuple[Choice, ...]:
     """The open points of a paper, from a file interpretations.yaml; raises ConfigError, one line for each fault."""
     faults = ErrorList()
@@ -265,6 +286,10 @@ class _Reader:
         self.measures = {name: function for name, function in measures_by_name.items() if not name.startswith("_")}
         self.ranges: dict[str, Callable[..., Any]] = {name: getattr(expected_ranges, name) for name in RANGE_NAMES}
 
+    def fault(self, path: KeyPath, message: str) -> None:
+        """Note a fault of the text as a whole."""
+        self.faults.add(self.document.origin(path), path, message)
+
     def claims(self, keys: FileKeys) -> Iterator[Claim]:
         """The claims in their order."""
         names = self._read_names(keys.names)
@@ -285,7 +310,7 @@ class _Reader:
             yield Claim(
                 f"{keys.paper}.{claim_keys.id}",
                 parts=tuple(claim_parts),
-                config=claim_keys.config or keys.config,
+                config=claim_keys.config or keys.config or "",
                 **fields,
             )
 

@@ -77,7 +77,8 @@ def claims_table(
     if paper_claims is not None:
         papers = _PaperEvidence(paper_claims, results, tables_by_name, shipped)
         for claim in paper_claims.claims:
-            rows += _claim_rows(claim, paper_claims.paper, papers, of_config=paper_claims.holds(claim, stem))
+            evidence, changed = papers.evidence(claim.config)
+            rows += rows_of_claim(claim, paper_claims.paper, evidence, changed, paper_claims.holds(claim, stem))
     table = tables.frame({name: [row[name] for row in rows] for name in COLUMNS})
     table.attrs[TABLES_READ] = TablesRead(row[TABLES_READ] for row in rows)
     return table
@@ -175,8 +176,11 @@ class _MeasuredPart:
     tables_read: tuple[tuple[str, str], ...] = ()
 
 
-def _claim_rows(claim: Claim, paper: str, papers: _PaperEvidence, of_config: bool) -> list[dict[str, Any]]:
-    evidence, changed = papers.evidence(claim.config)
+def rows_of_claim(
+    claim: Claim, paper: str, evidence: Any, changed: str = "", of_config: bool = True
+) -> list[dict[str, Any]]:
+    """Rows of claims.csv for a claim, a row each part. evidence: an `Evidence`, or one of its kind; None where no case
+    is the paper's, and `changed` says in what they differ."""
     if evidence is None and not (of_config and changed):
         return []
     measured_parts = [_measure_part(part, evidence, changed) for part in claim.parts]

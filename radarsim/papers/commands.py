@@ -10,6 +10,7 @@ from radarsim.cli import command_group, options
 @command_group.main.command()
 @click.argument("names", nargs=-1, metavar="[CONFIG | CLAIM | PAPER …]", shell_complete=options.complete_config)
 @options.out_option
+@click.option("--also", metavar="FILE", help="Also judge claims of yours, in YAML, on the stored run of each CONFIG.")
 @options.json_option
 @click.option("--markdown", is_flag=True, help="Print the page of claims in Markdown instead of text.")
 @click.option("--parts", is_flag=True, help="Also print what was measured for each claim.")
@@ -18,7 +19,9 @@ from radarsim.cli import command_group, options
     metavar="FILE",
     help="Also draw the claims to this file, as distances from the papers' words in margins.",
 )
-def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figure: str | None, parts: bool) -> None:
+def claims(
+    names: tuple[str, ...], out: str, also: str | None, as_json: bool, markdown: bool, figure: str | None, parts: bool
+) -> None:
     """List the papers' claims with their verdicts.
 
     Computes nothing. For a CLAIM (P1.3), prints its full text and what was measured. PAPER is P1, P2, P3 or P4; without
@@ -34,13 +37,14 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
       radarsim claims range_doppler
       radarsim claims P1                      a line each
       radarsim claims P1.3                    in full, with what was measured
+      radarsim claims rls2 --also my_claims.yaml
       radarsim claims --json
       radarsim claims --figure claims.svg
     """
     from radarsim.api import json_output
     from radarsim.papers import list_claims, print_claims
 
-    listed = list_claims.claims(*names, out=out)
+    listed = list_claims.claims(*names, out=out, also=also)
     if figure is not None:
         listed.draw(figure)
     if as_json:
@@ -51,7 +55,8 @@ def claims(names: tuple[str, ...], out: str, as_json: bool, markdown: bool, figu
 
         click.echo(claims_page(listed.in_words, {paper.paper: paper.page for paper in paper_claims()}), nl=False)
     else:
-        detailed = {row["claim"] for row in listed.rows if parts or row["claim"] in names}
+        shown = (*names, *listed.own_claims)
+        detailed = {row["claim"] for row in listed.rows if parts or row["claim"] in shown}
         print_claims.print_claims(listed.in_words, detailed, out, names)
 
 

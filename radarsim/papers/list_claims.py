@@ -10,7 +10,7 @@ from radarsim.api import arguments, configs, repeat_command
 from radarsim.api.display import Displayable
 from radarsim.api.load_experiments import load_all
 from radarsim.config.experiment import Experiment
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import tr
 from radarsim.papers.claim import PaperClaims
 from radarsim.papers.claim_rows import classes_in_words, group_by_claim, verdict_sentence
@@ -36,10 +36,16 @@ CLAIM_PATTERN = re.compile(r"P\d+(\.\w*)?|[Pp]\d+(\.[Ee]?\d+\w?)?(,.+)?")
 
 
 class Claims(Displayable):
-    """Claims of papers and their verdicts; one row for each measured part of a claim."""
+    """Claims of papers and their verdicts; a row for each measured part of a claim. own_claims: those of the user."""
 
-    def __init__(self, rows: Sequence[dict[str, Any]], interpretations: Iterable[PaperInterpretations] = ()):
+    def __init__(
+        self,
+        rows: Sequence[dict[str, Any]],
+        interpretations: Iterable[PaperInterpretations] = (),
+        own_claims: Collection[str] = (),
+    ):
         self.rows, self._interpretations = tuple(rows), tuple(interpretations)
+        self.own_claims = own_claims
 
     @property
     def in_words(self) -> list[dict[str, Any]]:
@@ -77,13 +83,16 @@ class Claims(Displayable):
         atomic_files.replace_all(Path(path).parent, {Path(path).name: save(figures["claims"], (kind,))[kind]})
 
 
-def claims(*names: str, out: str | os.PathLike[str] = repeat_command.RESULTS) -> Claims:
+def claims(
+    *names: str, out: str | os.PathLike[str] = repeat_command.RESULTS, also: str | os.PathLike[str] | None = None
+) -> Claims:
     """List the papers' claims with verdicts from the results stored in `out`; computes nothing.
 
     names are claims (P1.3), papers (P1) or configs; default: all claims of all papers. `table` has a row for each
     measured part of a claim: measured value, 95 % interval, expected value, verdict. Claims without stored results are
     listed as not run; for a config that judges none, those of its study's paper, with the reason why it does not judge
-    each. Raises ConfigError for unknown names.
+    each. also: a YAML file of claims of yours, judged on the stored runs of the configs. Raises ConfigError for unknown
+    names. `claims.judge(claims, table)` judges claims of yours on any table.
 
     >>> listed = claims("P1.3", out="/nowhere")
     >>> listed.table["verdict"].tolist()
@@ -94,6 +103,7 @@ def claims(*names: str, out: str | os.PathLike[str] = repeat_command.RESULTS) ->
     claim_names = [name for name in names if _is_meant_as_claim(name)]
     _check_claim_names(claim_names)
     experiments = load_all([name for name in names if name not in claim_names])
+    own_rows = [] if also is None else _own_claim_rows(experiments, also, out)
     keys = _paper_keys(claim_names) + [paper_key(registry.study(experiment.study)) for experiment in experiments]
     papers = paper_claims(keys)
     config_of = {claim.id: claim.config for paper in papers for claim in paper.claims}
@@ -110,7 +120,30 @@ def claims(*names: str, out: str | os.PathLike[str] = repeat_command.RESULTS) ->
     rows += [row for row in requested_rows if (row["claim"], row["config"]) not in listed]
     with_choices = [(paper.interpretations, paper.claims) for paper in open_papers(keys).values()]
     classes = known_classes(with_choices, Path(out))
-    return Claims(add_classes(rows, classes), [interpretations for interpretations, _ in with_choices])
+    own_names = [row["claim"] for row in own_rows]
+    interpretations = [interpretations for interpretations, _ in with_choices]
+    return Claims(add_classes(rows, classes) + own_rows, interpretations, own_names)
+
+
+def _own_claim_rows(
+    experiments: Sequence[Experiment], also: str | os.PathLike[str], out: str | os.PathLike[str]
+) -> list[dict[str, Any]]:
+    """The rows of a user's claims on the stored runs of experiments."""
+    from radarsim.papers import own_claims
+
+    if not experiments:
+        raise ConfigError(f"{argument('also')}: needs a CONFIG, on whose stored run the claims are judged")
+    return [row for experiment in experiments for row in own_claims.judge_stored_run(experiment, also, out)]
+
+
+def _judge(*arguments: Any, **options: Any) -> Claims:
+    """As `own_claims.judge`."""
+    from radarsim.papers import own_claims
+
+    return own_claims.judge(*arguments, **options)
+
+
+claims.judge = _judge  # type: ignore[attr-defined]  # `radarsim.claims.judge`
 
 
 def _experiment_rows(

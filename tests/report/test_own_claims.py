@@ -1,0 +1,178 @@
+"""Claims of a user: on a table that radarsim did not make, and on the stored run of a shipped config."""
+
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import radarsim
+from radarsim.errors import ConfigError
+from tests.program import command
+
+HEAD = "paper: mine\nclaims:\n"
+CLAIM = """- {id: ID, place: table 1, statement: It holds, parts: [
+    {of: OF, what: number, measure: MEASURE, expected: EXPECTED}]}
+"""
+
+
+def claims(*parts):
+    """A text of claims: for each the rows, the measure and the range."""
+    texts = [
+        CLAIM.replace("ID", str(i)).replace("OF", of).replace("MEASURE", measure).replace("EXPECTED", expected)
+        for i, (of, measure, expected) in enumerate(parts, 1)
+    ]
+    return HEAD + "".join(texts)
+
+
+def judged(table, *parts):
+    """The rows of the verdicts."""
+    return radarsim.claims.judge(claims(*parts), table).table.to_dict("records")
+
+
+TABLE = {
+    "filter": ["ekf", "ukf", "pf"],
+    "order": [1, 2, 3],
+    "mean": [0.3806, 0.3108, 0.42],
+    "mean_lo": [0.3787, 0.3091, 0.41],
+    "mean_hi": [0.3825, 0.3125, 0.43],
+    "error": [0.01, 0.02, 0.03],
+    "n": [20000, 20000, 500],
+}
+
+
+def test_a_number_of_a_row_is_judged_with_its_interval(tmp_path):
+    parts = (
+        ("[{filter: ekf}]", "{value: {column: mean}}", '{printed: "0.374"}'),
+        ("[{filter: ekf}]", "{value: {column: mean}}", '{printed: "0.374", runs: 100, variance: 0.015}'),
+        ("[{order: 2.0}]", "{value: {column: mean, se: error}}", "{about: '0.31'}"),
+        ("[{filter: pf}]", "{value: {column: order}}", "{within: [3, 3]}"),
+    )
+    rows = judged(TABLE, *parts)
+    assert [row["verdict"] for row in rows] == ["refuted", "confirmed", "not yet decided", "confirmed"]
+    assert [(row["measured"], row["lo"], row["hi"]) for row in rows[:2]] == [(0.3806, 0.3787, 0.3825)] * 2
+    assert rows[2]["hi"] - rows[2]["measured"] == pytest.approx(1.959964 * 0.02)
+    assert (rows[1]["margin_kind"], rows[1]["n"], rows[2]["needed"] > 20000) == ("sample", 20000, True)
+    file = tmp_path / "mine.csv"
+    pd.DataFrame(TABLE).to_csv(file, index=False)
+    for same in (file, str(file), pd.DataFrame(TABLE), pd.DataFrame(TABLE).set_index("filter")):
+        pd.testing.assert_frame_equal(pd.DataFrame(judged(same, *parts)), pd.DataFrame(rows))
+
+
+def test_ratio_and_difference_are_of_independent_rows():
+    rows = judged(
+        TABLE,
+        ("[{filter: ukf}, {filter: ekf}]", "{ratio: {column: mean}}", "{less: []}"),
+        ("[{filter: pf}, {filter: ekf}]", "{difference: {column: mean}}", "{above: 0}"),
+        ("[{filter: pf}, {filter: ekf}]", "{difference: {column: order}}", "{within: [2, 2]}"),
+    )
+    half = math.hypot(0.0017 / 0.3108, 0.0019 / 0.3806) * 0.3108 / 0.3806
+    assert rows[0]["hi"] - rows[0]["measured"] == pytest.approx(half, rel=0.01)
+    assert rows[1]["lo"] == pytest.approx(0.0394 - math.hypot(0.01, 0.0019))
+    assert [row["verdict"] for row in rows] == ["confirmed", "no material difference", "confirmed"]
+
+
+def test_statistics_of_rows_that_are_runs():
+    rng = np.random.default_rng(2)
+    runs = {"filter": np.repeat(["a", "b"], 400), "rmse": np.r_[rng.gamma(4, 1, 400), rng.gamma(4, 2, 400)]}
+    of = "[{filter: b}]"
+    rows = judged(
+        runs, *((of, f"{{{name}: {{column: rmse}}}}", "{above: 1}") for name in ("mean", "median", "variance", "rms"))
+    )
+    b = runs["rmse"][400:]
+    wanted = [b.mean(), np.median(b), b.var(ddof=1), np.sqrt(np.mean(b**2))]
+    np.testing.assert_allclose([row["measured"] for row in rows], wanted, rtol=1e-9)
+    assert all(row["lo"] < row["measured"] < row["hi"] and row["n"] == 400 for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("of", "measure", "said"),
+    [
+        ("[{filter: kf}]", "{value: {column: mean}}", "value: of: no row has filter 'kf'; there are ekf, ukf and pf"),
+        ("[{fitler: ekf}]", "{value: {column: mean}}", "value: of: no column 'fitler'; there are filter, order, mean"),
+        ("[{filter: ekf}]", "{value: {column: men}}", "value: no column 'men'; there are filter, order, mean"),
+        ("[{}]", "{value: {column: mean}}", "value: of: 3 rows have {}: name one; mean takes all of them"),
+        ("[{filter: ekf}]", "{value: {column: filter}}", "value: column 'filter' has cells that are no numbers"),
+        ("[{filter: ekf}]", "{value: {column: mean, lo: mean_lo}}", "value: takes lo and hi, or se alone"),
+        ("[ekf]", "{value: {column: mean}}", "value: of: must name cells, {COLUMN: VALUE}, got 'ekf'"),
+    ],
+)
+def test_a_mistake_is_a_reason_with_its_line(of, measure, said):
+    (row,) = judged(TABLE, (of, measure, "{above: 0}"))
+    assert row["verdict"] == "not judged here"
+    assert row["why"].startswith("its measure fails: claims:4:")
+    assert said in row["why"]
+
+
+def test_a_measure_without_a_number_is_not_judged():
+    (row,) = judged({"a": [math.nan]}, ("[{}]", "{value: {column: a}}", "{above: 0}"))
+    assert (row["class"], row["why"]) == ("not judged here", "its measure gives no number")
+
+
+def test_measures_of_the_users_own_lie_beside_the_file(tmp_path, monkeypatch):
+    (tmp_path / "mine.yaml").write_text(claims(("[{}]", "{half: {column: n}}", "{below: 1e4}")))
+    (tmp_path / "mine.py").write_text(
+        "def half(evidence, rows, column):\n    return evidence.numbers(rows, column).mean() / 2\n"
+    )
+    (row,) = radarsim.claims.judge(tmp_path / "mine.yaml", TABLE).table.to_dict("records")
+    assert (row["measured"], row["verdict"]) == (6750, "confirmed")
+    monkeypatch.setenv("RADARSIM_NO_CODE", "1")
+    with pytest.raises(ConfigError, match="is code of yours, and --no-code runs none"):
+        radarsim.claims.judge(tmp_path / "mine.yaml", TABLE)
+    monkeypatch.delenv("RADARSIM_NO_CODE")
+    (tmp_path / "mine.py").write_text("1 / 0\n")
+    with pytest.raises(ConfigError, match=r"mine.py: cannot be imported: ZeroDivisionError: .* \(.*mine.py:1\)"):
+        radarsim.claims.judge(tmp_path / "mine.yaml", TABLE)
+
+
+def test_claims_or_tables_that_cannot_be_read_are_named(tmp_path):
+    text = claims(("[{}]", "{mean: {column: n}}", "{below: 1e4}"))
+    with pytest.raises(ConfigError, match=r"nowhere\.yaml: cannot be read"):
+        radarsim.claims.judge(tmp_path / "nowhere.yaml", TABLE)
+    with pytest.raises(ConfigError, match=r"nowhere\.csv: cannot be read"):
+        radarsim.claims.judge(text, tmp_path / "nowhere.csv")
+    (tmp_path / "odd.csv").write_text("a,b\n1\n")
+    with pytest.raises(ConfigError, match=r"odd\.csv: is no table in CSV"):
+        radarsim.claims.judge(text, tmp_path / "odd.csv")
+    choices = "choices: [{key: a, asks: b, original: c, alternatives: [{name: d, kind: U, reason: e}]}]\n"
+    with pytest.raises(ConfigError, match="choices: need runs of a study in a package"):
+        radarsim.claims.judge(text + choices, TABLE)
+
+
+def test_claims_on_the_stored_run_of_a_shipped_config(tmp_path):
+    file = tmp_path / "mine.yaml"
+    parts = (
+        ("[{radar.scan_period_s: 10}]", "{gain: {filter: r+Vr, component: r}}", '{about: "20"}'),
+        ("[{}]", "{run_rms: {filter: r+Vr, component: r, first: 3, last: 15}}", '{printed: "150.1", se: 1.5}'),
+    )
+    file.write_text(
+        claims(*parts)
+        + CLAIM.replace("{id: ID", "{id: 9, config: rls3")
+        .replace("OF", "[{}]")
+        .replace("MEASURE", "{limit: {filter: r, component: r}}")
+        .replace("EXPECTED", "{above: 0}")
+    )
+    with pytest.raises(ConfigError, match="100,000 realisations are not stored"):
+        radarsim.claims("rls2", also=file, out=tmp_path)
+    radarsim.run("rls2", realisations=20_000, out=tmp_path, figures=False)
+    listed = radarsim.claims("rls2", also=file, out=tmp_path)
+    own = listed.table[listed.table["claim"].str.startswith("mine.")]
+    assert own["verdict"].tolist() == ["confirmed"] * 2
+    assert own["config"].tolist() == ["rls2"] * 2  # those of rls3 are not asked for
+    assert own["exact"].notna().tolist() == [True, False]
+    assert {"P1.18", "P1.28"} < set(listed.table["claim"])
+    done = command("claims", "rls2", "--also", file, "--out", tmp_path, "--json")
+    assert [row["claim"] for row in json.loads(done.stdout)][-2:] == ["mine.1", "mine.2"]
+    words = command("claims", "rls2", "--also", file, "--out", tmp_path).stdout
+    assert "mine.1 confirmed: It holds [mine, table 1; rls2]" in words
+    assert "--also: needs a CONFIG" in command("claims", "--also", file, "--out", tmp_path, code=2).stderr
+    file.write_text(
+        HEAD
+        + CLAIM.replace("{id: ID", "{id: 9, config: rls3")
+        .replace("OF", "[{}]")
+        .replace("MEASURE", "{gain: {filter: r+Vr, component: r}}")
+        .replace("EXPECTED", "{above: 0}")
+    )
+    with pytest.raises(ConfigError, match="no claim is of rls2; there are claims of rls3"):
+        radarsim.claims("rls2", also=file, out=tmp_path)
