@@ -8,12 +8,18 @@ import math
 import re
 import weakref
 from functools import partial
+from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import radarsim
+from radarsim.api.configs import load
 from radarsim.api.simulate_cases import RunOptions
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
+from radarsim.papers import one_file_claims, one_file_measures
+from radarsim.papers.claim import PaperClaims
+from radarsim.papers.claim_files import parse_claims
 from radarsim.papers.interpretation_runs import InterpretationRuns
 from radarsim.papers.interpretations import Alternative, Choice, ImpossibleInterpretation, PaperInterpretations
 from radarsim.papers.judge_interpretations import judge_requests
@@ -398,3 +404,68 @@ def test_names_of_earlier_versions_still_work(tmp_path):
     assert (stored_interpretations(tmp_path), stored_classes(tmp_path)) == stored
     with pytest.warns(DeprecationWarning, match="radarsim.interpretations"):
         assert radarsim.readings is radarsim.interpretations
+
+
+MINE = """
+paper: P9
+config: mine
+claims:
+- {id: 1, place: here, statement: A plot as it is has 250 m, parts: [
+    {of: [{}], what: σ, unit: m, measure: {sigma: {filter: raw, component: r}}, expected: {about: "250"}}]}
+- {id: 2, place: here, statement: and is worse, parts: [
+    {of: [{}], what: ratio, measure: {ratio: {filter: raw, over: r, component: r}}, expected: {greater: []}}]}
+- {id: 3, place: here, statement: nothing, parts: [
+    {of: [{}], what: none, measure: {none: {}}, expected: {greater: []}}]}
+choices:
+- key: length
+  asks: how long the target is watched
+  original: nothing
+  alternatives:
+  - {name: to 140 s, kind: U, reason: as printed}
+  - {name: to 90 s, kind: U, reason: as printed, sets: {scans: 10}}
+"""
+
+
+@pytest.fixture
+def mine(tmp_path):
+    """A paper whose config has a filter in Python, with a choice."""
+    (tmp_path / "mine.py").write_text("def raw(plots):\n    return plots['range_m'][..., None]\n")
+    shipped = Path(load("rls2").path).read_text(encoding="utf-8")
+    file = tmp_path / "mine.yaml"
+    file.write_text(shipped.replace("scans:", "  - {name: raw, python: 'mine.py:raw'}\nscans:", 1), encoding="utf-8")
+    measures = ModuleType("measures")
+    measures.none = lambda evidence, case: math.nan
+    claims, choices = parse_claims(MINE, "claims.yaml", one_file_measures, measures)
+    claims = [dataclasses.replace(claim, config=str(file)) for claim in claims]
+    paper = PaperClaims(claims, one_file_measures.Evidence, "mine")
+    return JudgingRequest(OpenPaper(one_file_claims.Interpretations("P9", choices), paper, "range_doppler"), claims)
+
+
+def test_claims_about_filters_in_python_are_judged_under_every_interpretation(mine, tmp_path):
+    run = {"out": tmp_path, "options": RunOptions(threads=1), "write": False}
+    done = judge_requests([mine], realisations=4000, **run)
+    sigma, ratio, none = done.claims
+    for claim in (sigma, ratio):
+        assert claim.outcome.kind == CONFIRMED
+        assert claim.outcome.holds_in == claim.outcome.interpretations == 2
+    assert none.outcome is None
+    assert none.sentence() == "not judged: its measure gives no number"
+    decided = judge_requests([dataclasses.replace(mine, claims=[none.claim])], realisations=64_000, decide=True, **run)
+    assert decided.undecided_messages == ()
+    stored = {piece.name for piece in tmp_path.glob(".blocks/*/T*")}
+    assert stored == {"T4000.sums"}  # of two cases; nothing was spent on a claim without a number
+
+
+def test_a_larger_stored_run_is_judged_in_place_of_a_smaller_one(mine, tmp_path):
+    def counts(realisations):
+        request = dataclasses.replace(mine, claims=mine.claims[:1])
+        run = {"out": tmp_path, "options": RunOptions(threads=1), "write": False}
+        (claim,) = judge_requests([request], realisations=realisations, **run).claims
+        return [judged.n for verdict in claim.verdicts for _, judged in verdict.parts]
+
+    assert counts(200) == [200] * 2
+    assert counts(3000) == [3000] * 2
+    assert counts(200) == [3000] * 2
+    radarsim.run(tmp_path / "mine.yaml", realisations=5000, out=tmp_path, figures=False)
+    assert counts(200) == [5000, 3000]  # a run of the config counts as well
+    assert counts(4000) == [5000, 4000]

@@ -35,7 +35,13 @@ def radarsim(place, warm):
     return example_packages.beside(warm, place / "site", place)
 
 
-LINES = {"chirp": 113, "bearings": 191, "learned": 247}  # at most, of its file, without imports
+LINES = {
+    "chirp": 113,
+    "bearings": 191,
+    "learned": 247,
+    "kalata": 116,
+    "upf": 240,
+}  # at most, of its file, without imports
 
 
 @pytest.mark.slow
@@ -81,6 +87,8 @@ def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
         ("chirp", N, (), {"sigma_r.svg", "gain_v.svg"}),
         ("bearings", 1500, ("consistency.csv",), {"consistency.svg"}),
         ("learned", 700, ("consistency.csv", "failures.csv"), {"sigma_x.svg"}),
+        ("kalata", N, (), {"sigma_x.svg", "gain_v.svg"}),
+        ("upf", 600, ("consistency.csv", "failures.csv"), {"sigma_x.svg"}),
     ],
 )
 def test_an_examples_run_is_the_same_by_any_means(radarsim, tmp_path, name, n, further, figures):

@@ -33,7 +33,9 @@ class Target(Model):
 class Filter(Member):
     """A filter of position."""
 
-    kind: Literal["kalman", "alpha_beta", "benedict_bordner", "alpha_beta_gamma"] = key("kind", "whence its gains are")
+    kind: Literal["kalman", "alpha_beta", "benedict_bordner", "alpha_beta_gamma"] = key(
+        "kind", "where its gains are from"
+    )
     alpha: Positive | None = key(
         "α", "gain of the position, no unit", only={"kind": ("alpha_beta", "benedict_bordner", "alpha_beta_gamma")}
     )
@@ -56,7 +58,9 @@ class Kalata(LinearStudy):
         adds_up = float(target.order == 3)
         return Motion(
             F=lambda dt: [[1, dt, dt * dt / 2], [0, 1, dt], [0, 0, 1]],
-            Q=lambda dt: (target.index * spec.sensor.sigma_x_m / T**2) ** 2 * np.outer(*2 * [[dt * dt / 2, dt, adds_up]]),
+            Q=lambda dt: (
+                (target.index * spec.sensor.sigma_x_m / T**2) ** 2 * np.outer(*2 * [[dt * dt / 2, dt, adds_up]])
+            ),
             mean=[0, 0, target.acceleration_mps2],
             covariance=np.diag([1e4, 1e4, 100 * adds_up]),
         )
@@ -85,7 +89,8 @@ claims:
     {of: [$WHITE], what: σ²/σ_v² of the position in the long run, measure: {reduction: {component: x}},
      expected: {printed: "0.7500"}}]}
 - {id: 2, place: α-β filter, statement: and the variance of the velocity is σ_v²/T², parts: [
-    {of: [$WHITE], what: σ² T²/σ_v² of the velocity, measure: {reduction: {component: v}}, expected: {printed: "1.0000"}}]}
+    {of: [$WHITE], what: σ² T²/σ_v² of the velocity, measure: {reduction: {component: v}},
+     expected: {printed: "1.0000"}}]}
 - {id: 3, place: α-β filter, statement: With α = 0.75 and β = 0.5 it is the Kalman filter in the long run, parts: [
     {of: [$WHITE], each: {c: [x, v]}, what: ratio of σ in $c, expected: {same: [1, 0.0001]},
      measure: {ratio: {filter: alpha-beta, over: kalman, component: $c}}}]}
@@ -104,7 +109,7 @@ claims:
 
 
 def reduction(evidence, case, component):
-    """The long run's variance over that of a plot, and of a velocity from two plots of which one is exact."""
+    """The variance in the long run over σ_v², of the velocity over σ_v²/T²."""
     result = evidence.case(case)
     row = evidence.row("last", case=result.name, filter="kalman", component=component)
     sensor = result.spec.sensor
