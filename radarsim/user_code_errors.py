@@ -22,6 +22,7 @@ LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), s
 COMPILER_NOISE = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
 ARRAY_UFUNC = "__array_ufunc__"  # in NumPy's error about the sine of eight realisations
 MAX_MESSAGE_LENGTH = 300  # characters of a message
+NO_CODE_VARIABLE = "RADARSIM_NO_CODE"  # in the environment, so that processes of a run keep to it: none of it may run
 MAX_FRAMES = 8  # of an author's code that are shown
 
 _owner: ContextVar[str] = ContextVar("_of", default="")

@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api import arguments, configs, repeat_command
@@ -133,17 +134,43 @@ def _own_claim_rows(
 
     if not experiments:
         raise ConfigError(f"{argument('also')}: needs a CONFIG, on whose stored run the claims are judged")
-    return [row for experiment in experiments for row in own_claims.judge_stored_run(experiment, also, out)]
+    return [row for experiment in experiments for row in own_claims.rows_on_stored_run(experiment, also, out)]
 
 
-def _judge(*arguments: Any, **options: Any) -> Claims:
-    """As `own_claims.judge`."""
+def judge_table(
+    claims: str | os.PathLike[str],
+    table: "pd.DataFrame | Mapping[str, Any] | str | os.PathLike[str]",
+    measures: ModuleType | None = None,
+) -> Claims:
+    """Judge claims on a table, without a study: by the rule, and with the columns, of claims.csv.
+
+    claims: a YAML file, or its text. table: a DataFrame, its columns, or a CSV file. A part of a claim names rows by
+    their cells (`of: [{filter: ekf}]`) and a measure: `value`, `ratio` and `difference` of numbers in single rows,
+    `mean`, `median`, `variance` and `rms` of a column over rows that are runs, or a function of `measures`, or of a
+    module beside the file (my_claims.py for my_claims.yaml), whose first argument is `evidence`. Raises ConfigError for
+    mistakes in the claims or the table.
+
+    >>> text = '''
+    ... paper: mine
+    ... claims:
+    ... - id: 1
+    ...   place: table 1
+    ...   statement: The error of the extended filter is 0.374
+    ...   parts:
+    ...   - {of: [{filter: ekf}], what: mean error, measure: {value: {column: mean}},
+    ...      expected: {printed: "0.374", runs: 100, variance: 0.015}}
+    ... '''
+    >>> judge_table(text, {"filter": ["ekf"], "mean": [0.3806], "mean_lo": [0.3787], "mean_hi": [0.3825]})
+    1 confirmed
+    mine.1 confirmed: The error of the extended filter is 0.374
+    """
     from radarsim.papers import own_claims
 
-    return own_claims.judge(*arguments, **options)
+    rows = own_claims.rows_on_table(claims, table, measures)
+    return Claims(rows, own_claims=[row["claim"] for row in rows])
 
 
-claims.judge = _judge  # type: ignore[attr-defined]  # `radarsim.claims.judge`
+claims.judge = judge_table  # type: ignore[attr-defined]  # `radarsim.claims.judge`
 
 
 def _experiment_rows(

@@ -16,13 +16,12 @@ from radarsim.papers import one_file_measures, table_measures
 from radarsim.papers.claim import Claim
 from radarsim.papers.claim_files import parse_own_claims
 from radarsim.papers.claims_table import COLUMNS, rows_of_claim
-from radarsim.papers.list_claims import Claims
 from radarsim.papers.paper_keys import claim_folders
 from radarsim.papers.study_claims import claims_of
 from radarsim.report import atomic_files, csv_text
+from radarsim.report.tables import frame
 from radarsim.studies.onefile import OneFile
 from radarsim.studies.registry import study
-from radarsim.studies.user_filters.from_code import FORBIDDEN
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,37 +29,15 @@ if TYPE_CHECKING:
 TEXT = "claims"  # stands for the file of claims that are given as text
 
 
-def judge(
+def rows_on_table(
     claims: str | os.PathLike[str],
     table: "pd.DataFrame | Mapping[str, Any] | str | os.PathLike[str]",
     measures: ModuleType | None = None,
-) -> Claims:
-    """Judge claims on a table, without a study: by the rule, and with the columns, of claims.csv.
-
-    claims: a YAML file, or its text. table: a DataFrame, its columns, or a CSV file. A part of a claim names rows by
-    their cells (`of: [{filter: ekf}]`) and a measure: `value`, `ratio` and `difference` of numbers in single rows,
-    `mean`, `median`, `variance` and `rms` of a column over rows that are runs, or a function of `measures`, or of a
-    module beside the file (my_claims.py for my_claims.yaml), whose first argument is `evidence`. Raises ConfigError for
-    mistakes in the claims or the table.
-
-    >>> text = '''
-    ... paper: mine
-    ... claims:
-    ... - id: 1
-    ...   place: table 1
-    ...   statement: The error of the extended filter is 0.374
-    ...   parts:
-    ...   - {of: [{filter: ekf}], what: mean error, measure: {value: {column: mean}},
-    ...      expected: {printed: "0.374", runs: 100, variance: 0.015}}
-    ... '''
-    >>> judge(text, {"filter": ["ekf"], "mean": [0.3806], "mean_lo": [0.3787], "mean_hi": [0.3825]})
-    1 confirmed
-    mine.1 confirmed: The error of the extended filter is 0.374
-    """
+) -> list[dict[str, Any]]:
+    """The rows of claims judged on a table; see `list_claims.judge_table`."""
     own_claims = _load(claims, (table_measures,), measures)
     evidence = table_measures.TableEvidence(_as_table(table))
-    rows = [row for claim in own_claims for row in _rows(claim, evidence, claim.config or "table")]
-    return Claims(rows, own_claims=[claim.id for claim in own_claims])
+    return [row for claim in own_claims for row in _rows(claim, evidence, claim.config or "table")]
 
 
 def _rows(claim: Claim, evidence: Any, config: str) -> list[dict[str, Any]]:
@@ -70,12 +47,12 @@ def _rows(claim: Claim, evidence: Any, config: str) -> list[dict[str, Any]]:
 
 
 def _as_table(table: Any) -> "pd.DataFrame":
-    import pandas as pd
-
-    if isinstance(table, pd.DataFrame):
-        return table.reset_index() if any(name is not None for name in table.index.names) else table
+    if hasattr(table, "reset_index"):
+        has_names = any(name is not None for name in table.index.names)
+        frame_of_user: pd.DataFrame = table.reset_index() if has_names else table
+        return frame_of_user
     if isinstance(table, Mapping):
-        return pd.DataFrame(dict(table))
+        return frame({name: list(column) for name, column in table.items()})
     try:
         return csv_text.from_csv(atomic_files.read(Path(table)))
     except OSError as error:
@@ -84,7 +61,9 @@ def _as_table(table: Any) -> "pd.DataFrame":
         raise ConfigError(f"{table}: is no table in CSV: {error}") from error
 
 
-def judge_stored_run(experiment: Experiment, claims: str | os.PathLike[str], out: str | os.PathLike[str]) -> list[dict]:
+def rows_on_stored_run(
+    experiment: Experiment, claims: str | os.PathLike[str], out: str | os.PathLike[str]
+) -> list[dict]:
     """Rows of a user's claims, judged on the stored run of an experiment: those that name its config, or none.
 
     A case is found by its keys (`of: [{radar.scan_period_s: 10}]`, `{}` is the first one) or as in the claims of the
@@ -134,7 +113,7 @@ def _module_beside(file: Path) -> list[ModuleType]:
     path = file.with_suffix(".py")
     if not path.is_file():
         return []
-    if os.environ.get(FORBIDDEN):
+    if os.environ.get(user_code_errors.NO_CODE_VARIABLE):
         raise ConfigError(f"{path}: is code of yours, and --no-code runs none")
     specification = importlib.util.spec_from_file_location(f"_radarsim_claims_{file.stem}", path)
     assert specification is not None  # the name ends in .py

@@ -6,10 +6,9 @@ of a column over the rows, each an independent run."""
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import shorten_names
@@ -18,6 +17,9 @@ from radarsim.papers.evidence import ratio as ratio_of_estimates
 from radarsim.report import run_statistics, statistics
 from radarsim.report.statistics import Estimate
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 MAX_NAMED_VALUES = 8  # of a column, in a message
 RELATIVE_TOLERANCE = 1e-9  # of one number written in two ways
 
@@ -25,7 +27,7 @@ RELATIVE_TOLERANCE = 1e-9  # of one number written in two ways
 class TableRows:
     """The rows of a table for a part of a claim; count: realisations behind them, by a column `n`, or the rows."""
 
-    def __init__(self, name: str, rows: pd.DataFrame):
+    def __init__(self, name: str, rows: "pd.DataFrame"):
         self.name, self.rows = name, rows
         self.count = int(rows["n"].min()) if "n" in rows and len(rows) else len(rows) if len(rows) > 1 else 0
 
@@ -33,7 +35,7 @@ class TableRows:
 class TableEvidence:
     """A table whose rows are evidence for claims. Nothing of it is known exactly unless it has no interval."""
 
-    def __init__(self, table: pd.DataFrame):
+    def __init__(self, table: "pd.DataFrame"):
         self.table = table
         self.tables_read: set[tuple[str, str]] = set()
 
@@ -50,7 +52,7 @@ class TableEvidence:
                 raise ConfigError(f"of: no row has {name} {value!r}; there are {there}")
         return TableRows(", ".join(f"{name} {value}" for name, value in key.items()), rows)
 
-    def column(self, name: str, prefix: str = "") -> pd.Series:
+    def column(self, name: str, prefix: str = "") -> "pd.Series":
         """A column. Raises ConfigError for an unknown one."""
         if name not in self.table:
             raise ConfigError(f"{prefix}no column {name!r}; there are {', '.join(map(str, self.table.columns))}")
@@ -60,7 +62,7 @@ class TableEvidence:
         """The numbers (rows,) of a column. Raises ConfigError where it has text."""
         self.column(name)
         try:
-            return np.asarray(pd.to_numeric(self.case(key).rows[name]), dtype=float)
+            return np.asarray(self.case(key).rows[name], dtype=float)
         except (TypeError, ValueError):
             raise ConfigError(f"column {name!r} has cells that are no numbers") from None
 

@@ -50,7 +50,6 @@ from radarsim.studies.user_filters.sources import (
     with_paths,
 )
 
-FORBIDDEN = "RADARSIM_NO_CODE"  # in the environment, so that processes of a run keep to it as well
 RECORDED_REALISATIONS = 16  # the first ones, on which it is recorded what a filter reads
 MAX_NAMED_FILES = 3  # in a message, or one more
 
@@ -63,7 +62,7 @@ def filter_from_code(
     keys: UserFilterKeys, place: str, baseline: bool, folder: Path, first_plots: Callable[[Case, int], Plots]
 ) -> "CodeFilter":
     """The filter that a config in a folder names at a place. ConfigError where there is none, or none may run."""
-    if os.environ.get(FORBIDDEN):
+    if os.environ.get(user_code_errors.NO_CODE_VARIABLE):
         raise ConfigError(f"is code of yours, and --no-code runs none, got {keys.python!r}")
     where, _, object_name = keys.python.rpartition(":")
     if not where or not object_name.isidentifier():
