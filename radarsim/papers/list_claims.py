@@ -93,7 +93,7 @@ def claims(
     measured part of a claim: measured value, 95 % interval, expected value, verdict. Claims without stored results are
     listed as not run; for a config that judges none, those of its study's paper, with the reason why it does not judge
     each. also: a YAML file of claims of yours, judged on the stored runs of the configs. Raises ConfigError for unknown
-    names. `claims.judge(claims, table)` judges claims of yours on any table.
+    names. The attribute `judge` judges claims of yours on any table.
 
     >>> listed = claims("P1.3", out="/nowhere")
     >>> listed.table["verdict"].tolist()
@@ -147,8 +147,8 @@ def judge_table(
     claims: a YAML file, or its text. table: a DataFrame, its columns, or a CSV file. A part of a claim names rows by
     their cells (`of: [{filter: ekf}]`) and a measure: `value`, `ratio` and `difference` of numbers in single rows,
     `mean`, `median`, `variance` and `rms` of a column over rows that are runs, or a function of `measures`, or of a
-    module beside the file (my_claims.py for my_claims.yaml), whose first argument is `evidence`. Raises ConfigError for
-    mistakes in the claims or the table.
+    module of the same name beside the file, whose first argument is `evidence`. Raises ConfigError for mistakes in the
+    claims or the table.
 
     >>> text = '''
     ... paper: mine
@@ -170,7 +170,7 @@ def judge_table(
     return Claims(rows, own_claims=[row["claim"] for row in rows])
 
 
-claims.judge = judge_table  # type: ignore[attr-defined]  # `radarsim.claims.judge`
+claims.judge = judge_table  # type: ignore[attr-defined]
 
 
 def _experiment_rows(

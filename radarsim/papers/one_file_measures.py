@@ -15,7 +15,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.papers.evidence import Curve, MissingEvidence, shipped_spec
 from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.report.run_statistics import STATISTICS
+from radarsim.report.run_statistics import STATISTICS, mean_of_runs
 from radarsim.report.statistics import Estimate, difference, mean
 from radarsim.report.tables import realisation_counts
 
@@ -112,6 +112,22 @@ def run_rms(
 ) -> Estimate:
     """A statistic over the runs of each run's root-mean-square error over the scans first to last, by default all."""
     return STATISTICS[statistic](evidence.run_rms(case, filter, component, first, last))
+
+
+def run_rms_ratio(
+    evidence: Evidence,
+    case: Any,
+    filter: str,
+    over: str,
+    component: str,
+    first: int | None = None,
+    last: int | None = None,
+) -> Estimate:
+    """The mean over the runs of each run's root-mean-square error, over that of another filter on the same runs."""
+    rms, base = (evidence.run_rms(case, name, component, first, last) for name in (filter, over))
+    value = float(np.nanmean(rms) / np.nanmean(base))
+    deviation = mean_of_runs((rms - value * base) / np.nanmean(base))  # of the ratio, to first order
+    return Estimate(value, value + deviation.lo - deviation.value, value + deviation.hi - deviation.value)
 
 
 def _error_index(result: CaseResult, filter: str, component: str, scan: int | None) -> tuple[int, int, int]:

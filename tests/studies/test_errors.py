@@ -13,7 +13,7 @@ from radarsim.api.run_errors import CaseErrors
 from radarsim.api.simulate_cases import RunOptions, collected_results, simulate
 from radarsim.errors import ConfigError
 from radarsim.papers.evidence import MissingEvidence, UnknownName, UnknownScans
-from radarsim.papers.one_file_measures import Evidence, run_rms
+from radarsim.papers.one_file_measures import Evidence, run_rms, run_rms_ratio
 from radarsim.report import run_statistics
 from radarsim.studies.registry import study
 
@@ -90,6 +90,12 @@ def test_a_measure_sees_errors_and_the_rms_of_each_run(rls2):
     half = stats.t.ppf(0.975, 1999) * rms.std(ddof=1) / np.sqrt(2000)
     np.testing.assert_allclose(estimate, [rms.mean(), rms.mean() - half, rms.mean() + half], rtol=1e-6)
     assert run_rms(evidence, {}, "r", "r", 3, 15, "variance").value == pytest.approx(rms.var(ddof=1))
+    base = evidence.run_rms({}, "r+Vr", "r", 3, 15)
+    quotient = run_rms_ratio(evidence, {}, "r", "r+Vr", "r", 3, 15)
+    resampled = np.random.default_rng(1).integers(0, 2000, (2000, 2000))  # bootstrap of the paired runs
+    spread = (rms[resampled].mean(axis=1) / base[resampled].mean(axis=1)).std()
+    assert quotient.value == pytest.approx(rms.mean() / base.mean())
+    assert quotient.hi - quotient.value == pytest.approx(1.96 * spread, rel=4 / np.sqrt(2 * 2000) + 0.01)
     with pytest.raises(UnknownName, match="no filter 'q'; there are r"):
         evidence.errors({}, "q", "r")
     with pytest.raises(UnknownScans, match="no such scans"):

@@ -227,7 +227,8 @@ claims:
     {of: [{}], what: mean of the runs' root-mean-square errors, measure: {run_rms: {filter: upf, component: x}},
      expected: {printed: "0.070", runs: 100, variance: 0.006}}]}
 - {id: 5, place: section 5, statement: The unscented particle filter is better than the unscented Kalman one, parts: [
-    {of: [{}], what: mean over mean, measure: {rms_ratio: {filter: upf, over: ukf}}, expected: {less: []}}]}
+    {of: [{}], what: ratio of the means, measure: {run_rms_ratio: {filter: upf, over: ukf, component: x}},
+     expected: {less: []}}]}
 choices:
 - key: mean_of_v
   asks: whether the Kalman filters know the mean of v
@@ -236,17 +237,6 @@ choices:
   - {name: no, kind: U, reason: as the authors' published program}
   - {name: yes, kind: U, reason: as a textbook has it, sets: {noise_mean: 1.5}}
 """
-
-
-def rms_ratio(evidence, case, filter, over):
-    """The mean of the runs' root mean squares over that of another filter, on the same runs."""
-    from radarsim.report.run_statistics import mean_of_runs
-    from radarsim.report.statistics import Estimate
-
-    a, b = (evidence.run_rms(case, name, "x") for name in (filter, over))
-    value = a.mean() / b.mean()
-    relative = mean_of_runs((a - value * b) / b.mean())  # to first order
-    return Estimate(value, value + relative.lo - relative.value, value + relative.hi - relative.value)
 
 
 STUDY = Upf()
