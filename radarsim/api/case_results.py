@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from radarsim.api.case_work import CaseWork
+from radarsim.api.run_errors import CaseErrors
 from radarsim.config.experiment import Case
 from radarsim.engine.dispatch import CollectedSums
 from radarsim.engine.results import CaseResult
@@ -24,7 +25,8 @@ def case_result(case: Case, work: CaseWork, collected: CollectedSums) -> CaseRes
                 plan_case.name, plan_case.study, plan_case.spec, plan_case.swept_values, count, sums, axes, seconds
             )
         )
-    result = replace(results[0], further_baselines=tuple(results[1:]), case=replace(case, realisations=count))
+    errors = CaseErrors(case, count)
+    result = replace(results[0], further_baselines=tuple(results[1:]), realisation_errors=errors)
     if not case.user_filters:
         return result
     from radarsim.studies.user_filters import sums as user_filters_sums

@@ -30,6 +30,7 @@ class CaseErrors:
         """realisations: how many, from the first on; default: those of the case."""
         self.case, self.work = case, CaseWork(case)
         self.realisations = case.realisations if realisations is None else realisations
+        self._run_rms: dict[ScanSpan, np.ndarray] = {}
 
     @property
     def filters(self) -> tuple[str, ...]:
@@ -78,12 +79,16 @@ class CaseErrors:
         return _index("component", name, [component for component, _ in self.components])
 
     def run_rms(self, span: ScanSpan | None = None) -> np.ndarray:
-        """The root mean squares (F, n, C) over the scans of a span. Default: all scans."""
+        """The root mean squares (F, n, C) over the scans of a span, computed once. Default: all scans."""
         k = np.asarray(self.work.plan.axes.k)
-        if span is not None and not span.is_among(k):
+        span = ScanSpan(int(k[0]), int(k[-1])) if span is None else span
+        if not span.is_among(k):
             raise ConfigError(f"{argument('runs')}: {self.case.name}: no such scans; there are {k[0]} to {k[-1]}")
-        scans = np.arange(k.size) if span is None else span.indices(k)
-        return np.concatenate([run_rms(np.moveaxis(errors[:, :, scans], 2, 3)) for errors in self.blocks()], axis=1)
+        if span not in self._run_rms:
+            scans = span.indices(k)
+            by_block = [run_rms(np.moveaxis(errors[:, :, scans], 2, 3)) for errors in self.blocks()]
+            self._run_rms[span] = np.concatenate(by_block, axis=1)
+        return self._run_rms[span]
 
 
 def _index(kind: str, name: str, names: Sequence[str]) -> int:
@@ -128,12 +133,8 @@ def runs_table(result: "Result", span: str = "all") -> "pd.DataFrame":
     mean ± mean: the mean over the runs of √(mean over the scans of e²)
     variance ± variance, median ± median: of the same numbers
     quantile_05, quantile_25, quantile_50, quantile_75, quantile_95: below which so many of a hundred runs lie"""
-    counts = {one.name: one.count for one in result.cases}
-    rows = []
-    for case in result.experiment.cases:
-        errors = CaseErrors(case, counts.get(case.name, 0))
-        if errors.realisations:
-            rows += _rows_of_case(errors, parse_span(span))
+    scans = parse_span(span)
+    rows = [row for case in result.cases for row in _rows_of_case(case.realisation_errors, scans)]
     return frame({name: [row[name] for row in rows] for name in (rows[0] if rows else ())})
 
 

@@ -219,7 +219,6 @@ class Evidence:
         self._places = places
         self._exact = False
         self._groups: dict[str, Mapping] = {}
-        self._run_rms: dict[tuple[str, ScanSpan], np.ndarray] = {}
 
     def exactly(self) -> "Evidence":
         """The same with exact values in place of measured ones; values that are not known exactly are missing. Curves
@@ -327,8 +326,8 @@ class Evidence:
         They are drawn again, and held in memory: `realisations` takes only so many, the first ones. K counts the scans
         of `case(key).axes.k`."""
         errors = self._case_errors(key, filter_name, component)
-        if realisations is not None:
-            errors.realisations = min(realisations, errors.realisations)
+        if realisations is not None and realisations < errors.realisations:
+            errors = type(errors)(errors.case, realisations)
         return np.concatenate(list(errors.of(filter_name, component)))
 
     def run_rms(
@@ -340,21 +339,16 @@ class Evidence:
         span = ScanSpan(int(k[0]) if first is None else first, int(k[-1]) if last is None else last)
         if not span.is_among(np.asarray(k)):
             raise UnknownScans("no such scans", f"there are {k[0]} to {k[-1]}")
-        name = (self.case(key).name, span)
-        if name not in self._run_rms:
-            self._run_rms[name] = errors.run_rms(span)
-        return self._run_rms[name][errors.filter_index(filter_name), :, errors.component_index(component)]
+        return errors.run_rms(span)[errors.filter_index(filter_name), :, errors.component_index(component)]
 
     def _case_errors(self, key: Any, filter_name: str, component: str) -> "CaseErrors":
         """The errors of a case. Raises MissingEvidence where they are not to be seen, or a name is unknown."""
-        from radarsim.api.run_errors import CaseErrors
-
         result = self.case(key)
         if self._exact:
             raise MissingEvidence("not known exactly")
-        if result.case is None:
-            raise MissingEvidence("the errors of its realisations are not stored")
-        errors = CaseErrors(result.case, result.count)
+        if result.realisation_errors is None:
+            raise MissingEvidence("the errors of its realisations are not known")
+        errors: CaseErrors = result.realisation_errors
         if filter_name not in errors.filters or component not in dict(errors.components):
             raise self._lacking(result, filter_name, component)
         return errors
