@@ -190,6 +190,13 @@ def shipped_spec(result: CaseResult) -> Any:
     return result.shipped_spec if isinstance(result, InterpretedCase) else result.spec
 
 
+def _check_numbers_differ(result: CaseResult, *filter_names: str) -> None:
+    """Raise MissingEvidence for a filter that draws the same random numbers in every block."""
+    axes: Any = result.user_filters and result.user_filters.axes
+    if axes and {*filter_names} & set(axes.repeating):
+        raise MissingEvidence(REPEATED_NUMBERS)
+
+
 class _WatchedTables(dict):
     """Tables that record which of them are read."""
 
@@ -285,9 +292,7 @@ class Evidence:
         self.tables_read.add((table, component))
         if rows is None:
             raise self._lacking(result, filter_name, component, *base)
-        axes: Any = result.user_filters and result.user_filters.axes
-        if axes and {filter_name, *base} & set(axes.repeating):
-            raise MissingEvidence(REPEATED_NUMBERS)
+        _check_numbers_differ(result, filter_name, *base)
         value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
         if self._exact:
             if np.isnan(exact).any():
@@ -351,6 +356,7 @@ class Evidence:
         errors: CaseErrors = result.realisation_errors
         if filter_name not in errors.filters or component not in dict(errors.components):
             raise self._lacking(result, filter_name, component)
+        _check_numbers_differ(result, filter_name)
         return errors
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:

@@ -60,6 +60,24 @@ def test_the_errors_of_a_result_come_in_order_and_of_user_filters_too(tmp_path):
     assert few.tobytes() == chunks[0][:100].tobytes()
 
 
+def test_no_claim_rests_on_errors_of_a_filter_that_repeats_its_random_numbers(tmp_path):
+    (tmp_path / "mine.py").write_text(
+        "import numpy as np\n\ndef noisy(plots):\n"
+        "    noise = np.random.default_rng(1).normal(0, 1000, plots['range_m'].shape)\n"
+        "    return (plots['range_m'] + noise)[..., None]\n"
+    )
+    shipped = Path(load("rls2").path).read_text(encoding="utf-8")
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        shipped.replace("scans:", "  - {name: noisy, python: 'mine.py:noisy'}\nscans:", 1), encoding="utf-8"
+    )
+    result = radarsim.run(file, realisations=9000)
+    evidence = Evidence(result.cases, result.tables, {})
+    with pytest.raises(MissingEvidence, match="random numbers repeat in every block"):
+        evidence.run_rms({}, "noisy", "r")
+    assert evidence.run_rms({}, "r", "r").shape == (9000,)
+
+
 @pytest.fixture(scope="module")
 def rls2():
     return radarsim.run("rls2", realisations=2000)
