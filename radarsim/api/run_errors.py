@@ -65,7 +65,7 @@ class CaseErrors:
         errors.swapaxes(0, 1)[:, ~np.asarray(self.work.plan.axes.available)] = np.nan
         return errors
 
-    def of(self, filter_name: str, component: str) -> Iterator[np.ndarray]:
+    def of_filter(self, filter_name: str, component: str) -> Iterator[np.ndarray]:
         """The errors (n, K) of a filter in a component, block by block."""
         f, c = self.filter_index(filter_name), self.component_index(component)
         return (errors[f, :, :, c] for errors in self.blocks())
@@ -101,16 +101,17 @@ def result_errors(
     result: "Result", filter: str, component: str, case: str | None = None, realisations: int | None = None
 ) -> Iterator[np.ndarray]:
     """As `Result.errors`."""
-    names = [one.name for one in result.experiment.cases]
+    names = [experiment_case.name for experiment_case in result.experiment.cases]
     number = 0 if case is None else _index("case", case, names)
-    done = {one.name: one.count for one in result.cases}.get(names[number], 0)
-    count = done if realisations is None else _checked_count(realisations, done)
-    return CaseErrors(result.experiment.cases[number], count).of(filter, component)
+    counts = {case_result.name: case_result.count for case_result in result.cases}
+    available = counts.get(names[number], 0)
+    count = available if realisations is None else _checked_count(realisations, available)
+    return CaseErrors(result.experiment.cases[number], count).of_filter(filter, component)
 
 
-def _checked_count(realisations: int, done: int) -> int:
-    if not 1 <= realisations <= done:
-        raise ConfigError(f"{argument('realisations')}: must be 1 to {done}, got {realisations}")
+def _checked_count(realisations: int, available: int) -> int:
+    if not 1 <= realisations <= available:
+        raise ConfigError(f"{argument('realisations')}: must be 1 to {available}, got {realisations}")
     return int(realisations)
 
 

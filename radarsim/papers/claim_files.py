@@ -317,15 +317,15 @@ class _Reader:
     def choices(self, keys: ChoicesKeys | FileKeys) -> Iterator[Choice]:
         """The choices in their order."""
         names = self._read_names(keys.names)
-        taken: set[str] = set()
+        earlier_keys: set[str] = set()
         for i, choice_keys in enumerate(keys.choices):
             if choice_keys.key in RESERVED_CHOICE_KEYS:
                 columns = ", ".join(RESERVED_CHOICE_KEYS)
                 message = f"is a column of interpretations.csv already; not allowed: {columns}"
                 self._add(("choices", i, "key"), message, choice_keys.key)
-            if choice_keys.key in taken:
+            if choice_keys.key in earlier_keys:
                 self._add(("choices", i, "key"), "stands there already", choice_keys.key)
-            taken.add(choice_keys.key)
+            earlier_keys.add(choice_keys.key)
             claims = self._filled(choice_keys.claims, names, ("choices", i, "claims"))
             claim_ids = [
                 claim_id

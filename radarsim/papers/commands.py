@@ -55,8 +55,8 @@ def claims(
 
         click.echo(claims_page(listed.in_words, {paper.paper: paper.page for paper in paper_claims()}), nl=False)
     else:
-        shown = (*names, *listed.own_claims)
-        detailed = {row["claim"] for row in listed.rows if parts or row["claim"] in shown}
+        detailed_names = (*names, *listed.own_claims)
+        detailed = {row["claim"] for row in listed.rows if parts or row["claim"] in detailed_names}
         print_claims.print_claims(listed.in_words, detailed, out, names)
 
 

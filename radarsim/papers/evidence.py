@@ -333,7 +333,7 @@ class Evidence:
         errors = self._case_errors(key, filter_name, component)
         if realisations is not None and realisations < errors.realisations:
             errors = type(errors)(errors.case, realisations)
-        return np.concatenate(list(errors.of(filter_name, component)))
+        return np.concatenate(list(errors.of_filter(filter_name, component)))
 
     def run_rms(
         self, key: Any, filter_name: str, component: str, first: int | None = None, last: int | None = None

@@ -102,19 +102,19 @@ def value(evidence: TableEvidence, rows: Any, column: str, lo: str = "", hi: str
 
 
 def ratio(
-    evidence: TableEvidence, rows: Any, over: Any, column: str, lo: str = "", hi: str = "", se: str = ""
+    evidence: TableEvidence, rows: Any, base: Any, column: str, lo: str = "", hi: str = "", se: str = ""
 ) -> Estimate:
     """The number of the first row over that of the second, as of independent positive estimates."""
-    first, second = (value(evidence, cells, column, lo, hi, se) for cells in (rows, over))
+    first, second = (value(evidence, cells, column, lo, hi, se) for cells in (rows, base))
     quotient = ratio_of_estimates(first, second)
     return quotient if has_interval(first) or has_interval(second) else exact_number(quotient.value)
 
 
 def difference(
-    evidence: TableEvidence, rows: Any, other: Any, column: str, lo: str = "", hi: str = "", se: str = ""
+    evidence: TableEvidence, rows: Any, less: Any, column: str, lo: str = "", hi: str = "", se: str = ""
 ) -> Estimate:
     """The number of the first row less that of the second, as of independent estimates."""
-    first, second = (value(evidence, cells, column, lo, hi, se) for cells in (rows, other))
+    first, second = (value(evidence, cells, column, lo, hi, se) for cells in (rows, less))
     gap = statistics.difference(first, second)
     return gap if has_interval(first) or has_interval(second) else exact_number(gap.value)
 

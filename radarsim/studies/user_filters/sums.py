@@ -197,10 +197,10 @@ def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
 def errors(plan: Plan, first: int, count: int) -> np.ndarray:
     """The errors (F + G, count, K, C) of the same realisations, of the config's filters and then of the user's;
     not-a-number where a filter has no estimate or the realisation fails."""
-    plots, own = plan.draw(first, count), list(inner_errors(plan, first, count))
-    largest_errors = greatest_errors(own)
+    plots, study_errors = plan.draw(first, count), list(inner_errors(plan, first, count))
+    largest_errors = greatest_errors(study_errors)
     answers = ((member, member.estimates(plots_of(plan, plots))) for member in plan.members)
-    return np.stack([*own, *(filter_errors(plan, *answer, plots, largest_errors).error for answer in answers)])
+    return np.stack([*study_errors, *(filter_errors(plan, *answer, plots, largest_errors).error for answer in answers)])
 
 
 def _paired_sums(powers: tuple[np.ndarray, ...], other_powers: tuple[np.ndarray, ...]) -> np.ndarray:
