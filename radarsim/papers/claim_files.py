@@ -47,10 +47,6 @@ from radarsim.papers.interpretations import (
 )
 from radarsim.report.statistics import Estimate
 
-RANGE_NAMES = (
-    *("printed", "between", "about", "above", "below", "at_most", "at_least", "greater", "less", "within", "same"),
-    *("kept", "on_grid"),
-)
 KeysModel = TypeVar("KeysModel", bound=Model)
 Declaration = TypeVar("Declaration", Claim, Choice)
 # The last is the name of a column of interpretations.csv in earlier versions.
@@ -284,7 +280,9 @@ class _Reader:
             methods |= {name: function for name, function in members if not hasattr(Evidence, name)}
         measures_by_name = methods | self.functions
         self.measures = {name: function for name, function in measures_by_name.items() if not name.startswith("_")}
-        self.ranges: dict[str, Callable[..., Any]] = {name: getattr(expected_ranges, name) for name in RANGE_NAMES}
+        self.ranges: dict[str, Callable[..., Any]] = {
+            name: getattr(expected_ranges, name) for name in expected_ranges.RANGE_NAMES
+        }
 
     def fault(self, path: KeyPath, message: str) -> None:
         """Note a fault of the text as a whole."""
@@ -391,7 +389,7 @@ class _Reader:
             raise _UnknownNameError
         measure = self._call(fields.pop("measure"), self.measures, cases, (*path, "measure"))
         words = fields.pop("expected")
-        expected = self._call(_with_further_arguments(words), self.ranges, (), (*path, "expected"))
+        expected = self._call(expected_ranges.with_further_arguments(words), self.ranges, (), (*path, "expected"))
         for key in ("scale", "ceiling"):
             if fields[key] is not None:
                 fields[key] = self._call(fields[key], self.measures, cases, (*path, key)).number
@@ -465,17 +463,6 @@ class _Reader:
 
     def _add(self, path: KeyPath, message: str, got: object) -> None:
         self.faults.add(self.document.origin(path), path, message, got)
-
-
-def _with_further_arguments(expected: Any) -> Any:
-    """A range with arguments beside its own, `{printed: "0.374", runs: 100, variance: 0.015}`, as one call."""
-    names = [name for name in expected if name in RANGE_NAMES] if isinstance(expected, dict) else []
-    if len(names) != 1 or len(expected) < 2:
-        return expected
-    (name,) = names
-    values = expected[name] if isinstance(expected[name], tuple) else (expected[name],)
-    own_arguments = dict(zip(_parameters_of(getattr(expected_ranges, name)), values, strict=False))
-    return {name: own_arguments | {key: value for key, value in expected.items() if key != name}}
 
 
 @cache
