@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.recordings.doppler_scale import DopplerScale, detect_case_doppler_scale
 from radarsim.recordings.fit.folded_doppler import Folding, detect_case_folding
 from radarsim.recordings.fit.likelihood_slice import (
     CountedLikelihood,
@@ -28,6 +29,7 @@ from radarsim.recordings.fit.newton_steps import polish_maximum
 from radarsim.recordings.fit.profile_search import HALF_CHI2_95
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
 from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
+from radarsim.recordings.target_speed import impossible_column_speed
 from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.studies.recording_interface import Likelihood, TurnError
 
@@ -71,13 +73,15 @@ class UsedRows:
 @dataclass(frozen=True)
 class Advice:
     """Advice from the likelihood of a config's filters over recorded plots: the best filter; the errors in the numbers
-    of the one that takes most columns; the rows used. folding: where the velocities are folded, and nothing else is
-    examined."""
+    of the one that takes most columns; the rows used. folding, doppler_scale: where the velocities are folded, or a
+    multiple of the change of the range; impossible_speed: that no target has, m/s; nothing else is then examined."""
 
     comparison: FilterComparison
     findings: list[Finding]
     used_rows: UsedRows
     folding: Folding | None = None
+    doppler_scale: DopplerScale | None = None
+    impossible_speed: float | None = None
 
 
 def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice | None:
@@ -98,8 +102,12 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
         return None
     comparison = compare_filters(list(likelihoods.values()))
     used_rows = UsedRows(sum(len(stretch["t_s"]) for stretch in sample), len(sample))
-    if (folding := detect_case_folding(case, stretches)) is not None:
-        return Advice(comparison, [], used_rows, folding)
+    if speed := impossible_column_speed(stretches):
+        return Advice(comparison, [], used_rows, impossible_speed=speed)
+    scale = detect_case_doppler_scale(case, stretches)
+    folding = detect_case_folding(case, stretches) if scale is None or scale.is_sign else None
+    if folding is not None or scale is not None:
+        return Advice(comparison, [], used_rows, folding, None if folding else scale)
     likelihood = likelihoods[comparison.most_columns]
     findings = [_with_turn_error(case, likelihood, finding) for finding in find_errors(likelihood, progress)]
     return Advice(comparison, findings, used_rows)

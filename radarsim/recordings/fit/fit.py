@@ -16,6 +16,7 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
 from radarsim.recordings import read_plots
+from radarsim.recordings.doppler_scale import detect_case_doppler_scale, doppler_scale_message
 from radarsim.recordings.fit.folded_doppler import VELOCITY_COLUMN, detect_case_folding, folding_message
 from radarsim.recordings.fit.likelihood_slice import (
     IMPOSSIBLE_LOG_LIKELIHOOD,
@@ -29,6 +30,7 @@ from radarsim.recordings.fit.likelihood_slice import (
 from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, FittedKey, LikelihoodSearch
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
+from radarsim.recordings.target_speed import impossible_column_speed, speed_message
 from radarsim.recordings.track_rows import split_by_track
 from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, Likelihood
 
@@ -133,10 +135,7 @@ def file_likelihoods(
             f"{source}: {constant_columns[0]}: must differ between plots, or σ cannot be estimated; all are the same"
         )
     likelihood = interface.likelihood(case, filter_name, long_tracks)
-    folding = detect_case_folding(case, long_tracks)
-    if folding and likelihood is not None and VELOCITY_COLUMN in likelihood.by_number(np.asarray(likelihood.stated)):
-        with use_language("en"):  # as all faults
-            raise ConfigError(f"{source}: {folding_message(folding, case)}")
+    _refuse_impossible_motion(source, case, likelihood, long_tracks)
     if likelihood is None:
         raise ConfigError(
             no_likelihood_message(
@@ -148,6 +147,25 @@ def file_likelihoods(
         interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked))),
         doubles,
     )
+
+
+def _refuse_impossible_motion(
+    source: str | os.PathLike, case: Case, likelihood: Likelihood | None, tracks: Sequence[Mapping[str, np.ndarray]]
+) -> None:
+    """Raise ConfigError if no target moves so fast, or if velocities that a likelihood takes are folded, or a multiple
+    of the change of the range: their σ would mean nothing."""
+    if speed := impossible_column_speed(tracks):
+        with use_language("en"):  # as all faults
+            raise ConfigError(f"{source}: {speed_message(speed)}")
+    if likelihood is None or VELOCITY_COLUMN not in likelihood.by_number(np.asarray(likelihood.stated)):
+        return
+    scale = detect_case_doppler_scale(case, tracks)
+    folding = detect_case_folding(case, tracks) if scale is None or scale.is_sign else None
+    with use_language("en"):  # as all faults
+        if folding is not None:
+            raise ConfigError(f"{source}: {folding_message(folding, case)}")
+        if scale is not None:
+            raise ConfigError(f"{source}: {doppler_scale_message(scale)}")
 
 
 def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters: Sequence[str]) -> str:

@@ -1,8 +1,9 @@
-"""Check the sign and the folding of imported Doppler speeds."""
+"""Check the unit, the sign and the folding of imported Doppler speeds."""
 
 import numpy as np
 
 from radarsim.language.translate import tr
+from radarsim.recordings import doppler_scale
 from radarsim.recordings.aircraft_match import MAX_GAP_S
 from radarsim.recordings.fit import folded_doppler
 from radarsim.recordings.formats.records import Batch
@@ -13,7 +14,7 @@ DOPPLER_COLUMNS = ("t_s", "range_m", "velocity_mps")
 
 
 class DopplerCheck:
-    """Check the sign and the folding of Doppler speeds on the first rows of tracks."""
+    """Check the unit, the sign and the folding of Doppler speeds on the first rows of tracks."""
 
     def __init__(self) -> None:
         self.rows: dict[str, list[np.ndarray]] = {}
@@ -31,8 +32,14 @@ class DopplerCheck:
                 self.rows.setdefault(name, []).append(table[rows][usable[rows]])
 
     def notes(self, towards: bool) -> list[str]:
-        """Notes if the opposite sign fits the rate of the range clearly better, and if speeds are folded."""
+        """Notes if another unit or sign fits the rate of the range clearly better, and if speeds are folded."""
         tracks, notes = [np.concatenate(parts) for parts in self.rows.values()], []
+        spanless_tracks = [
+            dict(zip(DOPPLER_COLUMNS, track[np.isnan(track[:, 3]), :3].T, strict=True)) for track in tracks
+        ]
+        scale = doppler_scale.detect_doppler_scale(spanless_tracks)
+        if scale is not None and not scale.is_sign:
+            return [doppler_scale.doppler_scale_message(scale)]
         offsets = np.abs(np.concatenate([np.empty((2, 0)), *map(_doppler_offsets, tracks)], axis=1))
         if offsets.shape[1] >= MIN_DOPPLER_ROWS:
             offset, opposite_offset = np.median(offsets, axis=1).tolist()
@@ -41,9 +48,6 @@ class DopplerCheck:
                 fields = {"as_is": offset, "turned": opposite_offset, "cure": cure}
                 notes = [tr("the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the "
                             "other sign by {turned:.1f} m/s: {cure}", **fields)]  # fmt: skip
-        spanless_tracks = [
-            dict(zip(DOPPLER_COLUMNS, track[np.isnan(track[:, 3]), :3].T, strict=True)) for track in tracks
-        ]
         folding = folded_doppler.detect_folding(spanless_tracks)
         return notes if folding is None else [*notes, folded_doppler.folding_message(folding)]
 

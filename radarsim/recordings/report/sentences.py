@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from radarsim.language.numerals import power_of_ten
 from radarsim.language.translate import join_names, plural, shorten_names, term, tr
+from radarsim.recordings.doppler_scale import doppler_scale_message
 from radarsim.recordings.fit import folded_doppler
 from radarsim.recordings.fit.advice import Advice, FilterComparison, Finding, UsedRows
 from radarsim.recordings.report.innovation_tests import (
@@ -17,6 +18,7 @@ from radarsim.recordings.report.innovation_tests import (
     TOO_SMALL,
     InnovationTest,
 )
+from radarsim.recordings.target_speed import speed_message
 from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.report.output_labels import labelled_line
 from radarsim.report.wording import number, significant_digits
@@ -151,6 +153,10 @@ def advice_statements(followed: TrackingResult, advice: Advice) -> list[Statemen
         statements.append(Statement("best", _best_filter_text(comparison)))
     if advice.folding is not None:
         statements.append(Statement("advice", folded_doppler.folding_message(advice.folding, followed.case)))
+    elif advice.impossible_speed is not None:
+        statements.append(Statement("advice", speed_message(advice.impossible_speed)))
+    elif advice.doppler_scale is not None:
+        statements.append(Statement("advice", doppler_scale_message(advice.doppler_scale)))
     elif not advice.findings:
         text = plural(
             "the stated values of {filter} agree with {count} row",

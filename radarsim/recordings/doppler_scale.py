@@ -1,0 +1,165 @@
+"""Radial velocities that are a multiple of the change of the range: of another unit, or of the other sign.
+
+Along a track the range is the integral of the velocity, however the target flies. Where the velocity is k times the
+change of the range, the slope of the range on the integral is 1 / k: it is fitted by least absolute deviations, with a
+constant for each stretch. A wrong unit of the velocities, of the ranges or of the times, and a wrong sign, each leave a
+multiple of their own. Velocities that are folded may look like a multiple below 1/3: a speed V by a span D becomes
+V - D = k V, with a size of at most D / 2. There the multiple must hold without what grows with time alone, as the spans
+do."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.language.translate import term, tr
+from radarsim.recordings.study_part import recording_interface
+from radarsim.report.wording import significant_digits
+
+COLUMNS = ("t_s", "range_m", "velocity_mps")
+MAX_GAP_S = 60.0  # of a stretch over which velocities are integrated
+MIN_STRETCH_ROWS, MIN_ROWS = 5, 20
+MIN_COURSE = 5.0  # median deviations of the ranges that the fitted course must span, by its median
+ROUNDS = 40  # of reweighting, for least absolute deviations
+ERROR_SIGMAS = 4.0  # of the multiple
+MAX_ERROR = 0.2  # of the multiple, relative
+MAX_PLAUSIBLE_MULTIPLE = 1.5  # or one over it: nearer to 1 no unit is
+UNIT_TOLERANCE = 0.01  # of a multiple, relative: of units, and of a line of sight that is not that of the range
+MIN_FOLDABLE, MAX_FOLDABLE = -1.05, 1 / 3  # multiples that folds may leave
+MAX_DRIFT_CHANGE = 0.2  # of such a multiple, relative, where a drift is allowed for
+FOOT_M, KNOT_MPS, KMH_MPS, MPH_MPS = 0.3048, 1852 / 3600, 1 / 3.6, 1609.344 / 3600
+CAUSES = {  # multiples, and what leaves them
+    1 / KNOT_MPS: term("they are in knots (--column velocity_kn=NAME)"),
+    1 / KMH_MPS: term("they are in km/h (--column velocity_kmh=NAME)"),
+    1 / FOOT_M: term("they are in feet per second"),
+    1 / MPH_MPS: term("they are in miles per hour"),
+    KNOT_MPS: term("they are in m/s, not in knots"),
+    KMH_MPS: term("they are in m/s, not in km/h"),
+    FOOT_M: term("the ranges are in feet, not in m"),
+    1e3: term("the times are in a unit a thousand times smaller, or the ranges in km"),
+    1e6: term("the times are in µs"),
+    1e9: term("the times are in ns"),
+    1e-3: term("the times are in a unit a thousand times larger, or the ranges in m, not in km"),
+    1 / 60: term("the times are in minutes"),
+    1 / 3600: term("the times are in hours"),
+    1 / 86400: term("the times are in days"),
+}
+
+
+@dataclass(frozen=True)
+class DopplerScale:
+    """Velocities as a multiple of the change of the range; is_sign: whether only the sign is wrong; causes: those of
+    CAUSES that leave such a multiple."""
+
+    multiple: float
+    is_sign: bool
+    causes: tuple[str, ...]
+
+
+def detect_doppler_scale(tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerScale | None:
+    """The multiple of the change of the range that the velocities of tracks, COLUMNS (n,), are; None where they agree
+    with it, or do not show one."""
+    arrays = [np.stack([columns[name] for name in COLUMNS]) for columns in tracks]
+    arrays = [array[:, np.isfinite(array).all(axis=0)] for array in arrays]
+    if sum(array.shape[1] for array in arrays) < MIN_ROWS:
+        return None
+    stretches = [stretch for array in arrays for stretch in _stretches(array)]
+    if sum(stretch.shape[1] for stretch in stretches) < MIN_ROWS:
+        return None
+    number = np.repeat(np.arange(len(stretches)), [stretch.shape[1] for stretch in stretches])
+    t, r, _, integral = np.concatenate(stretches, axis=1)
+    slope, residuals, course = _least_absolute_slope(integral, r, number)
+    deviation = float(np.median(np.abs(residuals)))
+    if slope == 0 or not float(np.median(np.abs(course))) > MIN_COURSE * deviation:
+        return None
+    size = float(np.sqrt(course @ course))
+    wandering = abs(slope) * max(map(_wandering_m, stretches)) * np.sqrt(len(r)) / size
+    error = ERROR_SIGMAS * (1.4826 * deviation / size + wandering)
+    if error > MAX_ERROR:
+        return None
+    scale = _scale(1 / slope, max(error, UNIT_TOLERANCE))
+    if scale is None or scale.is_sign or not MIN_FOLDABLE < scale.multiple < MAX_FOLDABLE:
+        return scale
+    return scale if _holds_with_drift(slope, t, r, integral, number) else None
+
+
+def _wandering_m(stretch: np.ndarray) -> float:
+    """How far the errors of the velocities of a stretch (4, m) carry their integral from its mean, m: a random walk."""
+    t, _, v, _ = stretch
+    sigma = float(np.median(np.abs(np.diff(v, n=2)))) / (0.6745 * np.sqrt(6))
+    return sigma * float(np.sqrt(np.sum(np.diff(t) ** 2) / 6))
+
+
+def _holds_with_drift(slope: float, t: np.ndarray, r: np.ndarray, integral: np.ndarray, number: np.ndarray) -> bool:
+    """Whether the slope of ranges on integrals (n,) stays where a drift in time is allowed for in each stretch."""
+    without_drift = []
+    for values in (integral, r):
+        deviations = values.copy()
+        for stretch in range(int(number[-1]) + 1):
+            rows = number == stretch
+            deviations[rows] -= np.polyval(np.polyfit(t[rows] - t[rows][0], values[rows], 1), t[rows] - t[rows][0])
+        without_drift.append(deviations)
+    refitted, residuals, course = _least_absolute_slope(without_drift[0], without_drift[1], number)
+    error = ERROR_SIGMAS * 1.4826 * float(np.median(np.abs(residuals))) / float(np.sqrt(course @ course) or 1e-300)
+    return error <= MAX_ERROR and abs(refitted / slope - 1) <= MAX_DRIFT_CHANGE
+
+
+def _stretches(track: np.ndarray) -> list[np.ndarray]:
+    """Stretches (4, m) of a track (3, n) without long gaps: with the integral of the velocity, m."""
+    t, _, v = track
+    steps = np.diff(t)
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])[: len(t)]
+    parts = np.split(np.vstack([track, integral]), np.flatnonzero((steps <= 0) | (steps > MAX_GAP_S)) + 1, axis=1)
+    return [part for part in parts if part.shape[1] >= MIN_STRETCH_ROWS]
+
+
+def _least_absolute_slope(x: np.ndarray, y: np.ndarray, number: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """The slope of y (n,) on x with least absolute deviations, with a constant for each stretch, by its number (n,);
+    the residuals (n,), and the fitted course (n,) without the constants."""
+    weights, slope, residuals, centred = np.ones(len(x)), 0.0, y, x
+    smallest = 1e-9 * float(np.abs(y).max()) + np.finfo(float).tiny
+    for _ in range(ROUNDS):
+        total = np.bincount(number, weights)
+        centred, y_centred = (z - (np.bincount(number, weights * z) / total)[number] for z in (x, y))
+        square = float(weights @ centred**2)
+        if not square > 0:
+            return 0.0, residuals, centred
+        slope = float(weights @ (centred * y_centred)) / square
+        residuals = y_centred - slope * centred
+        weights = 1 / np.maximum(np.abs(residuals), smallest)
+        weights /= weights.max()
+    return slope, residuals, slope * centred
+
+
+def _scale(multiple: float, error: float) -> DopplerScale | None:
+    """What a multiple says, with its relative error; None where it is near 1, or says nothing known."""
+    size = abs(multiple)
+    is_sign = abs(multiple + 1) <= error
+    if not is_sign and multiple > 0 and 1 / MAX_PLAUSIBLE_MULTIPLE < size < MAX_PLAUSIBLE_MULTIPLE:
+        return None
+    causes = tuple(cause for factor, cause in CAUSES.items() if abs(np.log(size / factor)) <= error)
+    is_likely = bool(causes) or size >= MAX_PLAUSIBLE_MULTIPLE  # any other multiple below 1 may be folded in part
+    return DopplerScale(multiple, is_sign, causes) if is_sign or is_likely else None
+
+
+def detect_case_doppler_scale(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerScale | None:
+    """The same for tracks that a case's study takes as measured, unless it unfolds the velocities."""
+    if not tracks or not set(COLUMNS) <= set(tracks[0]) or recording_interface(case).unfolds():
+        return None
+    return detect_doppler_scale(tracks)
+
+
+def doppler_scale_message(scale: DopplerScale) -> str:
+    """The message that velocities are a multiple of the change of the range, with its cause and cure."""
+    if scale.is_sign:
+        return tr("the velocities have the opposite sign of the change of the range: import the recording with "
+                  "--doppler-towards, or without it if it was given")  # fmt: skip
+    sign = tr("; and the sign is opposite: --doppler-towards") if scale.multiple < 0 else ""
+    cause = tr(" or ").join(map(tr, scale.causes)) or tr("their unit, or that of ranges or times, is another")
+    return tr(
+        "the Doppler speeds miss the change of the range by a factor of {multiple}: {cause}{sign}",
+        multiple=significant_digits(abs(scale.multiple), "#.3g"),
+        cause=cause,
+        sign=sign,
+    )

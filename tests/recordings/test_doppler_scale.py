@@ -1,0 +1,133 @@
+"""Velocities in another unit, or of the other sign, are told by the ranges of the same plots."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.errors import ConfigError
+from radarsim.recordings.doppler_scale import detect_doppler_scale, doppler_scale_message
+from radarsim.recordings.formats.import_options import Options
+from radarsim.recordings.time_spans import TimeSpan, meeting_text
+from tests.recordings.formats.example_files import imported
+
+KNOT_MPS = 1852 / 3600
+
+
+def recording(kind, speed_mps, multiple, seed, rows=60, sigma_m=30.0, sigma_mps=1.0):
+    """Plots every 4 s of a target that flies straight away, past, or in a turn; velocities are a multiple of the
+    rates."""
+    rng, t = np.random.default_rng(seed), 4.0 * np.arange(rows)
+    course = {"away": np.zeros(rows), "turn": np.clip(t - 60, 0, 120) * 0.02, "past": np.zeros(rows)}[kind]
+    if kind == "past":
+        x = speed_mps * (t - t[-1] / 2)
+        r, v = np.hypot(x, 9000.0), speed_mps * x / np.hypot(x, 9000.0)
+    else:
+        v = speed_mps * np.cos(course)
+        r = 20_000 + np.concatenate([[0.0], np.cumsum(2.0 * (v[1:] + v[:-1]))])
+    velocity = multiple * (v + rng.normal(0, sigma_mps, rows))
+    return {"t_s": t, "range_m": r + rng.normal(0, sigma_m, rows), "velocity_mps": velocity}
+
+
+@pytest.mark.parametrize("kind", ["away", "past", "turn"])
+@pytest.mark.parametrize(
+    ("multiple", "cause"),
+    [
+        (1 / KNOT_MPS, "in knots"), (3.6, "in km/h"), (KNOT_MPS, "not in knots"), (1e3, "thousand times smaller"),
+        (1e6, "in µs"), (-1.0, "opposite sign"), (-3.6, "in km/h"), (1 / 0.3048, "feet per second"),
+    ],
+)  # fmt: skip
+def test_the_multiple_names_the_unit(kind, multiple, cause):
+    for seed in range(5):
+        scale = detect_doppler_scale([recording(kind, 150.0, multiple, seed)])
+        assert scale is not None
+        message = doppler_scale_message(scale)
+        assert cause in message
+        assert ("--doppler-towards" in message) == (multiple < 0)
+        assert " or " not in message.partition("smaller")[0].replace("or without", "")
+
+
+def test_sound_and_folded_velocities_are_left_alone():
+    """Of any speed, σ, interval and course; and of constant speeds folded into 19.2 m/s."""
+    rng = np.random.default_rng(7)
+    for seed in range(300):
+        kind, rows = ("away", "past", "turn")[seed % 3], int(rng.integers(20, 150))
+        plots = recording(kind, 10 ** rng.uniform(-1, 2.5), 1.0, seed, rows, 10 ** rng.uniform(0, 2.6),
+                          10 ** rng.uniform(-1, 1.3))  # fmt: skip
+        assert detect_doppler_scale([plots]) is None
+    for speed in (11.0, 12.0, 14.0, 15.0, 18.0, 22.0, 28.0, 40.0):
+        for seed in range(8):
+            plots = recording("away", -speed, 1.0, seed, sigma_m=15.0, sigma_mps=0.8)
+            plots["velocity_mps"] = (plots["velocity_mps"] + 9.6) % 19.2 - 9.6
+            assert detect_doppler_scale([plots]) is None
+
+
+def test_wild_plots_do_not_hide_the_unit():
+    plots = recording("away", 150.0, 3.6, 1)
+    plots["range_m"][[3, 30, 31]] += [60e3, -9e3, 600e3]
+    scale = detect_doppler_scale([plots])
+    assert scale is not None
+    assert scale.multiple == pytest.approx(3.6, rel=0.01)
+
+
+def test_import_tells_the_unit(tmp_path):
+    plots = recording("away", 120.0, 1 / KNOT_MPS, 2)
+    text = "Time,Track,Range [m],Radial velocity\n" + "".join(
+        f"{t},7,{r:.1f},{v:.2f}\n" for t, r, v in zip(*plots.values(), strict=True)
+    )
+    done, *_ = imported(tmp_path, text.encode())
+    expected = ": they are in knots (--column velocity_kn=NAME)"
+    assert [expected in note for note in done.notes] == [False, True]
+    (tmp_path / "plots.csv").unlink()
+    done, columns, _ = imported(tmp_path, text.encode(), Options(columns={"velocity_kn": "Radial velocity"}))
+    assert done.notes == []
+    assert np.median(columns["velocity_mps"]) == pytest.approx(120.0, rel=0, abs=1.0)
+
+
+@pytest.mark.parametrize(("multiple", "expected"), [(-1.0, "opposite sign"), (3.6, "in km/h")])
+def test_fit_and_track_ask_before_they_advise(tmp_path, multiple, expected, capsys):
+    plots = recording("away", 120.0, multiple, 3)
+    path = tmp_path / "plots.csv"
+    path.write_text(
+        "t_s,range_m,velocity_mps\n" + "".join(f"{t},{r},{v}\n" for t, r, v in zip(*plots.values(), strict=True))
+    )
+    with pytest.raises(ConfigError, match=expected):
+        radarsim.fit("rls2", str(path))
+    fitted = radarsim.fit("rls2", str(path), filter_name="r")  # the ranges are sound
+    assert fitted["key"].tolist() == ["radar.sigma_range_m", "manoeuvre_variance"]
+    from radarsim.cli.command_group import main
+
+    main(["track", "rls2", str(path), "-o", str(tmp_path / "track.csv")], standalone_mode=False)
+    advice = [line for line in capsys.readouterr().out.splitlines() if line.startswith("advice")]
+    assert len(advice) == 1
+    assert expected in advice[0]
+
+
+def test_impossible_speeds_are_told_before_advice(tmp_path):
+    """A recording whose times are in hours."""
+    plots = recording("away", 120.0, 1.0, 3)
+    path = tmp_path / "plots.csv"
+    path.write_text(
+        "t_s,range_m,velocity_mps\n" + "".join(f"{t / 3600},{r},{v}\n" for t, r, v in zip(*plots.values(), strict=True))
+    )
+    with pytest.raises(ConfigError, match="if they are in hours"):
+        radarsim.fit("rls2", str(path))
+
+
+DAY = 1_795_824_000.0  # 28 November 2026
+
+
+@pytest.mark.parametrize(
+    ("positions", "expected"),
+    [
+        ((DAY + 3600, DAY + 4100), "they meet if the positions are 1 h earlier (another time zone)"),
+        ((DAY - 1024 * 604_800.0, DAY - 1024 * 604_800.0 + 500), "they meet if the positions are 1024 weeks later"),
+        ((DAY + 1e7, DAY + 1e7 + 9), ": they do not meet"),
+        ((DAY + 200, DAY + 900), ""),
+        ((86_300.0, 86_390.0), "they do not meet"),
+        ((7300.0, 7400.0), "they meet if the positions are 2 h earlier"),
+    ],
+)
+def test_spans_that_do_not_meet_are_shown(positions, expected):
+    text = meeting_text(TimeSpan(DAY, DAY + 480), TimeSpan(*positions))
+    assert expected in text
+    assert ("the plots are from 2026-11-28 00:00:00 to 00:08:00" in text) == bool(expected)
