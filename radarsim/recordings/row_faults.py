@@ -11,20 +11,21 @@ class Faults:
 
     def __init__(self, path: str):
         self.path = path
-        self.kinds: dict[str, tuple[str, str, list[int]]] = {}
+        self.kinds: dict[str, tuple[str, str, bool, list[int]]] = {}
 
     def __bool__(self) -> bool:
         return bool(self.kinds)
 
-    def add(self, line: int, where: str, must: str, got: object, cure: str = "") -> None:
-        """where: the column's number and name with their separator, or nothing."""
+    def add(self, line: int, where: str, must: str, got: object, cure: str = "", always: bool = False) -> None:
+        """where: the column's number and name with their separator, or nothing. always: the cure is named for a single
+        row too."""
         first = f"{self.path}:{line}:{where} {must}, got {got}"
-        self.kinds.setdefault(where + must, (first, cure and f"; {cure}", []))[2].append(line)
+        self.kinds.setdefault(where + must, (first, cure and f"; {cure}", always, []))[3].append(line)
 
     def lines(self) -> Iterator[str]:
-        for first, cure, (_, *further_lines) in self.kinds.values():
+        for first, cure, always, (_, *further_lines) in self.kinds.values():
             if not further_lines:
-                yield first
+                yield first + cure * always
                 continue
             line_numbers = ", ".join(map(str, further_lines[:MAX_NAMED_LINES])) + (
                 ", …" if len(further_lines) > MAX_NAMED_LINES else ""

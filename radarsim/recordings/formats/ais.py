@@ -36,8 +36,9 @@ try:
 except ImportError:
     pyais = None
 SENTENCE_PATTERN = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
-TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13})")
-TRAILING_TIME = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)\s*$")
+TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13}(?:\.\d+)?)")
+# The first of several is the time of reception.
+TRAILING_TIME = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)(?:[,; \t]+\d{9,13}(?:\.\d+)?)*\s*$")
 GATEHOUSE_TIME = re.compile(rb"\$PGHP,1,(\d{4})" + 5 * rb",(\d\d?)" + rb",(\d{1,3}),")  # the time of the next sentence
 PART_NUMBERS = re.compile(rb"![A-Z]{2}VD[MO],(\d),(\d),(\d?),")
 MAX_SPEED_KNOTS, UNKNOWN_COURSE_DEG, UNKNOWN_SECOND = 102.2, 360.0, 60

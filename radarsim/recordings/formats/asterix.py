@@ -29,6 +29,7 @@ from radarsim.recordings.track_names import TrackNames
 MAX_RECENT_BLOCKS = 4096  # data blocks; one that comes again among them is the double of a second network
 READ_CATEGORIES = (1, 2, 21, 34, 48, 62)
 RADAR_CATEGORIES = {1, 48}
+TRUNCATED_TIMES = "category 001 states times within 512 s only, and no sector messages (category 002) the others"
 TEXT_COLUMNS = ("address", "mode_3a", "callsign", "report", "marks")  # columns of text
 
 
@@ -70,6 +71,13 @@ class Asterix:
         # As truth ADS-B comes before the tracks that a centre has smoothed.
         self.trusted_categories = {21} if 21 in self.survey.categories else {21, 62}
 
+    @property
+    def lacks_full_times(self) -> bool:
+        """Whether plots of category 001 have only the last 512 s of their times, as far as the file has been read."""
+        return self.plots_001.full is None and (
+            1 in self.survey.categories or self.plots_001.unrolled_clock.last is not None
+        )
+
     def batches(self) -> Iterator[formats_records.Batch]:
         """The records in batches; raises ConfigError where a block or record violates the specification."""
         try:
@@ -94,6 +102,9 @@ class Asterix:
     def notes(self, radars: Iterable[str]) -> list[str]:
         """The marked reports, and the facts on these radars, in words."""
         lines = self.clock.notes()
+        if self.lacks_full_times:
+            lines.append(tr("category 001 states times within 512 s only, and no sector messages (category 002) the "
+                            "others: t_s counts from an unknown time"))  # fmt: skip
         turns = [(radar, self.survey.turns[radar]) for radar in radars if radar in self.survey.turns]
         if turns:
             turn_texts = ", ".join(tr("{radar} {turn:.4g} s", radar=radar, turn=turn) for radar, turn in turns)
@@ -211,6 +222,7 @@ class Asterix:
 
 
 def looks_like(head: bytes) -> bool:
-    """Whether a file with this beginning may be ASTERIX: at least one data block, of a category that radars send."""
+    """Whether a file with this beginning may be ASTERIX: a data block of a category that radars send, or blocks of any
+    category one after the other."""
     is_block = len(head) >= 4 and head[0] in (*READ_CATEGORIES, 8, 20) and int.from_bytes(head[1:3], "big") >= 4
-    return is_block or captures.is_capture(head) or captures.is_final(head)
+    return is_block or captures.is_chain(head) or captures.is_capture(head) or captures.is_final(head)

@@ -1,5 +1,6 @@
 """Records of an ASTERIX category, collected until their fields are decoded together."""
 
+import math
 from array import array
 from collections.abc import Callable
 
@@ -10,6 +11,8 @@ from radarsim.recordings.formats.asterix_decode import RecordContents, RecordFie
 from radarsim.recordings.formats.asterix_layout import Profile
 
 WRAP_001_S = 512.0  # of the truncated time of day of category 001
+MIDNIGHT_001_S = records.DAY_S % WRAP_001_S  # the truncated time at which the day ends
+NEAR_MIDNIGHT_S = 8.0  # from the last plot before midnight to it, and from it to the first one after
 
 
 class Category:
@@ -54,6 +57,7 @@ class Category001(Category):
         self.plot = Profile(1, self.items, "plot")
         self.full: float | None = None  # time of day of the last sector message of category 002
         self.unrolled_clock = records.UnrolledClock(WRAP_001_S)
+        self.midnight_turn = math.inf  # of the clock, at which a day ended early
 
     def find_items(self, data: bytes, start: int) -> tuple[list[int], int]:
         """The profile depends on the first bit of item 020, the second item of both; item 010 has two bytes."""
@@ -63,10 +67,17 @@ class Category001(Category):
         )
 
     def time_of_day(self, number: int) -> float:
-        """The time of day next to the last sector's; without sectors the truncated one, unwrapped."""
+        """The time of day next to the last sector's; without sectors the truncated one, unwrapped.
+
+        Midnight cuts a turn of the truncated clock short: that is seen where plots come up to it."""
         truncated = number / 128
         if self.full is None:
-            return self.unrolled_clock(truncated)
+            clock, last = self.unrolled_clock, self.unrolled_clock.last
+            unrolled = clock(truncated)
+            comes_to_midnight = last is not None and 0 <= MIDNIGHT_001_S - last < NEAR_MIDNIGHT_S
+            if comes_to_midnight and truncated < NEAR_MIDNIGHT_S and math.isinf(self.midnight_turn):
+                self.midnight_turn = clock.turns
+            return unrolled - (WRAP_001_S - MIDNIGHT_001_S) * (clock.turns >= self.midnight_turn)
         return truncated + WRAP_001_S * round((self.full - truncated) / WRAP_001_S)
 
 

@@ -16,6 +16,7 @@ from radarsim.errors import ConfigError
 from radarsim.language.translate import NUMBER_PLACEHOLDER, term
 
 CHUNK_BYTES = 1 << 20
+MIN_CHAIN_BLOCKS = 2  # of any category, one after the other, by which a file without frames is known
 MAX_TRAILING_BYTES = 16  # bytes of a network's own after the blocks of a datagram
 MAX_PACKET_BYTES = 1 << 24  # more is a damaged file
 USED_CATEGORIES = {*range(1, 35), 48, *range(61, 66), 129, 150, 204, 205, *range(238, 242), 247, 252}  # that are in use
@@ -67,6 +68,20 @@ def is_final(head: bytes) -> bool:
     """Whether a file with this beginning has frames of the kind FINAL."""
     count = int.from_bytes(head[:2], "big")
     return len(head) >= count and _blocks_of_frame(head[:count], FINAL) is not None
+
+
+def is_chain(head: bytes) -> bool:
+    """Whether a file with this beginning has data blocks of any category, one after the other.
+
+    The last may go beyond the beginning; of a category that is in use a single one is enough."""
+    offset, count, categories = 0, 0, set[int]()
+    while offset + 4 <= len(head):
+        length = int.from_bytes(head[offset + 1 : offset + 3], "big")
+        if length < 4 or not head[offset]:
+            return False
+        categories.add(head[offset])
+        offset, count = offset + length, count + 1
+    return count >= MIN_CHAIN_BLOCKS or (count == 1 and categories <= USED_CATEGORIES)
 
 
 def _bare_blocks(path: str, file: BinaryIO) -> Iterator[Block]:

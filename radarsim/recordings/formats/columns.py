@@ -1,19 +1,21 @@
 """Quantities and units of the columns of a recording, found by their names.
 
-A column is found by its name, whatever its case and spaces; a unit may stand at its end (`range_km`, `Altitude [ft]`,
-`Latitude_degrees`). A name without a unit means SI and degrees; but positions with names from aviation (`gs`,
-`alt_baro`, …) are in feet, knots and feet a minute, and speeds of ships in knots, like the exports that use them.
-Ranges and bearings have no such convention: their units must be stated."""
+A column is found by its name, whatever its case and spaces, in English, German or Russian; a unit may stand at its end
+(`range_km`, `Altitude [ft]`, `Latitude_degrees`, `Entfernung, km`). A name without a unit means SI and degrees; but
+positions with names from aviation (`gs`, `alt_baro`, …) are in feet, knots and feet a minute, and speeds of ships in
+knots, like the exports that use them. Ranges and bearings have no such convention: their units must be stated."""
 
 import math
 import re
 import shlex
 import types
-from collections.abc import Mapping
+import unicodedata
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
+from radarsim.recordings.formats.column_guesses import guess_options
 
 KNOT_MPS = 1852 / 3600
 
@@ -24,8 +26,15 @@ SPEEDS = {
     **dict.fromkeys(("kmh", "km/h"), 1 / 3.6), **dict.fromkeys(("fpm", "ft/min"), 0.3048 / 60),
 }  # fmt: skip
 DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 / math.pi}
-RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()}
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0}  # dmy, mdy: the order in 1/2/2024
+AZIMUTH_COUNTS = 4096  # of a turn: the pulses of an antenna's encoder (ACP)
+RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()} | {"acp": 2 * math.pi / AZIMUTH_COUNTS}
+DAYS = "days"  # of a spreadsheet, of Matlab, Julian ones: numbers that `times.day_number_s` tells apart
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0, DAYS: 1.0}  # dmy: day before month
+UNIT_SYNONYMS = {  # German and Russian
+    **{"м": "m", "км": "km", "м/с": "m/s", "км/ч": "km/h", "уз": "kn", "узлы": "kn", "knoten": "kn", "sm": "nm"},
+    **{"град": "deg", "град.": "deg", "grad": "deg", "рад": "rad", "с": "s", "сек": "s", "sek": "s", "мс": "ms"},
+    **{"футы": "ft", "фут": "ft", "tage": DAYS, "дни": DAYS},
+}
 
 
 class Quantity(NamedTuple):
@@ -42,14 +51,17 @@ QUANTITIES = {
         (
             *("lastposupdate", "last_position", "time_position"),  # of the position; the following may be of a query
             *("t", "time", "timestamp", "t_s", "datetime", "date_time", "basedatetime", "base_date_time", "utc"),
-            "date",
+            *("timemessagegenerated", "date"),
         ),
         TIME_UNITS,
         "s",
     ),
-    "date": Quantity(("date", "day")),  # of a time of day
+    "date": Quantity(("date", "day", "datemessagegenerated")),  # of a time of day
     "track": Quantity(
-        ("icao24", "icao", "hex", "mmsi", "track_id", "address", "callsign", "flight", "id", "track", "name")
+        (
+            *("icao24", "icao", "hex", "hexident", "mmsi", "track_id", "address"),
+            *("callsign", "flight", "id", "track", "name"),
+        )
     ),
     "latitude_deg": Quantity(("lat", "latitude"), DEGREES, "deg"),
     "longitude_deg": Quantity(("lon", "lng", "long", "longitude"), DEGREES, "deg"),
@@ -65,15 +77,40 @@ QUANTITIES = {
         ("true_track", "course", "cog", "track_angle", "direction", "heading", "track"), DEGREES, "deg"
     ),
     "up_mps": Quantity(
-        ("vertrate", "vertical_rate", "vert_rate", "geom_rate", "baro_rate", "climb"), SPEEDS, "m/s"
+        ("vertrate", "vertical_rate", "verticalrate", "vert_rate", "geom_rate", "baro_rate", "climb"), SPEEDS, "m/s"
     ),
     "range_m": Quantity(("range", "slant_range", "distance", "rho"), LENGTHS),
     "bearing_rad": Quantity(("bearing", "azimuth", "az", "theta"), RADIANS),
     "velocity_mps": Quantity(("radial_velocity", "doppler", "radial_speed", "range_rate", "velocity"), SPEEDS, "m/s"),
     "span_mps": Quantity(("span", "ambiguity", "doppler_span"), SPEEDS, "m/s"),
 }  # fmt: skip
+FOREIGN_NAMES = {  # German and Russian; looked for where no English name is found
+    "t_s": (
+        *("zeit", "uhrzeit", "zeitstempel", "zeitpunkt", "datum_uhrzeit", "datum"),
+        *("время", "метка_времени", "дата_время", "дата_и_время", "дата"),
+    ),
+    "date": ("datum", "дата"),
+    "track": (
+        *("spur", "spurnummer", "ziel", "zielnummer", "track_nr", "track-nr", "kennung"),
+        *("трасса", "номер_трассы", "цель", "номер_цели", "борт"),
+    ),
+    "latitude_deg": ("breite", "breitengrad", "широта"),
+    "longitude_deg": ("länge", "laenge", "längengrad", "laengengrad", "долгота"),
+    "altitude_m": ("höhe", "hoehe", "высота"),
+    "speed_mps": ("geschwindigkeit", "fahrt", "скорость", "путевая_скорость"),
+    "course_deg": ("kurs", "курс"),
+    "range_m": (
+        *("entfernung", "entf", "entf.", "schrägentfernung", "schraegentfernung", "distanz", "abstand"),
+        *("дальность", "наклонная_дальность", "расстояние"),
+    ),
+    "bearing_rad": ("azimut", "peilung", "азимут", "пеленг"),
+    "velocity_mps": (
+        *("vr", "v_r", "radialgeschwindigkeit", "dopplergeschwindigkeit"),
+        *("радиальная_скорость", "доплеровская_скорость", "доплер"),
+    ),
+}
 IDENTITIES = {  # what identifies an aircraft or a ship, by the names of columns
-    "address": ("icao24", "icao", "hex", "mmsi", "address"),
+    "address": ("icao24", "icao", "hex", "hexident", "mmsi", "address"),
     "callsign": ("callsign", "flight"),
     "mode_3a": ("squawk", "mode_3a", "mode3a", "ssr"),
 }
@@ -90,6 +127,7 @@ MARITIME_NAMES = ("sog", "cog", "mmsi")  # names of AIS
 HEADING_NAME = "heading"
 MARITIME_UNITS = {"speed_mps": "kn"}
 UNIT_PATTERN = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
+COMMA_UNIT_PATTERN = re.compile(r"^(.*?)\s*,\s*(\S+)$")
 
 
 class Column(NamedTuple):
@@ -104,13 +142,24 @@ class Column(NamedTuple):
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """A column's name without its unit, in lower case, and its unit: `Range [km]` and `range_km` are (range, km)."""
-    name = name.strip().lower()
+    """A column's name without its unit, in lower case, and its unit: `Range [km]`, `range_km` and `Range, km` are
+    (range, km)."""
+    name = unicodedata.normalize("NFC", name).strip().lower()
     if match := UNIT_PATTERN.match(name):
-        return re.sub(r"\s+", "_", match[1].strip()), match[2].strip()
+        unit = match[2].strip()
+        return re.sub(r"\s+", "_", match[1].strip()), UNIT_SYNONYMS.get(unit, unit)
+    match = COMMA_UNIT_PATTERN.match(name)
+    if match and (unit := UNIT_SYNONYMS.get(match[2], match[2])) in UNITS:
+        return re.sub(r"\s+", "_", match[1]), unit
     name = re.sub(r"\s+", "_", name)
     stem, _, last = name.rpartition("_")
-    return (stem, last) if stem and last in UNITS else (name, "fl" if name in FLIGHT_LEVELS else "")
+    unit = UNIT_SYNONYMS.get(last, last)
+    return (stem, unit) if stem and unit in UNITS else (name, "fl" if name in FLIGHT_LEVELS else "")
+
+
+def known_names(ours: str) -> tuple[str, ...]:
+    """The names that a quantity may have, those that count first before others."""
+    return (*QUANTITIES[ours].names, *FOREIGN_NAMES.get(ours, ()))
 
 
 def _printable(name: str) -> str:
@@ -121,12 +170,11 @@ def _printable(name: str) -> str:
 class Header:
     """The columns of a file by our names, those assigned by the user first; raises ConfigError.
 
-    columns: by name of the quantity; identities: the indices of those in
-    IDENTITIES; on_earth: whether positions are read, not plots; aviation, maritime: whether
-    names follow their customs."""
+    columns: by name of the quantity; identities: the indices of those in IDENTITIES; reads_positions: whether positions
+    are read, not plots; aviation, maritime: whether names follow their customs; sample: some rows of the file."""
 
-    def __init__(self, path: str, names: list[str], assigned: Mapping[str, str]):
-        self.path, self.names = path, [_printable(name) for name in names]
+    def __init__(self, path: str, names: list[str], assigned: Mapping[str, str], sample: Sequence[Sequence[str]] = ()):
+        self.path, self.names, self.sample = path, [_printable(name) for name in names], sample
         self.stems = [split_unit(name) for name in self.names]
         self.maritime = any(stem in MARITIME_NAMES for stem, _ in self.stems)
         self.aviation = any((name, "") in self.stems for name in AVIATION_NAMES)
@@ -147,7 +195,7 @@ class Header:
 
     def _has(self, ours: str) -> bool:
         """Whether a quantity has been assigned, or has a known name."""
-        return ours in self.columns or any(stem in QUANTITIES[ours].names for stem, _ in self.stems)
+        return ours in self.columns or any(stem in known_names(ours) for stem, _ in self.stems)
 
     def _assign_columns(self, assigned: Mapping[str, str]) -> None:
         """Assign the columns that the user names."""
@@ -184,10 +232,10 @@ class Header:
         excluded = {("velocity_mps", "velocity")} if has_positions else set()
         excluded |= {("course_deg", HEADING_NAME)} if self.maritime else set()
         used_indices = {column.position for column in self.columns.values()}
-        for ours, quantity in QUANTITIES.items():
+        for ours in QUANTITIES:
             candidates = [
                 name
-                for name in quantity.names
+                for name in known_names(ours)
                 if (ours, name) not in excluded and indices.get(name) not in used_indices
             ]
             match = next((name for name in candidates if name in indices), None)
@@ -213,26 +261,39 @@ class Header:
         return Column(index, name, quantity.units.get(unit_or_default, 1.0), unit_or_default, is_assumed)
 
     def _check(self) -> None:
-        """Raise ConfigError for missing columns, and for units that must be stated."""
+        """Raise ConfigError for missing columns, and for units that must be stated, all at once."""
         required = ("t_s", *EARTH_COLUMNS) if self.reads_positions else ("t_s", "range_m")
+        faults = []
         if missing := [name for name in required if name not in self.columns]:
-            hints = "; ".join(f"{name}: {', '.join(QUANTITIES[name].names)}" for name in missing)
             got = ", ".join(self.names)[:200] or "nothing"
             needed = "columns of time, and of latitude and longitude or of range (name them: --column OURS=THEIRS)"
-            raise ConfigError(f"{self.path}:1: must have {needed}; missing ({hints}); got {got}")
+            guesses = self._guesses(missing)
+            hints = ", ".join(missing)
+            if len(guesses) < len(missing):
+                hints = "; ".join(f"{name}: {', '.join(QUANTITIES[name].names)}" for name in missing)
+            ready = f"; perhaps {' '.join(guesses)}" if guesses else ""
+            faults.append(f"{self.path}:1: must have {needed}; missing ({hints}); got {got}{ready}")
         if columns_without_unit := {
             ours: column.name for ours, column in self.columns.items() if not column.unit and ours not in UNITLESS
         }:
             cures = []
             for ours, name in columns_without_unit.items():
-                by_factor: dict[float, str] = {}
-                for unit, factor in QUANTITIES[ours].units.items():
-                    by_factor.setdefault(factor, f"{split_unit(ours)[0]}_{unit}")
-                first, *alternatives = by_factor.values()
+                first, *alternatives = _names_with_units(ours)
                 cures.append(f"--column {first}={shlex.quote(name)} (or {', '.join(alternatives)})")
             names = ", ".join(columns_without_unit.values())
-            raise ConfigError(f"{self.path}:1: {names}: must have a unit in the name; where it has none, "
-                              f"{', '.join(cures)} states it")  # fmt: skip
+            faults.append(f"{self.path}:1: {names}: must have a unit in the name; where it has none, "
+                          f"{', '.join(cures)} states it")  # fmt: skip
+        if faults:
+            raise ConfigError(*faults)
+
+    def _guesses(self, missing: Sequence[str]) -> list[str]:
+        """The options that may name the missing columns, and others of a plot that no name is known of."""
+        optional = () if self.reads_positions else ("bearing_rad", "velocity_mps", "track")
+        quantities = [*missing, *(ours for ours in optional if ours not in self.columns)]
+        used = {column.position for column in self.columns.values()}
+        stems = [("", "") if i in used else stem for i, stem in enumerate(self.stems)]
+        return guess_options({ours: known_names(ours) for ours in quantities}, _name_with_unit, stems, self.names,
+                             self.sample)  # fmt: skip
 
     def notes(self) -> list[str]:
         """Notes on assumptions, and on columns that are not used."""
@@ -263,3 +324,20 @@ class Header:
             column = f"--column range_UNIT={shlex.quote(ranges[0])}"
             lines.append(tr("positions are read, not plots; for these: {column}", column=column))
         return lines
+
+
+def _names_with_units(ours: str) -> list[str]:
+    """A quantity's name in each unit that its columns may have, ours first."""
+    by_factor: dict[float, str] = {}
+    for unit, factor in QUANTITIES[ours].units.items():
+        by_factor.setdefault(factor, f"{split_unit(ours)[0]}_{unit}")
+    return list(by_factor.values())
+
+
+def _name_with_unit(ours: str, unit: str) -> str:
+    """A quantity's name in a unit; '' where that is no unit of it."""
+    if unit not in QUANTITIES[ours].units:
+        return ""
+    names = _names_with_units(ours)
+    factor = QUANTITIES[ours].units[unit]
+    return next((name for name in names if QUANTITIES[ours].units[name.rpartition("_")[2]] == factor), names[0])

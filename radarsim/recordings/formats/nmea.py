@@ -1,11 +1,11 @@
-"""Positions from the sentences of a satellite receiver (NMEA 0183), as a sheet."""
+"""NMEA 0183 as a sheet: positions of a satellite receiver, or the targets that a ship's radar tracks."""
 
 import contextlib
 import io
 import math
 import re
 from collections.abc import Iterator
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from radarsim.language.translate import term
 from radarsim.recordings.formats import ais, records
@@ -13,22 +13,32 @@ from radarsim.recordings.formats.cell_text import cell_text, finite_number
 from radarsim.recordings.formats.sheet import Sheet
 
 NMEA_COLUMNS = {"lat": "lat", "lon": "lon", "speed": "speed [kn]", "course": "course [deg]", "altitude": "altitude [m]"}
-SENTENCE_PATTERN = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC),[^\r\n]*")
+TARGET_COLUMNS = {"track": "track", "range": "range [m]", "bearing": "bearing [deg]", "altitude": "altitude [m]"}
+SENTENCE_PATTERN = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC|TTM),[^\r\n]*")
+TARGET_PATTERN = re.compile(rb"\$[A-Z]{2}TTM,[^\r\n]*")
+HEADING_PATTERN = re.compile(rb"\$[A-Z]{2}HDT,([\d.]+),T[^\r\n]*")
+DISTANCE_UNITS_M = {"N": 1852.0, "K": 1000.0, "S": 1609.344}
+FIRST_SECOND_OF_MINUTE = 60.0
+LEAP_SECOND_REASON = term("sentences in a leap second (23:59:60), which seconds from 1970 do not count")
 DATED_SENTENCE = re.compile(rb"\$[A-Z]{2}RMC,[^,]*,A(?:,[^,]*){6},\d{6}")
 CLOCK_PATTERN = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-6]\d(?:\.\d+)?)")
 
 
 def read_nmea(path: str, file: BinaryIO) -> Sheet:
     """Positions by a satellite receiver, NMEA 0183: RMC (place, speed, course, date) and GGA (place, height), of any
-    talker, those of one time as one row. Heights are above the ellipsoid where GGA has that of the geoid.
+    talker, those of one time as one row. Heights are above the ellipsoid where GGA has that of the geoid. Where the
+    first sentences have targets of a radar (TTM), these are read instead.
 
     Where no RMC stands among the first sentences, dates are left alone: times are of the day."""
-    has_dates = bool(DATED_SENTENCE.search(file.peek(io.DEFAULT_BUFFER_SIZE)))  # type: ignore[attr-defined]
-    sheet = Sheet(path, ["time", *NMEA_COLUMNS.values()], iter(()))
+    head = file.peek(io.DEFAULT_BUFFER_SIZE)  # type: ignore[attr-defined]
+    has_dates = bool(DATED_SENTENCE.search(head))
+    if TARGET_PATTERN.search(head):
+        return _read_targets(path, file, has_dates)
+    sheet = Sheet(path, ["time", *NMEA_COLUMNS.values()], iter(()), is_one_track=True)
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         fix: dict[str, float] = {}  # the numbers of all sentences of one time
-        number, midnight, previous_clock = 0, math.nan, math.nan
+        number, dates = 0, _Dates()
         for number, line in enumerate(file, start=1):
             sentence = _parse_fix(line, sheet) if line.strip() else {}
             if fix and sentence and sentence["clock"] != fix["clock"]:
@@ -36,10 +46,7 @@ def read_nmea(path: str, file: BinaryIO) -> Sheet:
                 fix = {}
             if sentence:
                 if has_dates:
-                    is_next_day = sentence["clock"] < previous_clock - records.DAY_S / 2
-                    midnight = sentence.pop("midnight", midnight + records.DAY_S * is_next_day)
-                    sentence["time"] = midnight + sentence["clock"]
-                previous_clock = sentence["clock"]
+                    sentence["time"] = dates.time(sentence["clock"], sentence.pop("midnight", None))
                 fix |= sentence
         if fix:
             yield number, _fix_cells(fix)
@@ -48,12 +55,88 @@ def read_nmea(path: str, file: BinaryIO) -> Sheet:
     return sheet
 
 
+class _Dates:
+    """The day of times of day, by the dates that sentences RMC state, and by midnight between them."""
+
+    def __init__(self) -> None:
+        self.midnight, self.previous_clock = math.nan, math.nan
+
+    def time(self, clock: float, midnight: float | None = None) -> float:
+        """Seconds from 1970 of a time of day, s; midnight: of the day that its sentence states."""
+        is_next_day = clock < self.previous_clock - records.DAY_S / 2
+        self.midnight = self.midnight + records.DAY_S * is_next_day if midnight is None else midnight
+        self.previous_clock = clock
+        return self.midnight + clock
+
+
+def _read_targets(path: str, file: BinaryIO, has_dates: bool) -> Sheet:
+    """The targets that a ship's radar tracks (TTM): number, distance, bearing, time of day; bearings from the bow are
+    turned by the heading (HDT) before them. Lost targets and own positions are left out."""
+    sheet = Sheet(path, ["time", *TARGET_COLUMNS.values()], iter(()))
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        dates, heading, own_clock = _Dates(), math.nan, math.nan
+        for number, line in enumerate(file, start=1):
+            if match := HEADING_PATTERN.search(line):
+                heading = _parse_number(match[1].decode("ascii"))
+            elif not TARGET_PATTERN.search(line):
+                fix = _parse_fix(line, sheet) if line.strip() else {}
+                if fix:
+                    own_clock = fix["clock"]
+                    dates.time(own_clock, fix.get("midnight"))
+                    sheet.skipped[term("positions of the ship itself, beside its radar's targets")] += 1
+            elif target := _parse_target(line, heading, own_clock, sheet):
+                clock = target.pop("clock")
+                time = dates.time(clock) if has_dates else math.nan
+                cells = [target[name] for name in TARGET_COLUMNS]
+                yield number, [cell_text(_clock_text(clock) if math.isnan(time) else time), *map(cell_text, cells)]
+
+    sheet.rows = rows()
+    return sheet
+
+
+def _parse_target(line: bytes, heading: float, own_clock: float, sheet: Sheet) -> dict[str, Any]:
+    """The values of TARGET_COLUMNS of a sentence TTM and its `clock`, s of the day, or that of the sentence before it;
+    empty where it has no place, or is of a lost target."""
+    match = TARGET_PATTERN.search(line)
+    assert match is not None
+    if b"*" in match[0] and not ais.has_valid_checksum(match[0]):
+        sheet.skipped[term("damaged sentences")] += 1
+        return {}
+    _, name, distance, bearing, reference, *cells = [
+        *match[0].partition(b"*")[0].decode("ascii", "replace").split(","),
+        *[""] * 16,
+    ]
+    unit_m, status, time = DISTANCE_UNITS_M.get(cells[5].strip()), cells[7].strip(), CLOCK_PATTERN.fullmatch(cells[9])
+    clock = _clock_s(time) if time else own_clock
+    angle = _parse_number(bearing) + (heading if reference == "R" else 0.0)
+    if status == "L":
+        sheet.skipped[term("targets that the radar has lost")] += 1
+    elif reference == "R" and math.isnan(heading):
+        sheet.skipped[term("targets by the bow, whose heading no sentence HDT states")] += 1
+    elif unit_m is None or math.isnan(clock + angle + _parse_number(distance)):
+        sheet.skipped[records.NO_TIME_OR_POSITION] += 1
+    else:
+        place = {"range": _parse_number(distance) * unit_m, "bearing": angle % 360, "altitude": 0.0}  # at sea
+        return {"clock": clock, "track": name, **place}
+    return {}
+
+
 def _fix_cells(fix: dict[str, float]) -> list[str]:
     """The cells of NMEA_COLUMNS; a time without a date becomes a time of day."""
-    minutes, seconds = divmod(fix["clock"], 60)
-    clock = f"{minutes // 60:02.0f}:{minutes % 60:02.0f}:{seconds:09.6f}"
     cells = [fix.get(name, math.nan) for name in NMEA_COLUMNS]
-    return [cell_text(fix.get("time", clock)), *map(cell_text, cells)]
+    return [cell_text(fix.get("time", _clock_text(fix["clock"]))), *map(cell_text, cells)]
+
+
+def _clock_text(clock: float) -> str:
+    """A time of day, s, as hours, minutes and seconds."""
+    minutes, seconds = divmod(clock, 60)
+    return f"{minutes // 60:02.0f}:{minutes % 60:02.0f}:{seconds:09.6f}"
+
+
+def _clock_s(match: re.Match[str]) -> float:
+    """A time matched by CLOCK_PATTERN, s of the day."""
+    return 3600.0 * int(match[1]) + 60 * int(match[2]) + float(match[3])
 
 
 def _parse_fix(line: bytes, sheet: Sheet) -> dict[str, float]:
@@ -68,7 +151,10 @@ def _parse_fix(line: bytes, sheet: Sheet) -> dict[str, float]:
     if not time or (cells[0] != "A" if is_rmc else cells[4] in ("", "0")):
         sheet.skipped[term("sentences without a fix")] += 1
         return {}
-    fix = {"clock": 3600.0 * int(time[1]) + 60 * int(time[2]) + float(time[3])}
+    if float(time[3]) >= FIRST_SECOND_OF_MINUTE:
+        sheet.skipped[LEAP_SECOND_REASON] += 1
+        return {}
+    fix = {"clock": _clock_s(time)}
     fix |= {"lat": _angle_deg(*cells[is_rmc : 2 + is_rmc]), "lon": _angle_deg(*cells[2 + is_rmc : 4 + is_rmc])}
     if not is_rmc:
         sea, geoid = _parse_number(cells[7]), _parse_number(cells[9])

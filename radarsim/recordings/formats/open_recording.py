@@ -4,6 +4,7 @@ import codecs
 import gzip
 import io
 import os
+import re
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -30,12 +31,16 @@ GZIP_MAGIC = b"\x1f\x8b"  # how gzip begins
 UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 ENCODING_NAMES = {  # as spreadsheets write them
     **dict.fromkeys(("utf-16", "utf-16-le", "utf-16-be"), "UTF-16"),
-    **{"utf-8-sig": "UTF-8", "cp1252": "Windows-1252"},
+    **{"utf-8-sig": "UTF-8", "cp1252": "Windows-1252", "cp1251": "Windows-1251", "koi8-r": "KOI8-R", "cp866": "CP866"},
 }
+CYRILLIC_ENCODINGS = ("cp1251", "koi8-r", "cp866")
+MIN_CYRILLIC_SHARE = 0.7  # of the letters beyond ASCII
+CYRILLIC_WORD = re.compile(r"[А-ЯЁ]?[а-яё]{2,}|[А-ЯЁ]{2,}")  # words have small letters, or are of capitals
 
 
 def detect_encoding(path: str | os.PathLike, fallback: str) -> str:
-    """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8; if it is not UTF-8, the fallback."""
+    """The encoding of a text file: UTF-16 by its mark or zeros, else UTF-8; if it is not UTF-8, the fallback, or a
+    Cyrillic one whose words are found, or Windows-1252."""
     if not os.path.isfile(path):  # a stream is read once
         return fallback or "utf-8-sig"
     with open_unzipped(path) as file:
@@ -51,8 +56,19 @@ def detect_encoding(path: str | os.PathLike, fallback: str) -> str:
                 decoder.decode(piece)
             decoder.decode(b"", final=True)
         except UnicodeDecodeError:
-            return fallback or "cp1252"
+            return fallback or _detect_code_page(head)
     return "utf-8-sig"
+
+
+def _detect_code_page(head: bytes) -> str:
+    """The 8-bit encoding of a text: Cyrillic where almost all of its letters beyond ASCII are in Cyrillic words."""
+    shares = {}
+    for encoding in CYRILLIC_ENCODINGS:
+        text = head.decode(encoding, "replace")
+        foreign = sum(not letter.isascii() for letter in text)
+        shares[encoding] = sum(len(word) for word in CYRILLIC_WORD.findall(text)) / max(foreign, 1)
+    best = max(shares, key=shares.__getitem__)
+    return best if shares[best] > MIN_CYRILLIC_SHARE else "cp1252"
 
 
 @contextmanager
@@ -115,13 +131,10 @@ def detect_format(path: str, head: bytes) -> Format:
         return "json"
     text = b"\0" not in head and sum(byte < 9 or 13 < byte < 32 for byte in head) == 0
     lines = [line for line in head.splitlines() if line.strip() and not line.startswith(b"#")]
-    if text and lines[:1] and lines[0].startswith((b"MSG,", b"STA,", b"AIR,", b"SEL,", b"ID,", b"CLK,")):
-        raise ConfigError(f"{path}:1: must have a header; lines such as MSG,3,… are those of a BaseStation port (SBS): "
-                          "give them one with time, icao24, lat, lon, alt")  # fmt: skip
     if text and lines and any(sign in lines[0] for sign in (b",", b";", b"\t")):
         names = lines[0].lower()
         return "opensky" if b"icao24" in names and b"lat" in names else "csv"
     if not text and asterix.looks_like(head):
         return "asterix"
     raise ConfigError(f"{path}: must be a recording in one of {', '.join(FORMATS)}; its first bytes are of none: "
-                      f"{head[:16].hex(' ')}")  # fmt: skip
+                      f"{head[:16].hex(' ')}; if it is one: --from FORMAT")  # fmt: skip

@@ -13,6 +13,7 @@ import numpy as np
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
 
+NEAR_FIRST_TURN = 1 / 24  # of a clock's period: how near to its turn earlier rows are of the period before
 BATCH_ROWS = 20_000  # records held at a time
 DAY_S = 86400.0
 PLOTS, POSITIONS = "plots", "positions"
@@ -112,23 +113,27 @@ class UnrolledClock:
     are times that fall from, or to, more than near_s from the clock's turn."""
 
     def __init__(self, period_s: float, near_s: float = math.inf):
-        self.period_s, self.near_s, self.turns = period_s, near_s, 0
+        self.period_s, self.near_s, self.turns, self.most_turns = period_s, near_s, 0, 0
         self.last: float | None = None
 
     def __call__(self, t: float) -> float:
         """Unwrapped time of a clock time t (s)."""
         if self.last is not None:
-            is_near_turn = max(t, self.last) >= self.period_s - self.near_s and min(t, self.last) <= self.near_s
-            if is_near_turn and t < self.last - self.period_s / 2:
-                self.turns += 1
-            elif is_near_turn and t > self.last + self.period_s / 2 and self.turns:
-                return t + (self.turns - 1) * self.period_s
+            near_s = self.near_s
+            if t > self.last + self.period_s / 2 and not self.turns:  # before the first turn: rows out of order there
+                near_s = min(near_s, self.period_s * NEAR_FIRST_TURN)
+            is_near_turn = max(t, self.last) >= self.period_s - near_s and min(t, self.last) <= near_s
+            if is_near_turn and abs(t - self.last) > self.period_s / 2:
+                self.turns += 1 if t < self.last else -1
+                self.most_turns = max(self.most_turns, self.turns)
         self.last = t
         return t + self.turns * self.period_s
 
     def notes(self) -> list[str]:
         """A note if midnight has passed on a clock of a day, and how often."""
-        return [tr("the times of day pass midnight: t_s runs on ({turns} × 24 h)", turns=self.turns)] * (self.turns > 0)
+        return [tr("the times of day pass midnight: t_s runs on ({turns} × 24 h)", turns=self.most_turns)] * (
+            self.most_turns > 0
+        )
 
 
 def utc_s(text: str) -> float:

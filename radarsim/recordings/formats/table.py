@@ -1,16 +1,19 @@
 """Positions or plots from a table, row by row, in our quantities and units.
 
 Times are seconds from 1970 (or thousandths and less of them, seen by their size), times of day (unwrapped after
-midnight, or of the day in a column `date`), dates as `20.11.2026 10:00:00,01` or ISO 8601, with or without a zone
-(default UTC). The time is that of the measurement, if the file has several. Assumptions are in `notes`."""
+midnight, or of the day in a column `date`), dates as `20.11.2026 10:00:00,01`, `2026/11/20` or ISO 8601, with or
+without a zone (default UTC), or, where the user says so, day numbers. The time is that of the measurement, if the file
+has several. Assumptions are in `notes`."""
 
 import math
 import re
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
-from radarsim.recordings.formats import columns, records
+from radarsim.recordings.formats import cell_times, columns, records, table_checks
+from radarsim.recordings.formats.cell_times import CLOCK_PATTERN, TIME_FORMATS
 from radarsim.recordings.formats.columns import EARTH_COLUMNS, Header
 from radarsim.recordings.formats.sheet import Sheet
 from radarsim.recordings.row_faults import Faults
@@ -24,10 +27,7 @@ MIDNIGHT_S = 3600.0  # a falling time of day has passed midnight if both are as 
 STILL_MPS = 1.0  # below it a position may stay the same
 MAX_CELL_VALUES = 10_000  # different cells in a column that may name aircraft
 MAX_ALTITUDE_M = 20_000.0  # of an aircraft; higher altitudes are feet
-MAX_TIME_S = 1e11  # greater times are thousandths of seconds, or thousandths of these
-CLOCK_PATTERN = re.compile(r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,:](\d+))?)?")
-DATE_PATTERN = re.compile(r"(\d{1,2})([./])(\d{1,2})\2(\d{4})(?:[ T]+(\S+))?")
-TIME_FORMATS = "a time of day, ISO 8601 or DD.MM.YYYY and a time"
+LEAP_SECOND_REASON = term("rows in a leap second (23:59:60), which seconds from 1970 do not count")
 
 
 class Table:
@@ -42,12 +42,17 @@ class Table:
         self.has_decimal_comma = False  # a comma that cannot has been read
         self.faults = Faults(self.path)
         self.width = len(sheet.header)
-        self.header = Header(self.path, sheet.header, assigned or {})
+        self.header = Header(self.path, sheet.header, assigned or {}, sheet.sample)
         self.columns = self.header.columns
         self.kind = records.POSITIONS if self.header.reads_positions else records.PLOTS
         self.clock = records.UnrolledClock(records.DAY_S, near_s=MIDNIGHT_S)
         self.day_s = math.nan  # of the date read last
         self.unit_s = 1.0  # of times that are too great for seconds
+        self.is_leap_second = False  # of the row
+        self.has_clock_times = False  # times of day or dates were read
+        self.is_checked = False  # whether the first batch has been looked at
+        self.long_step_s: float | None = None  # from row to row of a track, if it is longer than a scan
+        self.flight_level_column = ""  # whose numbers were taken as hundreds of feet
         self.slashed_dates: dict[str, str] = {}  # the first date of 1/2/2024 by what it shows: the order, or nothing
         self.last_positions: dict[str, tuple[float, ...]] = {}  # the last position of each track
         self.has_joint_position = (
@@ -81,6 +86,16 @@ class Table:
         if self.silent_count and "course_deg" in self.columns:
             message = term("reports without speed or course: {count} of {all}")
             lines.append(tr(message, count=self.silent_count, all=self.records))
+        if self.long_step_s is not None:
+            option = f"--column t_ms={shlex.quote(self.columns['t_s'].name)}"
+            message = term("the times are read as s, {step:g} s from row to row; if they are ms: {cure}")
+            lines.append(tr(message, step=self.long_step_s, cure=option))
+        if self.flight_level_column:
+            name = self.flight_level_column
+            cure = f"--column altitude_ft={shlex.quote(name)}"
+            message = term("{name} is read in hundreds of feet: in feet the targets would lie below the horizon; if "
+                           "they do: {cure}")  # fmt: skip
+            lines.append(tr(message, name=name, cure=cure))
         if self.highest_m > MAX_ALTITUDE_M and not self.header.aviation:
             name = (self.columns.get("altitude_m") or self.columns["barometric_m"]).name
             message = term("altitudes up to {highest:.0f} m: if {name} is in feet, name it {name}_ft")
@@ -96,11 +111,15 @@ class Table:
         names = self.header.names
         return ", ".join(tr("{name} ({count} different)", name=names[i], count=count) for i, count in likely)
 
+    @property
+    def is_one_track(self) -> bool:
+        """Whether rows without the name of their track are of one track, as no column may tell several apart."""
+        return "track" in self.columns or self.sheet.is_one_track
+
     def track_question(self, late_count: int) -> str | None:
-        """The question which column identifies the aircraft, if none does and rows are out of order in time."""
-        if not late_count or "track" in self.columns:
+        """The question which column identifies the aircraft, if one may, and rows are out of order in time."""
+        if not late_count or self.is_one_track or not (candidates := self._likely_track_columns()):
             return None
-        candidates = self._likely_track_columns() or "none: each has too many different values"
         rows = "1 row is" if late_count == 1 else f"{late_count} rows are"
         return (
             f"{self.path}: track: no column identifies the tracks, and {rows} not later than the one before; "
@@ -116,14 +135,32 @@ class Table:
             for line, cells in self.sheet.rows:
                 self.line = line
                 self._add_row(cells, builder, row_of)
-                if len(builder) >= records.BATCH_ROWS:
-                    yield builder.take_batch()
+                if len(builder) >= records.BATCH_ROWS and not self.faults:
+                    yield self._checked_batch(builder.take_batch())
         except ConfigError as error:
             raise ConfigError(*self.faults.lines(), *error.lines) from error
         if self.faults:
             raise ConfigError(*self.faults.lines())
         if len(builder):
-            yield builder.take_batch()
+            yield self._checked_batch(builder.take_batch())
+
+    def _checked_batch(self, batch: records.Batch) -> records.Batch:
+        """A batch; the first one shows by its numbers whether times are day numbers, and altitudes flight levels."""
+        if not self.is_checked:
+            self.is_checked = True
+            time = self.columns["t_s"]
+            if time.unit != columns.DAYS and not self.has_clock_times:
+                first_cell = next((row[time.position] for row in self.sheet.sample), f"{batch.columns['t_s'][0]:.15g}")
+                table_checks.refuse_day_numbers(batch, self.path, time.name, "date" in self.columns, first_cell)
+                self.long_step_s = table_checks.long_step_s(batch)
+            if factor := table_checks.flight_level_factor(batch, self.columns):
+                (self.flight_level_column,) = table_checks.assumed_altitude(self.columns)
+                ours = "altitude_m" if "altitude_m" in self.columns else "barometric_m"
+                self.columns[ours] = self.columns[ours]._replace(
+                    factor=self.columns[ours].factor * factor, unit="FL", is_assumed=False
+                )
+                batch.columns["altitude_m"] *= factor
+        return batch
 
     def _add_row(self, cells: list[str], builder: records.BatchBuilder, row_of: RowReader) -> None:
         self.records += 1
@@ -132,6 +169,9 @@ class Table:
             return
         row = row_of(cells)
         if self.faults:  # the rest is only read for further ones
+            return
+        if self.is_leap_second:
+            self.skipped[LEAP_SECOND_REASON] += 1
             return
         if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == records.POSITIONS else (0, 1))):
             self.skipped[records.NO_TIME_OR_POSITION] += 1
@@ -166,8 +206,21 @@ class Table:
 
     def _plot(self, cells: list[str]) -> tuple[float, ...]:
         """PLOT_COLUMNS of a row."""
-        names = ("range_m", "bearing_rad", "velocity_mps", "span_mps")
-        return (self._time(cells), *(self._parse_number(cells, name) for name in names), self._altitude(cells))
+        t, r = self._time(cells), self._parse_number(cells, "range_m")
+        velocity, span = self._parse_number(cells, "velocity_mps"), self._parse_number(cells, "span_mps")
+        return t, r, self._bearing(cells), velocity, span, self._altitude(cells)
+
+    def _bearing(self, cells: list[str]) -> float:
+        """The bearing, rad; beyond a full turn by noise it is turned back."""
+        bearing = self._parse_number(cells, "bearing_rad")
+        if abs(bearing) > 2 * math.pi:
+            if not -2 * math.pi <= bearing <= 4 * math.pi:
+                column = self.columns["bearing_rad"]
+                must = f"must be within a turn, in {column.unit}"
+                cure = f"counts of {columns.AZIMUTH_COUNTS} a turn: --column bearing_acp={shlex.quote(column.name)}"
+                self._add_fault("bearing_rad", must, repr(cells[column.position].strip()[:60]), cure)
+            return bearing % (2 * math.pi)
+        return bearing
 
     def _altitude(self, cells: list[str]) -> float:
         """The geometric altitude, m; where there is none the barometric one; of a ship 0."""
@@ -183,6 +236,7 @@ class Table:
         """Seconds from 1970; of a time of day without a date, from the first midnight."""
         column = self.columns["t_s"]
         text = cells[column.position].strip()
+        self.is_leap_second = False
         if not text or text.lower() in MISSING_TEXTS:
             return math.nan
         try:
@@ -190,42 +244,67 @@ class Table:
                 t = float(self._with_decimal_point(text)) * column.factor
             except ValueError:
                 return self._parse_time(text, cells)
-            return self._date_time_of_day(t, cells) if 0 <= t < records.DAY_S else self._scale_time(t)
+            if column.unit == columns.DAYS:
+                is_time_of_day = 0 <= t < 1
+                return self._at_date(t * records.DAY_S, cells) if is_time_of_day else cell_times.day_number_s(t)
+            return self._at_date(t, cells) if 0 <= t < records.DAY_S else self._scale_time(t)
         except ValueError:
             self._add_fault("t_s", f"must be a time in s, {TIME_FORMATS}", repr(text[:60]))
             return math.nan
 
-    def _date_time_of_day(self, t: float, cells: list[str]) -> float:
+    def _at_date(self, t: float, cells: list[str]) -> float:
         """A time of day, s, at the date beside it or before it; unrolled where the table has no date."""
         if "date" not in self.columns:
             return self.clock(t)
         if date := cells[self.columns["date"].position].strip():
-            self.day_s = self._parse_time(date, cells)
+            try:
+                self.day_s = self._parse_date(date, cells)
+            except ValueError:
+                must = "must be a date, as DD.MM.YYYY, YYYY/MM/DD or ISO 8601"
+                self._add_fault("date", must, repr(date[:60]))
+                self.day_s = math.nan
         return self.day_s + t
 
+    def _parse_date(self, text: str, cells: list[str]) -> float:
+        """Seconds from 1970 of a date, which a spreadsheet may have as a day number; raises ValueError."""
+        try:
+            days = float(self._with_decimal_point(text))
+        except ValueError:
+            return self._parse_time(text, cells)
+        if cell_times.day_numbers_of(days) in ("", cell_times.FRACTIONS_OF_DAY):
+            return self._parse_time(text, cells)  # 20261120
+        return cell_times.day_number_s(math.floor(days))
+
     def _scale_time(self, t: float) -> float:
-        """A time that may be in ms, µs or ns; raises ValueError for one that is none."""
-        if abs(t) < MAX_TIME_S:
-            return t
-        unit = next((unit for unit in (1e-3, 1e-6, 1e-9) if abs(t * unit) < MAX_TIME_S), None)
-        if unit is None:
-            raise ValueError(t)
-        self.unit_s = min(self.unit_s, unit)
-        return t * unit
+        """A time that may be in ms, µs or ns; one that is none of 1990 to 2100 is a fault."""
+        scaled = cell_times.scaled_time(t)
+        if scaled is None:
+            name = shlex.quote(self.columns["t_s"].name)
+            cure = f"its unit is stated by --column t_ms={name}, t_us={name} or t_ns={name}"
+            must = "must be a time in s, or in ms, µs or ns from 1970"
+            self._add_fault("t_s", must, f"{t:.15g}", cure)
+            return math.nan
+        self.unit_s = min(self.unit_s, scaled[1])
+        return scaled[0]
 
     def _parse_time(self, text: str, cells: list[str]) -> float:
         """Seconds of a time of day, a date, or both, `20.11.2026 10:00:00` or ISO 8601; raises ValueError."""
+        self.has_clock_times = True
+        if cell_times.LEAP_SECOND_PATTERN.search(text):
+            self.is_leap_second = True
+            return math.nan
         if day := CLOCK_PATTERN.fullmatch(text):
             self.of_day = "date" not in self.columns
-            return self._date_time_of_day(_second_of_day(day), cells)
-        if not (match := DATE_PATTERN.fullmatch(text)):
+            return self._at_date(cell_times.second_of_day(day), cells)
+        if match := cell_times.YEAR_FIRST_PATTERN.fullmatch(text):
+            year, _, month, day_of, clock = match.groups(default="0:00")
+            return cell_times.date_s(year, month, day_of, clock)
+        if not (match := cell_times.DATE_PATTERN.fullmatch(text)):
             return records.utc_s(text.removesuffix("UTC").rstrip())
         day_of, sign, month, year, clock = match.groups(default="0:00")
-        if not (time := CLOCK_PATTERN.fullmatch(clock)):
-            raise ValueError(text)
         if sign == "/" and self._is_month_first(int(day_of), int(month), text):
             day_of, month = month, day_of
-        return records.utc_s(f"{year}-{int(month):02}-{int(day_of):02}") + _second_of_day(time)
+        return cell_times.date_s(year, month, day_of, clock)
 
     def _is_month_first(self, first: int, second: int, text: str) -> bool:
         """Whether the first number of a date with slashes is the month: where no date tells, it is the day."""
@@ -269,14 +348,6 @@ class Table:
         return text.replace(",", ".")
 
     def _add_fault(self, ours: str, must: str, got: str, cure: str = "") -> None:
-        column = self.columns[ours]
+        column, always = self.columns[ours], bool(cure)
         cure = cure or f"if this is not {ours}, name the column: --column {ours}=THEIRS"
-        self.faults.add(self.line, f"{column.position + 1}: {column.name}:", must, got, cure)
-
-
-def _second_of_day(match: re.Match) -> float:
-    """A time matched by CLOCK_PATTERN, s after midnight; raises ValueError for an impossible one."""
-    hours, minutes, seconds, fraction = match.groups(default="0")
-    if int(hours) > 23 or int(minutes) > 59 or int(seconds) > 60:
-        raise ValueError(match[0])
-    return 3600 * int(hours) + 60 * int(minutes) + float(f"{int(seconds)}.{fraction}")
+        self.faults.add(self.line, f"{column.position + 1}: {column.name}:", must, got, cure, always)

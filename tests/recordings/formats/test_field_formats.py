@@ -1,0 +1,162 @@
+"""Formats of the field: a ship's radar, a receiver's port, German and Russian tables, airports' recordings."""
+
+import re
+
+import numpy as np
+import pytest
+
+from radarsim.recordings.formats.import_options import Options
+from radarsim.recordings.formats.open_recording import detect_format
+from tests.recordings.formats.example_files import SITE, block, imported, plot_048, refused
+from tests.recordings.formats.test_importing import NM
+from tests.recordings.formats.test_logs import sentence
+
+KNOT_MPS = NM / 3600
+AT = Options(site=SITE)
+
+
+def target(k, number=1, reference="T", bearing=200.0, unit="N", status="T", time=True):
+    """A target that a ship's radar tracks, 5 + 0.05 k miles away, at 10 s a turn."""
+    clock = f"1200{k:02}.50" if time else ""
+    return sentence(
+        f"RATTM,{number:02},{5 + 0.05 * k:.2f},{bearing:.1f},{reference},6.0,90.0,T,0.1,5.0,{unit},T{number},{status},,"
+        f"{clock},A"
+    )
+
+
+def own(k):
+    return sentence(f"GPRMC,1200{k:02}.00,A,5236.300000,N,00445.600000,E,0.0,0.0,310124,,,A")
+
+
+def test_targets_of_a_ships_radar_are_its_plots(tmp_path):
+    """Beside its own positions, which give the date; a lost target and a damaged sentence are left out."""
+    lines = [text for k in range(20) for text in (own(k), target(k), target(k, 2, bearing=10.0 + k))]
+    lines += [target(21, status="L"), target(22).replace("6.1", "6.2")]
+    done, columns, tracks = imported(tmp_path, "".join(lines).encode(), Options(zero=1_706_702_400.0))
+    assert (done.format, tracks) == ("nmea", ["01", "02"] * 20)
+    np.testing.assert_array_equal(columns["t_s"][::2], 0.5 + np.arange(20))  # from 12:00 on 31 January 2024
+    np.testing.assert_allclose(columns["range_m"][::2], NM * (5 + 0.05 * np.arange(20)), rtol=0, atol=NM * 1e-12)
+    np.testing.assert_allclose(columns["bearing_rad"][1::2], np.radians(10.0 + np.arange(20)), rtol=1e-15)
+    assert sorted(done.skipped) == [
+        "damaged sentences (1)",
+        "positions of the ship itself, beside its radar's targets (20)",
+        "targets that the radar has lost (1)",
+    ]
+
+
+def test_bearings_from_the_bow_need_a_heading(tmp_path):
+    """The heading is 350°; kilometres, and no time but that of the position before."""
+    text = own(0) + target(1, reference="R", unit="K") + sentence("HEHDT,350.0,T")
+    text += "".join(own(k) + target(k, reference="R", unit="K", time=False) for k in range(2, 5))
+    done, columns, _ = imported(tmp_path, text.encode())
+    np.testing.assert_allclose(columns["range_m"], [5100, 5150, 5200], rtol=1e-15)
+    np.testing.assert_allclose(columns["bearing_rad"], np.radians(190), rtol=1e-15)
+    np.testing.assert_array_equal(columns["t_s"], [0, 1, 2])
+    assert "targets by the bow, whose heading no sentence HDT states (1)" in done.skipped
+
+
+FIELDS = (
+    "MessageType,TransmissionType,SessionID,AircraftID,HexIdent,FlightID,DateMessageGenerated,TimeMessageGenerated,"
+    "DateMessageLogged,TimeMessageLogged,Callsign,Altitude,GroundSpeed,Track,Latitude,Longitude,VerticalRate,Squawk,"
+    "Alert,Emergency,SPI,IsOnGround\n"
+)
+
+
+@pytest.mark.parametrize("header", ["", FIELDS])
+def test_a_basestation_port_is_read_as_it_is(tmp_path, header):
+    lines = []
+    for k in range(10):
+        when = f"2024/12/31,23:59:{50 + k}.250,2025/01/01,00:59:{50 + k}.900"
+        lines += [f"MSG,3,1,1,484164,1,{when},,38000,,,{52.5 + 0.002 * k:.5f},4.76,,,0,0,0,0"]
+        lines += [f"MSG,4,1,1,484164,1,{when},,,400,0,,,0,,,,,", "STA,,5,179,400AE7,10103,2024/12/31,23:59:55.000,,,RM"]
+    done, columns, tracks = imported(tmp_path, (header + "\n".join(lines)).encode(), AT)
+    assert set(tracks) == {"484164"}
+    np.testing.assert_array_equal(columns["t_s"], np.arange(10))
+    np.testing.assert_allclose(columns["altitude_m"], 38_000 * 0.3048, rtol=1e-15)
+    assert done.skipped == ["messages without a position (20)"]
+    assert "s after 1970" in (tmp_path / "plots.csv").read_text()
+
+
+def german(header):
+    """A boat that comes nearer at 6 m/s, with decimal commas."""
+    rows = [f"{2.5 * k};{9.0 - 0.015 * k:.3f};{45.0};{-6 / KNOT_MPS:.3f}" for k in range(30)]
+    return "\n".join([header, *(row.replace(".", ",") for row in rows), ""])
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Zeit;Entf_km;Azimut [Grad];Vr_kn",
+        "Zeit, s;Entfernung, km;Peilung, deg;Radialgeschwindigkeit, Knoten",
+        "Время, с;Дальность, км;Азимут, град;Радиальная скорость, уз",
+        "ВРЕМЯ;ДАЛЬНОСТЬ [КМ];ПЕЛЕНГ (ГРАД);Vr, уз",
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1251"])
+def test_tables_of_german_and_russian_engineers(tmp_path, header, encoding):
+    done, columns, _ = imported(tmp_path, german(header).encode(encoding), Options())
+    np.testing.assert_allclose(columns["range_m"], 9000 - 15.0 * np.arange(30), rtol=1e-15)
+    np.testing.assert_allclose(columns["bearing_rad"], np.pi / 4, rtol=1e-15)
+    np.testing.assert_allclose(columns["velocity_mps"], -6, rtol=0, atol=KNOT_MPS * 0.0005)
+    page = [note for note in done.notes if "the text is read as" in note]
+    is_cyrillic = not header.isascii()
+    assert [re.findall("Windows-1251", note) for note in page] == [["Windows-1251"]] * (
+        encoding == "cp1251" and is_cyrillic
+    )
+
+
+def test_german_umlauts_are_no_cyrillic(tmp_path):
+    text = "Zeit;Entfernung [km];Höhe [m];Größe;Prüfung\n0;5,1;100;groß;süß\n4;5,2;100;mäßig;öde\n"
+    done, columns, _ = imported(tmp_path, text.encode("cp1252"))
+    assert columns["altitude_m"].tolist() == [100, 100]
+    assert any("Windows-1252" in note for note in done.notes)
+
+
+def test_commas_separate_where_semicolons_stand_in_cells(tmp_path):
+    _, columns, _ = imported(tmp_path, b"time,range_m,note; remark\n0,5,a; b\n4,6,c; d\n")
+    assert columns["range_m"].tolist() == [5, 6]
+
+
+def test_a_refused_header_comes_with_the_options_that_read_it(tmp_path):
+    """All that is missing at once; the options, copied, import the file."""
+    text = "tim;dist;dop;azm\n0,0;7945,2;-6,1;44,9\n2,5;7930,1;-6,2;45,0\n5,0;7914,1;-6,2;45,0\n"
+    (line,) = refused(tmp_path, text.encode())
+    options = dict(re.findall(r"--column (\S+)=(\S+)", line.partition("perhaps")[2]))
+    assert options == {"t_s": "tim", "range_m": "dist", "velocity_mps": "dop", "bearing_deg": "azm"}
+    _, columns, _ = imported(tmp_path, text.encode(), Options(columns=options))
+    assert columns["range_m"].tolist() == [7945.2, 7930.1, 7914.1]
+
+
+@pytest.mark.parametrize(
+    ("row", "place"),
+    [("2024/19/09,12:00:00.250", "2:1: Date: must be a date"), ("2024/12/09,noon", "2:2: Time: must be a time in s")],
+)
+def test_the_cell_at_fault_is_blamed(tmp_path, row, place):
+    (line,) = refused(tmp_path, f"Date,Time,range_m\n{row},5\n".encode())
+    assert f"recording:{place}" in line
+    assert line.endswith(f"got '{row.split(',')[int(place[2]) - 1]}'")
+
+
+@pytest.mark.parametrize("text", ["2024/12/09 12:00:{:02}", "2024.12.09 12:00:{:02}.000", "2024/12/9 12:00:{:02}"])
+def test_dates_may_begin_with_the_year(tmp_path, text):
+    rows = "".join(f"{text.format(2 * k)},{5 + k}\n" for k in range(3))
+    _, columns, _ = imported(tmp_path, f"time,range_m\n{rows}".encode(), Options(zero=1_733_745_600.0))
+    np.testing.assert_array_equal(columns["t_s"], [0, 2, 4])
+
+
+@pytest.mark.parametrize("category", [2, 7, 10, 11, 19, 23, 150, 240, 247])
+def test_asterix_may_begin_with_any_category(tmp_path, category):
+    data = block(category, bytes([0x80, 25, 1])) + b"".join(
+        block(48, plot_048(100 + 4 * k, 12_800 + k, track=1)) for k in range(5)
+    )
+    if category == 2:
+        data = block(2, b"\xb0\x19\x0a\x02" + (100 * 128).to_bytes(3, "big")) + data[len(block(2, b"abc")) :]
+    assert detect_format("x", data) == "asterix"
+    _, columns, _ = imported(tmp_path, data)
+    np.testing.assert_array_equal(columns["t_s"], 4 * np.arange(5))
+
+
+def test_bytes_of_no_kind_name_the_option(tmp_path):
+    (line,) = refused(tmp_path, b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
+    assert "its first bytes are of none" in line
+    assert line.endswith("if it is one: --from FORMAT")
