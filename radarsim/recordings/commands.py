@@ -110,16 +110,18 @@ def simulate(
     help="Subtract a bias that `radarsim register` found: range_m, range_scale, bearing_deg or time_s; repeatable.",
 )
 @click.option(
-    "--encoding", default="", metavar="NAME", help="Of text that is not UTF-8, as cp1251; default: Windows-1252."
+    "--encoding", default="", metavar="NAME", help="Of text that is not UTF-8, as cp1251; default: recognised."
 )
 @click.option(
     "--keep-marked", is_flag=True, help="Keep test targets, field monitors and coasted records in tracks and truth."
 )
+@click.option("--allow-loss", is_flag=True, help="Import even if over a tenth of the rows must be left out.")
 def import_(recording: str, output: str, **arguments: Any) -> None:
     """Read ASTERIX, ADS-B, AIS, GPS or a table into plots.
 
     PLOTS.csv has one row per plot and all tracks of the recording, each named in the column `track`; `radarsim track`
-    and `radarsim fit` read it. Its first lines describe the columns. For a damaged recording nothing is written.
+    and `radarsim fit` read it. Its first lines describe the columns. Rows out of order are sorted by time. For a
+    damaged recording, or one with numbers that no target has, nothing is written.
 
     \b
     asterix  categories 048 and 001 (plots of a radar: range, bearing, height, Doppler speed
@@ -129,9 +131,11 @@ def import_(recording: str, output: str, **arguments: Any) -> None:
              the column names are those of aviation (gs, alt, …)
     json     traces and aircraft.json of readsb, states of OpenSky, data frames
     ais      sentences !AIVDM of ships; needs radarsim[ais]
-    gpx      tracks of GPX; nmea: $GPRMC and $GPGGA of a satellite receiver
-    csv      any table with a header: time, and range or latitude and longitude; units as in
-             `range_km` or `Altitude [ft]`; separated by commas, semicolons or tabs;
+    gpx      tracks of GPX; nmea: $GPRMC and $GPGGA of a satellite receiver, or
+             $RATTM, the targets of a ship's radar
+    csv      any table with a header, in English, German or Russian: time, and range or
+             latitude and longitude; units as in `range_km` or `Altitude [ft]`; separated by
+             commas, semicolons or tabs; lines of a BaseStation port (MSG,…);
              parquet: the same, needs radarsim[parquet]
 
     All positions on the earth need --at. Files may be gzipped.
@@ -154,6 +158,7 @@ def import_(recording: str, output: str, **arguments: Any) -> None:
         *(
             import_options.check_encoding(arguments["encoding"]),
             arguments["keep_marked"],
+            arguments["allow_loss"],
             import_options.parse_biases(arguments["biases"]),
         ),
     )

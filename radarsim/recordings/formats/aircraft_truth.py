@@ -25,8 +25,10 @@ from radarsim.recordings.formats.asterix import Asterix
 from radarsim.recordings.formats.import_options import Options
 from radarsim.recordings.formats.open_recording import open_recording
 from radarsim.recordings.formats.records import DAY_S, PLOTS, Batch, Reader
+from radarsim.recordings.formats.site_distance import without_no_fix
 from radarsim.recordings.formats.sites import position_columns
 from radarsim.recordings.grouping import rows_by_name
+from radarsim.recordings.time_spans import TimeSpan, meeting_text
 
 MAX_LISTED = 12
 LOCAL_COLUMNS = ("x_m", "y_m", "z_m")
@@ -46,6 +48,8 @@ class AircraftTruth:
         self.paths = AircraftPaths()
         self.owner, self.truth_tracks = options.owner, set[str]()
         self.of_day = False
+        self.times = [math.inf, -math.inf]  # the first and last of the positions, and of the plots
+        self.plot_times = [math.inf, -math.inf]
         if self.is_same_file:
             self._read_own(path, options)
         else:
@@ -81,6 +85,8 @@ class AircraftTruth:
             self.of_day = reader.of_day
             if batch.kind == PLOTS:
                 continue
+            batch, _ = without_no_fix(batch, self.site)
+            _widen(self.times, batch.columns["t_s"])
             measured = self.site.measure(batch.columns)
             table = np.stack([batch.columns["t_s"], *(measured[name] for name in LOCAL_COLUMNS)], axis=-1)
             self.truth_tracks.update(batch.track)
@@ -92,6 +98,7 @@ class AircraftTruth:
             return {}
         if reader.of_day != self.of_day:
             self.paths.period_s = DAY_S
+        _widen(self.plot_times, batch.columns["t_s"])
         states = np.empty((len(batch.track), 6))
         for radar, rows in rows_by_name(batch.radar).items():
             site, part = self.sites.get(radar, self.site), batch.rows(rows.tolist())
@@ -124,7 +131,8 @@ class AircraftTruth:
             )
             faults.append(f"truth: no plot has the address, the callsign or the code of an aircraft in it at that time "
                          f"and place; it has {', '.join(names[:MAX_LISTED])}{ellipsis}, the plots "
-                         f"{', '.join(list(filter(None, plots))[:MAX_LISTED]) or 'no names'}")  # fmt: skip
+                         f"{', '.join(list(filter(None, plots))[:MAX_LISTED]) or 'no names'}"
+                         f"{meeting_text(_time_span(self.plot_times), _time_span(self.times))}")  # fmt: skip
         for number, parts in self.offsets_by_path.items():
             offsets = np.concatenate(parts)
             if are_far(offsets[:, :2], offsets[:, 2]):
@@ -146,3 +154,13 @@ class AircraftTruth:
             "truth: of {count} of {all} plots ({share:.0f} %; by {by}), which lie {distance} from it (median)"
         )
         return [tr(message, count=len(offsets), all=self.rows, share=100 * len(offsets) / self.rows, **fields)]
+
+
+def _time_span(times: list[float]) -> TimeSpan:
+    return TimeSpan(times[0], times[1])
+
+
+def _widen(span: list[float], t: np.ndarray) -> None:
+    """Widen a first and last time by times (n,), in place."""
+    if len(t):
+        span[:] = min(span[0], float(t.min())), max(span[1], float(t.max()))

@@ -24,7 +24,8 @@ class Options:
     to write, all where empty. zero: origin of t_s, "first" (record), "midnight" (of the first record's day, UTC) or s
     from 1970. truth: a second recording, of positions. towards: Doppler speeds are positive where the range falls.
     columns: of a CSV, theirs by ours. encoding: of text that is neither UTF-8 nor UTF-16, Windows-1252 where none is
-    named. keep_marked: records of no aircraft (asterix.NO_AIRCRAFT) are in tracks and truth too. whose: the track,
+    named. keep_marked: records of no aircraft (asterix.NO_AIRCRAFT) are in tracks and truth too. allow_loss: more than
+    a tenth of the rows may be left out. whose: the track,
     address, callsign or code of the plots whose truth is the one path of the second recording, for receivers that know
     nothing of these. biases: of plots, by BIASES, to be subtracted."""
 
@@ -40,6 +41,7 @@ class Options:
     columns: Mapping[str, str] = field(default_factory=dict)
     encoding: str = ""
     keep_marked: bool = False
+    allow_loss: bool = False
     biases: Mapping[str, float] = field(default_factory=dict)
 
     @property

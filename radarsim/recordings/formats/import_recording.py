@@ -1,7 +1,8 @@
 """Import a recording as a CSV file of plots (`radarsim import`).
 
 Records are read, placed and written in batches, so that memory does not grow with the file; only the truth is kept in
-memory, to be looked up by time. The file is written completely or not at all."""
+memory, to be looked up by time. A recording whose rows are out of order, or jump, is read again as a whole and sorted.
+The file is written completely or not at all."""
 
 import datetime
 import math
@@ -15,21 +16,30 @@ import numpy as np
 from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
 from radarsim.language.translate import term, tr
+from radarsim.recordings import target_speed
 from radarsim.recordings.csv_rows import column_texts
-from radarsim.recordings.formats import asterix, asterix_decode
+from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
 from radarsim.recordings.formats.asterix import Asterix
 from radarsim.recordings.formats.doppler_check import DopplerCheck
 from radarsim.recordings.formats.import_options import Format, Options
 from radarsim.recordings.formats.open_recording import open_recording
-from radarsim.recordings.formats.records import BIASES, DAY_S, PLOTS, POSITIONS, Batch, Reader, skip_counts
+from radarsim.recordings.formats.records import BATCH_ROWS, BIASES, DAY_S, PLOTS, POSITIONS, Batch, Reader, skip_counts
+from radarsim.recordings.formats.row_order import SAME_TIME_REASON, LaterRows, NeedsAllRows
+from radarsim.recordings.formats.site_distance import NO_FIX_REASON, SiteDistance, without_no_fix
 from radarsim.recordings.formats.sites import Site, antenna_angles, position_columns
 from radarsim.recordings.formats.table import Table
 from radarsim.recordings.grouping import rows_by_name
+from radarsim.recordings.target_speed import FastestLegs, TrackPositions
+from radarsim.recordings.time_spans import MIN_DATED_S
 from radarsim.report.atomic_files import Writer
 
 MAX_SITE_DISTANCE_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
-NOT_LATER_REASON = term("rows not later than the one before of their track")
+NO_SITE_FAULT = (
+    "at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions on the earth, not ranges"
+)
+MAX_LOSS = 0.1  # of the rows that may be left out because of others
+UNREACHABLE_REASON = term("rows that no target reaches from those beside them")
 UNKNOWN_RADAR_REASON = term("rows of radar #/#, whose place neither it nor --at says")
 OTHER_KIND_REASONS = {PLOTS: term("plots beside positions"), POSITIONS: term("positions beside plots")}
 SEA_LEVEL_NOTE = term("positions without altitude, placed at sea level: {count} of {all}")
@@ -40,7 +50,6 @@ BEHIND_ANTENNA_NOTE = term(
     "plots behind the antenna or without height: {count} of {all}; elevation_rad and azimuth_rad are empty there"
 )
 NO_TRACK_NOTE = term("plots of no track, which `radarsim track` skips: {count} of {all}")
-MIN_DATED_S = 1e8  # since 1970; smaller times count from anywhere
 MEASURED_COLUMNS = ("range_m", "bearing_rad", "velocity_mps")
 
 
@@ -67,12 +76,23 @@ def import_recording(
 
     progress is called from time to time with the number of records read."""
     path = os.fspath(source)
+    try:
+        return _import_rows(path, output, options, progress, not os.path.isfile(path))  # a stream is read once
+    except NeedsAllRows:
+        return _import_rows(path, output, options, progress, True)
+
+
+def _import_rows(
+    path: str, output: str | os.PathLike, options: Options, progress: Callable[[int], None], all_at_once: bool
+) -> ImportResult:
+    """Import a recording, batch by batch or all at once; raises NeedsAllRows where that is needed."""
     with open_recording(path, options) as (format_, reader):
         options, contradictions = add_stated_sites(options, reader)
         if options.truth and not (options.site or options.sites):
             raise ConfigError("truth: needs the place of the radar, --at LAT,LON,HEIGHT")
-        truth = AircraftTruth(path, options) if options.site or options.sites else None
-        work = _Import(format_, reader, options, truth)
+        has_truth = bool(options.site or options.sites) and (options.truth or not _lacks_full_times(reader))
+        truth = AircraftTruth(path, options) if has_truth else None
+        work = _Import(format_, reader, options, truth, all_at_once)
         with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
             first = True
             for rows in work.rows():
@@ -88,6 +108,11 @@ def import_recording(
     result = work.finish()
     result.notes = contradictions + result.notes
     return result
+
+
+def _lacks_full_times(reader: Reader) -> bool:
+    """Whether a recording is known to state only the last part of its times."""
+    return isinstance(reader, Asterix) and reader.lacks_full_times
 
 
 def add_stated_sites(options: Options, reader: Reader) -> tuple[Options, list[str]]:
@@ -107,23 +132,40 @@ def add_stated_sites(options: Options, reader: Reader) -> tuple[Options, list[st
 class _Import:
     """An import in progress: batches in, rows out."""
 
-    def __init__(self, format_: Format, reader: Reader, options: Options, truth: "AircraftTruth | None"):
-        self.reader, self.options, self.truth = reader, options, truth
+    def __init__(
+        self, format_: Format, reader: Reader, options: Options, truth: "AircraftTruth | None", all_at_once: bool
+    ):
+        self.reader, self.options, self.truth, self.all_at_once = reader, options, truth, all_at_once
         self.result = ImportResult(format_)
         self.kind: str | None = None  # of the rows
         self.zero: float | None = None
         self.tracks_are_addresses: bool | None = (
             None  # whether tracks are addresses, and nothing else identifies an aircraft
         )
-        self.last_times: dict[str, float] = {}
         self.skipped = reader.skipped
+        self.later_rows = LaterRows(self.skipped, all_at_once)
+        self.legs = FastestLegs()
+        self.site_distance = None if options.only_site is None else SiteDistance(options.only_site)
+        self.impossible_speed: float | None = None  # of most targets, m/s
+        self.disordered_count = 0  # rows that were earlier, unless the newest came first
         self.radars = Counter[str]()
         self.note_counts = Counter[str]()  # by what a note says of these rows
         self.doppler = DopplerCheck()
         self.track_names: set[str] = set()
 
     def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
-        """The rows of the output, in batches."""
+        """The rows of the output, in batches; raises NeedsAllRows."""
+        for batch in self._sorted_batches() if self.all_at_once else self._requested_batches():
+            selected = self.later_rows.select(batch)
+            if selected.track:
+                if selected.kind == PLOTS:
+                    self.radars.update(selected.radar)
+                for track, count in Counter(selected.track).items():
+                    self.result.tracks[track] = self.result.tracks.get(track, 0) + count
+                yield self._row_texts(selected)
+
+    def _requested_batches(self) -> Iterator[Batch]:
+        """The records of one kind that are requested, corrected, in the order of the file."""
         for batch in self.reader.batches():
             if self.kind is None:
                 has_plots = (
@@ -134,9 +176,52 @@ class _Import:
                 if batch.kind == PLOTS or self.truth is None or not self.truth.is_same_file:
                     self.skipped[OTHER_KIND_REASONS[batch.kind]] += len(batch.track)
                 continue
-            selected = self._select_rows(self._correct(batch))
-            if selected.track:
-                yield self._row_texts(selected)
+            fixes, no_fix_count = without_no_fix(self._correct(batch), self.options.only_site)
+            if no_fix_count:
+                self.skipped[NO_FIX_REASON] += no_fix_count
+            yield self._select_rows(fixes)
+
+    def _sorted_batches(self) -> Iterator[Batch]:
+        """All requested records in the order of time, without those that no target reaches."""
+        batches = [batch for batch in self._requested_batches() if batch.track]
+        if not batches:
+            return
+        batch, notes, is_falling = row_order.sort_rows(row_order.join_batches(batches))
+        self.result.notes += notes
+        self.disordered_count = 0 if is_falling else len(notes)
+        batch = self._reachable_rows(batch)
+        for first in range(0, len(batch.track), BATCH_ROWS):
+            yield batch.rows(list(range(first, min(first + BATCH_ROWS, len(batch.track)))))
+
+    def _reachable_rows(self, batch: Batch) -> Batch:
+        """The rows of a whole recording without those that no target reaches; also finds where most are such."""
+        positions, is_reachable = self._positions(batch), np.ones(len(batch.track), dtype=bool)
+        tracks = []
+        for name, rows in rows_by_name(batch.track).items():
+            if name:
+                track = TrackPositions(batch.columns["t_s"][rows], positions[rows])
+                unreachable = target_speed.unreachable_rows(track)
+                is_reachable[rows[unreachable]] = False
+                tracks.append(track)
+        if isinstance(self.reader, Table) and self.reader.track_question(1):  # it may be of several targets
+            is_repeated = any((np.diff(track.t_s) == 0).any() for track in tracks)
+            if is_repeated or (~is_reachable).mean() > MAX_LOSS:
+                return batch
+        self.impossible_speed = target_speed.impossible_speed(tracks)
+        if not is_reachable.all():
+            self.skipped[UNREACHABLE_REASON] += int((~is_reachable).sum())
+            batch = batch.rows(np.flatnonzero(is_reachable).tolist())
+        return batch
+
+    def _positions(self, batch: Batch, measured: Mapping[str, np.ndarray] | None = None) -> np.ndarray:
+        """Positions (n, d) of rows, m; of plots without bearings their ranges; measured: of positions, if known."""
+        if batch.kind == POSITIONS:
+            if self.options.only_site is None:
+                raise ConfigError(NO_SITE_FAULT)
+            measured = measured or self.options.only_site.measure(batch.columns)
+            return np.stack([measured[name] for name in ("x_m", "z_m")], axis=1)  # heights may be missing
+        r, b = batch.columns["range_m"], batch.columns["bearing_rad"]
+        return r[:, None] if np.isnan(b).any() else np.stack([r * np.cos(b), r * np.sin(b)], axis=1)
 
     def _correct(self, batch: Batch) -> Batch:
         """A batch without the biases of the radar, with its sign of the Doppler speed turned, without spans of 0, and
@@ -159,26 +244,22 @@ class _Import:
         return batch
 
     def _select_rows(self, batch: Batch) -> Batch:
-        """Select the records of a batch that are requested, and later than the last of their track."""
-        requested, rows = set(self.options.tracks), []
-        times = batch.columns["t_s"].tolist()
-        for i, (track, radar, t) in enumerate(zip(batch.track, batch.radar, times, strict=True)):
-            if len(self.track_names) < MAX_LISTED:
-                self.track_names.add(track)
-            if self.options.sites and batch.kind == PLOTS and radar not in self.options.sites:
+        """The records of a batch that are requested."""
+        if len(self.track_names) < MAX_LISTED:
+            self.track_names.update(batch.track)
+        requested, sites = set(self.options.tracks), self.options.sites if batch.kind == PLOTS else {}
+        if not requested and not sites:
+            return batch
+        rows = []
+        for i, (track, radar) in enumerate(zip(batch.track, batch.radar, strict=True)):
+            if sites and radar not in sites:
                 self.skipped[
                     UNKNOWN_RADAR_REASON.replace("#/#", radar) if radar else term("rows of a radar without a name")
                 ] += 1
             elif requested and track not in requested:
                 self.skipped[term("rows of other tracks")] += 1
-            elif track and t <= self.last_times.get(track, -math.inf):
-                self.skipped[NOT_LATER_REASON] += 1
             else:
                 rows.append(i)
-                self.last_times[track] = t
-                if batch.kind == PLOTS:
-                    self.radars[radar] += 1
-                self.result.tracks[track] = self.result.tracks.get(track, 0) + 1
         return batch.rows(rows)
 
     def _row_texts(self, batch: Batch) -> Iterable[tuple[str, ...]]:
@@ -187,6 +268,10 @@ class _Import:
         if self.zero is None:
             self.zero = self._time_zero(float(t[0]))
         columns = {"t_s": t - self.zero} | self._add_places(batch)
+        if not self.all_at_once and self.legs.has_jump(batch.track, t, self._positions(batch, columns)):
+            raise NeedsAllRows
+        if self.site_distance and batch.kind == POSITIONS:
+            self.site_distance.add(batch)
         if batch.kind == PLOTS:
             self.doppler.add(batch)
         if self.truth is not None:
@@ -219,8 +304,7 @@ class _Import:
         site, batch_columns = self.options.only_site, batch.columns
         if batch.kind == POSITIONS:
             if site is None:
-                raise ConfigError("at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions "
-                                  "on the earth, not ranges")  # fmt: skip
+                raise ConfigError(NO_SITE_FAULT)
             measured = site.measure(batch_columns)
             self.note_counts[SEA_LEVEL_NOTE] += int(np.isnan(batch_columns["altitude_m"]).sum())
             columns = {name: measured[name] for name in (*MEASURED_COLUMNS, "level_elevation_rad", *LOCAL_COLUMNS)}
@@ -262,7 +346,8 @@ class _Import:
         if not isinstance(zero, str):
             zero = datetime.datetime.fromtimestamp(zero, datetime.UTC).isoformat()
         origin = {"first": "the first record", "midnight": "midnight (UTC) before the first record"}.get(zero, zero)
-        epoch = "midnight" if self.reader.of_day else "1970" if is_dated else "the start of its clock"
+        is_of_day = self.reader.of_day and not _lacks_full_times(self.reader)
+        epoch = "midnight" if is_of_day else "1970" if is_dated else "the start of its clock"
         lines = [
             f"# made by radarsim import from a recording in the format {self.result.format}",
             f"# t_s: seconds from {origin} ({self.zero!r} s after {epoch}); {track_line}",
@@ -301,11 +386,32 @@ class _Import:
             names = ", ".join(self.radars)
             faults.append(f"at: must say where each radar stands whose plots are wanted, --at SAC/SIC=LAT,LON,HEIGHT: "
                          f"{path} has plots of {len(self.radars)}: {names}")  # fmt: skip
-        if isinstance(self.reader, Table) and (question := self.reader.track_question(self.skipped[NOT_LATER_REASON])):
+        disordered = self.disordered_count + self.later_rows.lost
+        question = self.reader.track_question(disordered) if isinstance(self.reader, Table) else None
+        if self.impossible_speed and not question:
+            faults.append(f"{self.reader.path}: {target_speed.speed_message(self.impossible_speed)}")
+        elif question or (question := self._loss_fault()):
             faults.append(question)
+        if _lacks_full_times(self.reader) and (self.options.zero != "first" or self.options.truth):
+            option = "truth" if self.options.zero == "first" else "time-from"
+            faults.append(f"{option}: {path}: {asterix.TRUNCATED_TIMES}: its times cannot be compared with others")
+        if self.site_distance is not None and (fault := self.site_distance.fault()):
+            faults.append(fault)
         if self.truth is not None:
             faults += self.truth.faults(sorted(self.track_names))
         return faults
+
+    def _loss_fault(self) -> str | None:
+        """That more than a tenth of the rows is left out because of others, unless the user allows it."""
+        counts: dict[str, int] = {
+            SAME_TIME_REASON: self.later_rows.lost,
+            UNREACHABLE_REASON: self.skipped[UNREACHABLE_REASON],
+        }
+        lost = sum(counts.values())
+        if self.options.allow_loss or lost <= MAX_LOSS * (self.result.rows + lost):
+            return None
+        return (f"{self.reader.path}: {lost} of {self.result.rows + lost} rows would be left out: "
+                f"{', '.join(skip_counts(counts))}; --allow-loss imports the others")  # fmt: skip
 
     def finish(self) -> ImportResult:
         """The result, with notes for the user."""
@@ -319,6 +425,9 @@ class _Import:
             result.notes.append(tr("plots of several radars, SAC/SIC (rows): {each}; the tracks of all but the first "
                                  "have its name before their number", each=counts_by_radar))  # fmt: skip
         result.notes += self.reader.notes(self.radars)
+        if isinstance(self.reader, Table) and self.reader.sheet.is_one_track and not self.reader.of_day:
+            last_s = max(self.later_rows.last_times.values(), default=math.nan)
+            result.notes += row_order.rollover_notes(self.reader.path, last_s)
         if self.truth is not None:
             result.notes += self.truth.notes()
         result.notes += self.doppler.notes(self.options.towards)

@@ -34,6 +34,7 @@ from radarsim.recordings.registration.read_recording import (
     read_recording,
 )
 from radarsim.recordings.registration.result import Adjustment, AircraftResiduals, Registration
+from radarsim.recordings.time_spans import TimeSpan, meeting_text
 
 MIN_PLOTS = 20
 MAX_DEVIATION_M = 100.0  # of an interpolated position from the straight line
@@ -75,7 +76,7 @@ def register_radar(radar: str, positions_file: str) -> Registration:
     matching = _match_plots(paths, t, r, b, assign_owner(owner, plots.tracks, plots.identity))
     is_used, path_numbers = matching.is_used, matching.match.path_numbers[matching.is_used]
     if is_used.sum() < MIN_PLOTS:
-        raise _too_few_plots(radar, str(path), matching)
+        raise _too_few_plots(radar, str(path), matching, meeting_text(_time_span(plots), _time_span(positions)))
     adjustment = fit_biases(MatchedPlots(t[is_used], r[is_used], b[is_used], path_numbers, paths.states))
     counts_by_kind = Counter(KINDS[k] for k in matching.match.kind_numbers[is_used].tolist())
     return Registration(
@@ -140,12 +141,18 @@ def _aircraft_residuals(
     return tuple(aircraft)
 
 
-def _too_few_plots(radar: str, positions_file: str, matching: _Matching) -> ConfigError:
+def _time_span(recording: Recording) -> TimeSpan:
+    """The times that a recording covers, by its own clock."""
+    (zero_s, since), t = recording.zero, recording.columns["t_s"]
+    return TimeSpan(zero_s + float(t.min()), zero_s + float(t.max()), since != UNKNOWN_ZERO)
+
+
+def _too_few_plots(radar: str, positions_file: str, matching: _Matching, times: str) -> ConfigError:
     with use_language("en"):  # as all faults
         reasons = "".join(f"; left out: {reason}" for reason in _excluded_plots(matching, positions_file))
     counts = f"{matching.is_used.sum()} of {len(matching.is_used)} plots"
     return ConfigError(f"{radar}: {counts} have a position of their aircraft in {positions_file}, by address, callsign "
-                       f"or Mode 3/A code and time; needs {MIN_PLOTS}{reasons}")  # fmt: skip
+                       f"or Mode 3/A code and time; needs {MIN_PLOTS}{reasons}{times}")  # fmt: skip
 
 
 def _excluded_plots(matching: _Matching, positions_file: str) -> list[str]:

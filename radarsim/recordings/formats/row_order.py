@@ -1,0 +1,161 @@
+"""Put the rows of a recording into the order of time, and recognise clocks that were set back.
+
+A recording is read batch by batch while the times of each track rise. The first row that is earlier than one before, or
+that no target reaches, raises `NeedsAllRows`; the recording is then read again as a whole, and sorted here."""
+
+import datetime
+import os
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+
+from radarsim.language.translate import term, tr
+from radarsim.recordings.formats.records import DAY_S, Batch
+from radarsim.recordings.grouping import rows_by_name
+from radarsim.recordings.time_spans import HOUR_S, ROLLOVER_S
+
+MAX_AGE_S = 2 * DAY_S  # of a file, from the last time in it to when it was written
+MAX_STEP_INTERVALS, MAX_STEP_S = 3.0, 300.0  # from the row before a clock is set back to that after it
+SENT_AGAIN_REASON = term("rows sent again, with the same time and values")
+SAME_TIME_REASON = term("rows of the same time as one before of their track")
+SORTED_NOTE = term("rows that were earlier than one before of their track: {count} of {all}; they are sorted by time")
+HOUR_NOTE = term(
+    "times fall by an hour, as local times do at the end of summer time: the {count} rows from there on are taken as "
+    "an hour later"
+)
+ROLLOVER_NOTE = term(
+    "dates step by 1024 weeks, as those of a satellite receiver do that missed a rollover: the {count} rows before are "
+    "taken as 1024 weeks later"
+)
+
+
+class NeedsAllRows(Exception):
+    """A row that must be judged with all others of the recording: it is out of order, or no target reaches it."""
+
+
+class LaterRows:
+    """Select the rows that are later than the last of their track, and count the others.
+
+    is_sorted: the rows have been sorted; else an earlier one raises NeedsAllRows."""
+
+    def __init__(self, skipped: Counter[str], is_sorted: bool):
+        self.skipped, self.is_sorted = skipped, is_sorted
+        self.lost = 0  # rows left out, not counting those that say what the one before says
+        self.last_times: dict[str, float] = {}
+        self.last_rows: dict[str, int] = {}  # of the batch, by track
+        self.previous: tuple[Batch, dict[str, int]] | None = None  # the batch before
+
+    def select(self, batch: Batch) -> Batch:
+        """The rows of a batch that are later; those of no track may have any time."""
+        rows, last_times = [], self.last_times
+        self.last_rows = last_rows = {}
+        for i, (track, t) in enumerate(zip(batch.track, batch.columns["t_s"].tolist(), strict=True)):
+            if track:
+                last = last_times.get(track)
+                if last is not None and t <= last:
+                    if t < last and not self.is_sorted:
+                        raise NeedsAllRows
+                    self._count(batch, i, track)
+                    continue
+                last_times[track] = t
+                last_rows[track] = i
+            rows.append(i)
+        self.previous = (batch, last_rows)
+        return batch if len(rows) == len(batch.track) else batch.rows(rows)
+
+    def _count(self, batch: Batch, i: int, track: str) -> None:
+        """Count a row that has the time of the last of its track."""
+        source, rows = (batch, self.last_rows) if track in self.last_rows else self.previous or (batch, {})
+        if track in rows and _row_values(source, rows[track]) == _row_values(batch, i):
+            self.skipped[SENT_AGAIN_REASON] += 1
+        else:
+            self.skipped[SAME_TIME_REASON] += 1
+            self.lost += 1
+
+
+def _row_values(batch: Batch, i: int) -> tuple[str, ...]:
+    """What a row holds, comparable where numbers are missing."""
+    return (batch.radar[i], *(texts[i] for texts in batch.identity.values()), *(
+        repr(column[i].item()) for column in batch.columns.values()
+    ))  # fmt: skip
+
+
+def join_batches(batches: Iterable[Batch]) -> Batch:
+    """One batch of the rows of several of one kind."""
+    parts = list(batches)
+    first = parts[0]
+    track, address, radar = (
+        [text for part in parts for text in getattr(part, name)] for name in ("track", "address", "radar")
+    )
+    columns = {name: np.concatenate([part.columns[name] for part in parts]) for name in first.columns}
+    texts = {name: [text for part in parts for text in part.texts[name]] for name in first.texts}
+    return Batch(first.kind, track, address, radar, columns, texts)
+
+
+def sort_rows(batch: Batch) -> tuple[Batch, list[str], bool]:
+    """The rows of a whole recording in the order of time, notes on what was out of order, and whether the times of each
+    track only fell."""
+    notes = _undo_clock_steps(batch)
+    t, late_count, is_falling = batch.columns["t_s"], 0, True
+    for name, rows in rows_by_name(batch.track).items():
+        if name:
+            times = t[rows]
+            late_count += int((times < np.maximum.accumulate(times)).sum())
+            is_falling &= bool((np.diff(times) <= 0).all())
+    if not late_count:
+        return batch, notes, False
+    notes.append(tr(SORTED_NOTE, count=late_count, all=len(t)))
+    return batch.rows(np.argsort(t, kind="stable").tolist()), notes, is_falling
+
+
+def _undo_clock_steps(batch: Batch) -> list[str]:
+    """Continue times that are set back by an hour, or by 1024 weeks, once in a recording; in place, with a note."""
+    t = batch.columns["t_s"]
+    tracks = [rows for name, rows in rows_by_name(batch.track).items() if name]
+    if shifted := _rows_after_fall(t, tracks, HOUR_S):
+        t[shifted] += HOUR_S
+        return [tr(HOUR_NOTE, count=len(shifted))]
+    rollover_rows = [rows[: int(i) + 1] for rows in tracks for i in np.flatnonzero(_is_rollover(t[rows]))]
+    if rollover_rows:
+        before = np.concatenate(rollover_rows)
+        t[before] += ROLLOVER_S
+        return [tr(ROLLOVER_NOTE, count=len(before))]
+    return []
+
+
+def rollover_notes(path: str, last_s: float) -> list[str]:
+    """A note if a satellite receiver's file was written 1024 weeks after the last time in it, s from 1970."""
+    if not os.path.isfile(path) or not abs(os.path.getmtime(path) - ROLLOVER_S - last_s) < MAX_AGE_S:
+        return []
+    date = datetime.datetime.fromtimestamp(last_s, datetime.UTC)
+    return [tr("the dates end on {date:%Y-%m-%d}, 1024 weeks before the file was written: the receiver has missed a "
+               "rollover of its weeks", date=date)]  # fmt: skip
+
+
+def _is_rollover(times: np.ndarray) -> np.ndarray:
+    """Whether the next time of a track (n,) is 1024 weeks later, but for a day (n - 1,)."""
+    return np.abs(np.diff(times) - ROLLOVER_S) < DAY_S
+
+
+def _rows_after_fall(t: np.ndarray, tracks: list[np.ndarray], size_s: float) -> list[int]:
+    """The rows after the only fall of the times, which is as large as that, but for the interval of rows; empty if
+    times fall otherwise, or more than once in a track."""
+    shifted: list[int] = []
+    first_fall = len(t)
+    for rows in tracks:
+        steps = np.diff(t[rows])
+        falls = np.flatnonzero(steps < 0)
+        if not falls.size:
+            continue
+        rises = steps[steps > 0]
+        usual = float(np.median(rises)) if rises.size else 0.0
+        gap = steps[falls[0]] + size_s
+        if falls.size > 1 or not 0 <= gap <= min(MAX_STEP_INTERVALS * usual, MAX_STEP_S):
+            return []
+        shifted += rows[int(falls[0]) + 1 :].tolist()
+        first_fall = min(first_fall, int(rows[int(falls[0]) + 1]))
+    later_tracks = [rows for rows in tracks if rows[0] >= first_fall]
+    if (np.diff(t[first_fall:]) >= 0).all():  # in file order: tracks that begin after it are by the same clock
+        shifted += [row for rows in later_tracks for row in rows.tolist()]
+    return sorted(shifted)

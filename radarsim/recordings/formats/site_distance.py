@@ -1,0 +1,72 @@
+"""Positions that cannot be seen from a radar: of no fix, or with swapped or turned coordinates."""
+
+import math
+
+import numpy as np
+
+from radarsim.language.translate import term
+from radarsim.recordings.formats.records import POSITIONS, Batch
+from radarsim.recordings.formats.sites import Site
+
+MAX_RADAR_DISTANCE_M = 1e6  # of a target that a radar sees along a straight line: an aircraft at 20 km from a mountain
+EARTH_RADIUS_M = 6.371e6
+MAX_KEPT_ROWS = 2000  # from which the cause is told
+NO_FIX_REASON = term("positions at 0°, 0°, which stand for no fix")
+
+
+def without_no_fix(batch: Batch, site: Site | None) -> tuple[Batch, int]:
+    """A batch without the positions at latitude and longitude 0, and how many these are; all of a radar near it."""
+    if batch.kind != POSITIONS or site is None:
+        return batch, 0
+    is_zero = (batch.columns["latitude_deg"] == 0) & (batch.columns["longitude_deg"] == 0)
+    if not is_zero.any() or _distance_m(*site.coordinates[:2], np.zeros(1), np.zeros(1))[0] < MAX_RADAR_DISTANCE_M:
+        return batch, 0
+    return batch.rows(np.flatnonzero(~is_zero).tolist()), int(is_zero.sum())
+
+
+class SiteDistance:
+    """How far positions lie from the radar."""
+
+    def __init__(self, site: Site):
+        self.latitude_deg, self.longitude_deg = site.coordinates[:2]
+        self.rows = self.near_rows = 0
+        self.sample: list[np.ndarray] = []
+
+    def add(self, batch: Batch) -> None:
+        """Count the positions of a batch that are near the radar."""
+        lat, lon = batch.columns["latitude_deg"], batch.columns["longitude_deg"]
+        if self.rows < MAX_KEPT_ROWS:
+            self.sample.append(np.stack([lat, lon]))
+        self.rows += len(lat)
+        distance = _distance_m(self.latitude_deg, self.longitude_deg, lat, lon)
+        self.near_rows += int((distance < MAX_RADAR_DISTANCE_M).sum())
+
+    def fault(self) -> str | None:
+        """That no position is near the radar, if coordinates that are swapped or turned in sign explain it."""
+        if not self.rows or self.near_rows:
+            return None
+        lat, lon = np.concatenate(self.sample, axis=1)
+        changes = {
+            "latitude and longitude are swapped, in the recording or in --at": (lon, lat),
+            "the longitude has the other sign, in the recording or in --at": (lat, -lon),
+            "the latitude has the other sign, in the recording or in --at": (-lat, lon),
+            "both have the other sign, in the recording or in --at": (-lat, -lon),
+        }
+        distances = {cause: self._median_m(*place) for cause, place in changes.items()}
+        cause = min(distances, key=distances.__getitem__)
+        if distances[cause] > MAX_RADAR_DISTANCE_M:
+            return None
+        return (f"at: the positions lie {self._median_m(lat, lon) / 1e3:.0f} km from it (median), none within "
+                f"{MAX_RADAR_DISTANCE_M / 1e3:.0f} km; {distances[cause] / 1e3:.0f} km if {cause}")  # fmt: skip
+
+    def _median_m(self, lat: np.ndarray, lon: np.ndarray) -> float:
+        return float(np.median(_distance_m(self.latitude_deg, self.longitude_deg, lat, lon)))
+
+
+def _distance_m(latitude_deg: float, longitude_deg: float, lat: np.ndarray, lon: np.ndarray) -> np.ndarray:
+    """Distances (n,) along a sphere (haversine), m."""
+    lat_0, lon_0, lat, lon = (np.radians(angle) for angle in (latitude_deg, longitude_deg, lat, lon))
+    is_place = np.abs(lat) <= math.pi / 2  # not a longitude in its place
+    haversine = np.sin((lat - lat_0) / 2) ** 2 + np.cos(lat_0) * np.cos(lat) * np.sin((lon - lon_0) / 2) ** 2
+    distances = 2 * EARTH_RADIUS_M * np.arcsin(np.sqrt(np.clip(haversine, 0.0, 1.0)))
+    return np.where(is_place, distances, np.inf)
