@@ -19,7 +19,7 @@ from radarsim.report.wording import significant_digits
 
 COLUMNS = ("t_s", "range_m", "velocity_mps")
 MAX_GAP_S = 60.0  # of a stretch over which velocities are integrated
-MIN_STRETCH_ROWS, MIN_ROWS = 5, 20
+MIN_STRETCH_ROWS, MIN_ROWS, MAX_ROWS = 5, 20, 10_000  # of a stretch, and of all
 MIN_COURSE = 5.0  # median deviations of the ranges that the fitted course must span, by its median
 ROUNDS = 40  # of reweighting, for least absolute deviations
 ERROR_SIGMAS = 4.0  # of the multiple
@@ -64,7 +64,7 @@ def detect_doppler_scale(tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerS
     arrays = [array[:, np.isfinite(array).all(axis=0)] for array in arrays]
     if sum(array.shape[1] for array in arrays) < MIN_ROWS:
         return None
-    stretches = [stretch for array in arrays for stretch in _stretches(array)]
+    stretches = _longest_stretches([stretch for array in arrays for stretch in _stretches(array)])
     if sum(stretch.shape[1] for stretch in stretches) < MIN_ROWS:
         return None
     number = np.repeat(np.arange(len(stretches)), [stretch.shape[1] for stretch in stretches])
@@ -112,6 +112,13 @@ def _stretches(track: np.ndarray) -> list[np.ndarray]:
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])[: len(t)]
     parts = np.split(np.vstack([track, integral]), np.flatnonzero((steps <= 0) | (steps > MAX_GAP_S)) + 1, axis=1)
     return [part for part in parts if part.shape[1] >= MIN_STRETCH_ROWS]
+
+
+def _longest_stretches(stretches: list[np.ndarray]) -> list[np.ndarray]:
+    """The longest stretches (4, m), of MAX_ROWS in all; the first rows of one that is longer."""
+    longest = sorted((stretch[:, :MAX_ROWS] for stretch in stretches), key=lambda stretch: -stretch.shape[1])
+    ends = np.cumsum([stretch.shape[1] for stretch in longest])
+    return longest[: int(np.searchsorted(ends, MAX_ROWS)) + 1]
 
 
 def _least_absolute_slope(x: np.ndarray, y: np.ndarray, number: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

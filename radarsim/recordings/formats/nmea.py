@@ -24,15 +24,15 @@ DATED_SENTENCE = re.compile(rb"\$[A-Z]{2}RMC,[^,]*,A(?:,[^,]*){6},\d{6}")
 CLOCK_PATTERN = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-6]\d(?:\.\d+)?)")
 
 
-def read_nmea(path: str, file: BinaryIO) -> Sheet:
+def read_nmea(path: str, file: BinaryIO, only_positions: bool = False) -> Sheet:
     """Positions by a satellite receiver, NMEA 0183: RMC (place, speed, course, date) and GGA (place, height), of any
     talker, those of one time as one row. Heights are above the ellipsoid where GGA has that of the geoid. Where the
-    first sentences have targets of a radar (TTM), these are read instead.
+    first sentences have targets of a radar (TTM), these are read instead, unless only positions are wanted.
 
     Where no RMC stands among the first sentences, dates are left alone: times are of the day."""
     head = file.peek(io.DEFAULT_BUFFER_SIZE)  # type: ignore[attr-defined]
     has_dates = bool(DATED_SENTENCE.search(head))
-    if TARGET_PATTERN.search(head):
+    if TARGET_PATTERN.search(head) and not only_positions:
         return _read_targets(path, file, has_dates)
     sheet = Sheet(path, ["time", *NMEA_COLUMNS.values()], iter(()), is_one_track=True)
 

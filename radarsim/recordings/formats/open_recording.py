@@ -23,7 +23,6 @@ SHEET_READERS: dict[Format, Callable[[str, io.BufferedReader], Sheet]] = {
     "json": json_rows.read_json,
     "parquet": parquet_rows.read_parquet,
     "gpx": gpx.read_gpx,
-    "nmea": nmea.read_nmea,
 }
 HEAD_BYTES = 4096  # bytes used to detect the format
 GZIP_MAGIC = b"\x1f\x8b"  # how gzip begins
@@ -86,7 +85,7 @@ def open_unzipped(path: str | os.PathLike) -> Iterator["io.BufferedReader[Any]"]
 def open_recording(path: str, options: Options, truth: bool = False) -> Iterator[tuple[Format, Reader]]:
     """Open a recording with the reader of the given format, or of the detected one; raises ConfigError.
 
-    truth: only the positions of an ASTERIX file are needed."""
+    truth: only the positions of an ASTERIX file, or of a ship's log, are needed."""
     encoding = "utf-8-sig"
     try:
         with open_unzipped(path) as file:
@@ -96,6 +95,8 @@ def open_recording(path: str, options: Options, truth: bool = False) -> Iterator
                 yield format_, Asterix(path, file, truth, options.keep_marked)
             elif format_ == "ais":
                 yield format_, Ais(path, file)
+            elif format_ == "nmea":
+                yield format_, Table(nmea.read_nmea(path, file, truth), options.columns)
             elif format_ in SHEET_READERS:
                 yield format_, Table(SHEET_READERS[format_](path, file), options.columns)
             else:

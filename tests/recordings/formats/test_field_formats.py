@@ -55,6 +55,15 @@ def test_bearings_from_the_bow_need_a_heading(tmp_path):
     assert "targets by the bow, whose heading no sentence HDT states (1)" in done.skipped
 
 
+def test_the_log_of_a_ship_with_a_radar_is_the_truth_of_its_own_positions(tmp_path):
+    """Plots of the ship by another radar, and its log, which has targets too."""
+    (tmp_path / "own.nmea").write_text("".join(own(k) + target(k) for k in range(9)))
+    text = "Time,track,range [m]\n" + "".join(f"2024-01-31T12:00:{k:02}Z,7,33400\n" for k in range(1, 8))
+    options = Options(site=SITE, truth=str(tmp_path / "own.nmea"), owner="7")
+    _, columns, _ = imported(tmp_path, text.encode(), options)
+    assert np.isfinite(columns["true_r_m"]).all()
+
+
 FIELDS = (
     "MessageType,TransmissionType,SessionID,AircraftID,HexIdent,FlightID,DateMessageGenerated,TimeMessageGenerated,"
     "DateMessageLogged,TimeMessageLogged,Callsign,Altitude,GroundSpeed,Track,Latitude,Longitude,VerticalRate,Squawk,"
