@@ -28,7 +28,7 @@ SPEEDS = {
 DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 / math.pi}
 AZIMUTH_COUNTS = 4096  # of a turn: the pulses of an antenna's encoder (ACP)
 RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()} | {"acp": 2 * math.pi / AZIMUTH_COUNTS}
-DAYS = "days"  # of a spreadsheet, of Matlab, Julian ones: numbers that `times.day_number_s` tells apart
+DAYS = "days"  # of a spreadsheet, of Matlab, Julian ones: numbers that `cell_times` tells apart
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0, DAYS: 1.0}  # dmy: day before month
 UNIT_SYNONYMS = {  # German and Russian
     **{"м": "m", "км": "km", "м/с": "m/s", "км/ч": "km/h", "уз": "kn", "узлы": "kn", "knoten": "kn", "sm": "nm"},

@@ -145,6 +145,7 @@ class _Import:
         self.skipped = reader.skipped
         self.later_rows = LaterRows(self.skipped, all_at_once)
         self.legs = FastestLegs()
+        self.has_bearings: bool | None = None  # all of the first batch
         self.site_distance = None if options.only_site is None else SiteDistance(options.only_site)
         self.impossible_speed: float | None = None  # of most targets, m/s
         self.disordered_count = 0  # rows that were earlier, unless the newest came first
@@ -186,9 +187,8 @@ class _Import:
         batches = [batch for batch in self._requested_batches() if batch.track]
         if not batches:
             return
-        batch, notes, is_falling = row_order.sort_rows(row_order.join_batches(batches))
+        batch, notes, self.disordered_count = row_order.sort_rows(row_order.join_batches(batches))
         self.result.notes += notes
-        self.disordered_count = 0 if is_falling else len(notes)
         batch = self._reachable_rows(batch)
         for first in range(0, len(batch.track), BATCH_ROWS):
             yield batch.rows(list(range(first, min(first + BATCH_ROWS, len(batch.track)))))
@@ -214,14 +214,17 @@ class _Import:
         return batch
 
     def _positions(self, batch: Batch, measured: Mapping[str, np.ndarray] | None = None) -> np.ndarray:
-        """Positions (n, d) of rows, m; of plots without bearings their ranges; measured: of positions, if known."""
+        """Positions (n, d) of rows, m; of plots their ranges, if some of the first have no bearing; measured: of
+        positions, if known."""
         if batch.kind == POSITIONS:
             if self.options.only_site is None:
                 raise ConfigError(NO_SITE_FAULT)
             measured = measured or self.options.only_site.measure(batch.columns)
             return np.stack([measured[name] for name in ("x_m", "z_m")], axis=1)  # heights may be missing
         r, b = batch.columns["range_m"], batch.columns["bearing_rad"]
-        return r[:, None] if np.isnan(b).any() else np.stack([r * np.cos(b), r * np.sin(b)], axis=1)
+        if self.has_bearings is None:
+            self.has_bearings = not np.isnan(b).any()
+        return np.stack([r * np.cos(b), r * np.sin(b)], axis=1) if self.has_bearings else r[:, None]
 
     def _correct(self, batch: Batch) -> Batch:
         """A batch without the biases of the radar, with its sign of the Doppler speed turned, without spans of 0, and

@@ -93,9 +93,9 @@ def join_batches(batches: Iterable[Batch]) -> Batch:
     return Batch(first.kind, track, address, radar, columns, texts)
 
 
-def sort_rows(batch: Batch) -> tuple[Batch, list[str], bool]:
-    """The rows of a whole recording in the order of time, notes on what was out of order, and whether the times of each
-    track only fell."""
+def sort_rows(batch: Batch) -> tuple[Batch, list[str], int]:
+    """The rows of a whole recording in the order of time, notes on what was out of order, and how many rows were
+    earlier than one before of their track: 0 where the newest came first."""
     notes = _undo_clock_steps(batch)
     t, late_count, is_falling = batch.columns["t_s"], 0, True
     for name, rows in rows_by_name(batch.track).items():
@@ -104,9 +104,9 @@ def sort_rows(batch: Batch) -> tuple[Batch, list[str], bool]:
             late_count += int((times < np.maximum.accumulate(times)).sum())
             is_falling &= bool((np.diff(times) <= 0).all())
     if not late_count:
-        return batch, notes, False
+        return batch, notes, 0
     notes.append(tr(SORTED_NOTE, count=late_count, all=len(t)))
-    return batch.rows(np.argsort(t, kind="stable").tolist()), notes, is_falling
+    return batch.rows(np.argsort(t, kind="stable").tolist()), notes, 0 if is_falling else late_count
 
 
 def _undo_clock_steps(batch: Batch) -> list[str]:

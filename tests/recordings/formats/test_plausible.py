@@ -136,6 +136,16 @@ def test_fast_and_rough_recordings_lose_nothing(tmp_path):
     assert imported(tmp_path, text.encode())[0].skipped == []
 
 
+def test_bearings_may_be_missing_anywhere(tmp_path):
+    """In the second batch of rows only, and in the first."""
+    for empty in (20_003, 5):
+        rows = (f"{4 * k},7,{20_000 + k},{'' if k == empty else 45}\n" for k in range(20_010))
+        done, columns, _ = imported(tmp_path, ("time,track,range_m,azimuth_deg\n" + "".join(rows)).encode())
+        assert np.flatnonzero(np.isnan(columns["bearing_rad"])).tolist() == [empty]
+        assert done.skipped == []
+        (tmp_path / "plots.csv").unlink()
+
+
 def test_azimuths_just_beyond_a_turn_are_turned_back_and_counts_are_told(tmp_path):
     text = "time,track,range_m,azimuth [deg]\n0,7,5000,359.9\n4,7,5000,360.15\n8,7,5000,0.2\n"
     _, columns, _ = imported(tmp_path, text.encode())
