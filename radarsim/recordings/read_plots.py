@@ -199,9 +199,15 @@ class _Reader:
             for i in np.flatnonzero(~rises & np.isfinite(times[:-1]) & np.isfinite(times[1:])):
                 must = f"must {'not be earlier' if self.equal_times or name else 'be later'} than the row before"
                 got = f"{times[i + 1]:g} after {times[i]:g}{f' in track {name}' if name else ''}"
-                cure = "" if name else f"if there are several tracks, name their column {TRACK_COLUMN}"
-                self.faults.add(lines[rows[i]], self._column_label(0), must, got, cure)
+                self.faults.add(lines[rows[i]], self._column_label(0), must, got, self._order_cure(name))
             self.last_times[name] = times[-1]
+
+    def _order_cure(self, track: str) -> str:
+        """What helps where the times of a track, '' where there is one alone, do not rise."""
+        cures = [] if track else [f"if there are several tracks, name their column {TRACK_COLUMN}"]
+        if "range_m" in self.names:
+            cures.append(f"rows are sorted by {import_command(self.path)}")
+        return "; ".join(cures)
 
     def _row_numbers(self, row: list[str], line: int) -> list[float]:
         """The numbers of a row; faulty ones become NaN."""
