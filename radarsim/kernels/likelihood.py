@@ -4,8 +4,10 @@ Letters as in the book: x state, P its covariance, F transition, Q process noise
 that was measured, S variance of its innovation e, K = p / S gain with p = P h. A plot is taken in one number after the
 other, each with an error of its own.
 
-An outlier is a number whose σ is OUTLIER_FACTOR times the configured one; each is one with the probability `share`. The
-two explanations of x and P are merged by moments (GPB1).
+An outlier is a number whose error follows another law: it is near, of NEAR_WIDTH times the stated σ, or far, of any
+size: the logarithm of its σ is uniform between FAR_WIDTH times the stated one and the span of the data, taken at
+FAR_COUNT values. One law of one width would lift σ with the size of the farthest. A hard manoeuvre is an interval in
+which the process noise is HARD_FACTOR times as large. The explanations of x and P are merged by moments (GPB1).
 
 Errors that last from plot to plot are states of their own (`with_lasting_errors`), each of the first order: its
 correlation falls with time as a power."""
@@ -14,26 +16,59 @@ import numpy as np
 
 from radarsim.kernels.compiler import kernel
 
-OUTLIER_FACTOR = 10.0
+NEAR_WIDTH, FAR_WIDTH = 3.0, 10.0  # of an outlier, in σ of a number
+FAR_COUNT = 6  # widths of far outliers
+LAW_COUNT = 2 + FAR_COUNT  # of errors: the stated one, that of near outliers, those of far ones
+HARD_FACTOR = 100.0  # on the process noise in a hard manoeuvre
+NEAR, FAR, HARD = 0, 1, 2  # of the shares
 
 
 @kernel
-def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, share, white, log_densities):
+def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, shares, span, white, log_densities, soundness):
     """The log-likelihood of n rows of m numbers, for a state of d components.
 
     x (d,) and P (d, d) are what is known at the first row, and are overwritten; F, Q (n, d, d): transition to each row
     and what the manoeuvre of unit variance adds; H (n, m, d), z, variance (n, m): the numbers, where `present`;
-    manoeuvre: its variance; share: of outliers; white: 1, or 0 where the errors are states. Out: log_densities (n, m),
-    the logarithm of each number's density given those before it, zero where it is missing."""
-    product, p = np.zeros_like(P), np.zeros_like(x)
+    manoeuvre: its variance; shares (3,): of near and far outliers among the numbers, of hard manoeuvres among the
+    intervals; span (m,): of the data; white: 1, or 0 where the errors are states. Out: log_densities (n, m), the
+    logarithm of each number's density given those before it, zero where it is missing; soundness (n, m): the
+    probability that it is no outlier."""
+    product, p, laws = np.zeros_like(P), np.zeros_like(x), np.empty((2, LAW_COUNT))
+    hard_x, hard_P, hard_score, hard_soundness = x.copy(), P.copy(), log_densities[0].copy(), soundness[0].copy()
     for k in range(z.shape[0]):
+        row = H[k], z[k], variance[k], present[k], shares, span, white, p, laws
+        may_be_hard = k > 0 and shares[HARD] > 0.0
+        if may_be_hard:
+            hard_x[:], hard_P[:] = x, P
+            extrapolate(hard_x, hard_P, product, p, F[k], Q[k], HARD_FACTOR * manoeuvre)
+            take_row(hard_x, hard_P, row, hard_score, hard_soundness)
         if k > 0:
             extrapolate(x, P, product, p, F[k], Q[k], manoeuvre)
-        for j in range(z.shape[1]):
-            log_densities[k, j] = 0.0
-            if present[k, j]:
-                e, spread = innovation(x, P, H[k, j], z[k, j], p)
-                log_densities[k, j] = take_number(x, P, p, e, spread + white * variance[k, j], variance[k, j], share)
+        take_row(x, P, row, log_densities[k], soundness[k])
+        if may_be_hard:
+            calm = np.log(1.0 - shares[HARD]) + log_densities[k].sum()
+            hard = np.log(shares[HARD]) + hard_score.sum()
+            total = max(calm, hard) + np.log1p(np.exp(-abs(calm - hard)))
+            log_densities[k, 0] += total - log_densities[k].sum()
+            merge_states(x, P, hard_x, hard_P, np.exp(hard - total))
+
+
+@kernel
+def take_row(x, P, row, log_densities, soundness):
+    """Update x and P in place by the numbers of a row; fills the logarithms of their densities and their soundness.
+
+    row: what `log_likelihood` has of it, and work arrays p (d,) and laws (2, LAW_COUNT)."""
+    H, z, variance, present, shares, span, white, p, laws = row
+    for j in range(z.size):
+        log_densities[j], soundness[j] = 0.0, 1.0
+        if present[j]:
+            e, spread = innovation(x, P, H[j], z[j], p)
+            S = spread + white * variance[j]
+            if shares[NEAR] + shares[FAR] > 0.0:
+                fill_laws(laws, e, S, variance[j], shares, span[j])
+                log_densities[j], soundness[j] = take_number_of_laws(x, P, p, e, laws)
+            else:
+                log_densities[j] = take_number(x, P, p, e, S)
 
 
 @kernel
@@ -73,27 +108,65 @@ def extrapolate(x, P, product, predicted_x, F, Q, manoeuvre):
 
 
 @kernel
-def take_number(x, P, p, e, S, variance, share):
-    """Update x and P in place by a number with innovation e of variance S; returns the logarithm of its density.
+def take_number(x, P, p, e, S):
+    """Update x and P in place by a number with innovation e of variance S; returns the logarithm of its density."""
+    gain = 1.0 / S
+    for a in range(x.size):
+        x[a] += gain * e * p[a]
+        for b in range(a + 1):
+            P[a, b] -= gain * p[a] * p[b]
+            P[b, a] = P[a, b]
+    return -0.5 * (np.log(2.0 * np.pi * S) + e * e / S)
 
-    variance: of the number's error; that of an outlier is FACTOR² times as large."""
-    T = S + (OUTLIER_FACTOR * OUTLIER_FACTOR - 1.0) * variance
-    plain = np.log(1.0 - share) - 0.5 * (np.log(2.0 * np.pi * S) + e * e / S)
-    density, w, v = plain, 1.0, 0.0
-    if share > 0.0:
-        wide = np.log(share) - 0.5 * (np.log(2.0 * np.pi * T) + e * e / T)
-        larger = max(plain, wide)
-        density = larger + np.log(np.exp(plain - larger) + np.exp(wide - larger))
-        w, v = np.exp(plain - density), np.exp(wide - density)
-    gain = w / S + v / T
-    difference = 1.0 / S - 1.0 / T
-    shrink = gain - w * v * e * e * difference * difference
+
+@kernel
+def fill_laws(laws, e, S, variance, shares, span):
+    """Fill, for each law of a number's error, the logarithm of its probability and density at an innovation e, and its
+    variance of the innovation: S for the stated law, whose error has the given variance. laws (2, LAW_COUNT)."""
+    ratio = max(span * span / (FAR_WIDTH * FAR_WIDTH * variance), 1.0) ** (1.0 / (FAR_COUNT - 1))
+    width = FAR_WIDTH * FAR_WIDTH
+    for i in range(LAW_COUNT):
+        if i == 0:
+            share, laws[1, i] = 1.0 - shares[NEAR] - shares[FAR], S
+        elif i == 1:
+            share, laws[1, i] = shares[NEAR], S + (NEAR_WIDTH * NEAR_WIDTH - 1.0) * variance
+        else:
+            share, laws[1, i] = shares[FAR] / FAR_COUNT, S + (width - 1.0) * variance
+            width *= ratio
+        T = laws[1, i]
+        laws[0, i] = np.log(share) - 0.5 * (np.log(2.0 * np.pi * T) + e * e / T) if share > 0.0 else -np.inf
+
+
+@kernel
+def take_number_of_laws(x, P, p, e, laws):
+    """As `take_number`, of an error that follows one of several laws; returns the logarithm of the number's density and
+    the probability of the stated law."""
+    larger, total, gain, square = laws[0].max(), 0.0, 0.0, 0.0
+    for i in range(LAW_COUNT):
+        total += np.exp(laws[0, i] - larger)
+    density = larger + np.log(total)
+    for i in range(LAW_COUNT):
+        w = np.exp(laws[0, i] - density)
+        gain += w / laws[1, i]
+        square += w / (laws[1, i] * laws[1, i])
+    shrink = gain - e * e * max(square - gain * gain, 0.0)
     for a in range(x.size):
         x[a] += gain * e * p[a]
         for b in range(a + 1):
             P[a, b] -= shrink * p[a] * p[b]
             P[b, a] = P[a, b]
-    return density
+    return density, np.exp(laws[0, 0] - density)
+
+
+@kernel
+def merge_states(x, P, other_x, other_P, weight):
+    """Merge another state of the given weight into x and P, by moments, in place."""
+    for a in range(x.size):
+        for b in range(a + 1):
+            spread = weight * (1.0 - weight) * (other_x[a] - x[a]) * (other_x[b] - x[b])
+            P[a, b] = P[b, a] = (1.0 - weight) * P[a, b] + weight * other_P[a, b] + spread
+    for a in range(x.size):
+        x[a] += weight * (other_x[a] - x[a])
 
 
 def with_lasting_errors(x, P, with_errors, F, Q, H, variance, correlation):

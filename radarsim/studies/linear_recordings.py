@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.studies.linear_design import period
-from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, Track, usual_interval_s
+from radarsim.studies.gross_errors import data_span, soundness_by_column
+from radarsim.studies.recording_interface import (
+    CORRELATION,
+    MANOEUVRES,
+    NEAR_PART,
+    OUTLIERS,
+    Track,
+    outlier_shares,
+    usual_interval_s,
+)
 
 if TYPE_CHECKING:
     from radarsim.studies.linear import LinearStudy
@@ -120,7 +129,7 @@ class PlotLikelihood:
     """The likelihood of tracks under a filter's model, by the keys that the study names as `fitted`. The state at the
     first plot is as in the config."""
 
-    explains: tuple[str, ...] = (OUTLIERS, CORRELATION)
+    explains: tuple[str, ...] = (OUTLIERS, CORRELATION, MANOEUVRES)
 
     def __init__(self, study: "LinearStudy", spec: Any, track: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec, self.filter, self.model = spec, track.name, RowModel(study, spec, track)
@@ -131,21 +140,29 @@ class PlotLikelihood:
             raise study._fault("fitted", f"{self.keys[stated.index(None)]} is not given")
         self.stated = np.array(stated, dtype=float)
         self.least = ZERO_SHARE * np.where(self.stated > 0, self.stated, 1.0)
+        none = np.full(self.rows, np.nan)
+        self.given_tracks = [
+            {"t_s": track["t_s"], **{name: track.get(name, none[: len(track["t_s"])]) for name in self.model.columns}}
+            for track in tracks
+        ]
+        self.span = data_span(self.given_tracks, self.model.columns)
         self.plots = [
             (np.diff(track["t_s"], prepend=track["t_s"][0]), self.model.numbers(track, len(track["t_s"])))
             for track in tracks
         ]
         self.usual_s = usual_interval_s(tracks)
 
-    def _scores(self, values: np.ndarray, outliers: float, correlation: float) -> np.ndarray:
-        """Sums over all tracks for each number of a plot."""
+    def _track_scores(
+        self, values: np.ndarray, shares: np.ndarray, correlation: float
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The log-densities (n, D) of the numbers of each track, and their probabilities to be no outliers."""
         from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
 
         spec = self.spec
         for key, value in zip(self.keys, values, strict=True):
             spec = _changed(spec, key.split("."), float(value))
         start = self.model.study.assumed_motion(spec, self.model.filter_keys)
-        total: np.ndarray = np.zeros(len(self.model.columns))
+        result = []
         for dt, z in self.plots:
             (F, Q), (H, R) = self.model.moves(dt, spec), self.model.rows(0, len(dt), spec)
             x, P = np.array(start.mean, dtype=float), np.array(start.covariance, dtype=float)
@@ -153,18 +170,42 @@ class PlotLikelihood:
             if correlation:
                 first = np.zeros((x.size, z.shape[1]))
                 model, white = with_lasting_errors(x, P, first, F, Q, H, R, correlation ** (dt / self.usual_s)), 0.0
-            score = np.empty(z.shape)
-            log_likelihood(*model, np.where(has_number, z, 0.0), R, has_number, 1.0, outliers, white, score)
+            score, soundness = np.empty((2, *z.shape))
+            numbers = np.where(has_number, z, 0.0), R, has_number
+            log_likelihood(*model, *numbers, 1.0, shares, self.span, white, score, soundness)
+            result.append((score, soundness))
+        return result
+
+    def _scores(self, values: np.ndarray, shares: np.ndarray, correlation: float) -> np.ndarray:
+        """Sums over all tracks for each number of a plot."""
+        total: np.ndarray = np.zeros(len(self.model.columns))
+        for score, _ in self._track_scores(values, shares, correlation):
             total += score.sum(axis=0)
         return total
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+    def __call__(
+        self,
+        values: np.ndarray,
+        outliers: float = 0.0,
+        bias: float = 0.0,
+        correlation: float = 0.0,
+        manoeuvres: float = 0.0,
+        near: float = NEAR_PART,
+    ) -> float:
         """The logarithm of the likelihood."""
-        return float(self._scores(values, outliers, correlation).sum())
+        return float(self._scores(values, outlier_shares(outliers, near, manoeuvres), correlation).sum())
+
+    def soundness(
+        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    ) -> list[dict[str, np.ndarray]]:
+        """The probability of each number that it is no outlier."""
+        scores = self._track_scores(values, outlier_shares(outliers, near, 0.0), correlation)
+        judged = [(i, np.arange(len(soundness)), soundness) for i, (_, soundness) in enumerate(scores)]
+        return soundness_by_column(self.model.columns, self.given_tracks, self.given_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of each number of a plot."""
-        return dict(zip(self.model.columns, self._scores(values, 0.0, 0.0).tolist(), strict=True))
+        return dict(zip(self.model.columns, self._scores(values, np.zeros(3), 0.0).tolist(), strict=True))
 
 
 def _changed(model: Any, path: Sequence[str], value: float) -> Any:

@@ -63,7 +63,8 @@ class Tracker(Protocol):
 
 MAX_PREPARED = 4  # cases that stay prepared: those whose plots were drawn last
 
-OUTLIERS, BIAS, CORRELATION = EXPLANATIONS = ("outliers", "bias", "correlation")
+OUTLIERS, BIAS, CORRELATION, MANOEUVRES = EXPLANATIONS = ("outliers", "bias", "correlation", "manoeuvres")
+NEAR, NEAR_PART = "near", 0.5  # the part of outliers that is near, where it is not fitted
 
 
 class Likelihood(Protocol):
@@ -83,12 +84,25 @@ class Likelihood(Protocol):
     usual_s: float
 
     def __call__(
-        self, values: "np.ndarray", outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0
+        self,
+        values: "np.ndarray",
+        outliers: float = 0.0,
+        bias: float = 0.0,
+        correlation: float = 0.0,
+        manoeuvres: float = 0.0,
+        near: float = NEAR_PART,
     ) -> float:
         """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
 
-        outliers: the share of plots with ten times their σ; bias: a constant error of a number that can show one, in
-        its σ; correlation: of the errors of neighbouring plots, at the recording's usual interval."""
+        outliers: their share among the numbers, of which the part `near` has a few times its σ and the rest any size
+        (`radarsim.kernels.likelihood`); bias: a constant error of a number that can show one, in its σ; correlation: of
+        the errors of neighbouring plots, at the recording's usual interval; manoeuvres: the share of intervals in which
+        the target manoeuvres far harder than in the others."""
+
+    def soundness(
+        self, values: "np.ndarray", outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    ) -> "list[Mapping[str, np.ndarray]]":
+        """The times t_s of each track, and the probability of each number that it is no outlier, by column; (n,) each."""
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
         """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
@@ -100,6 +114,13 @@ def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:
 
     medians = [float(np.median(np.diff(track["t_s"]))) for track in tracks if len(track["t_s"]) > 1]
     return float(np.median(medians)) if medians else 1.0
+
+
+def outlier_shares(outliers: float, near: float, manoeuvres: float) -> "np.ndarray":
+    """The shares (3,) of near and far outliers and of hard manoeuvres, as `radarsim.kernels.likelihood` takes them."""
+    import numpy as np
+
+    return np.array([outliers * near, outliers * (1 - near), manoeuvres])
 
 
 class TurnError(NamedTuple):

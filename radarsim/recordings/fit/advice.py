@@ -20,10 +20,13 @@ from radarsim.recordings.fit.likelihood_slice import (
     CountedLikelihood,
     LikelihoodSlice,
     Progress,
+    Rival,
     climb,
     log_likelihood,
     maximise,
     no_progress,
+    rival_of_outliers,
+    single_explanations,
 )
 from radarsim.recordings.fit.newton_steps import polish_maximum
 from radarsim.recordings.fit.profile_search import HALF_CHI2_95
@@ -31,7 +34,7 @@ from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
 from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
 from radarsim.recordings.target_speed import impossible_column_speed
 from radarsim.recordings.tracking_result import TrackingResult
-from radarsim.studies.recording_interface import Likelihood, TurnError
+from radarsim.studies.recording_interface import MANOEUVRES, OUTLIERS, Likelihood, TurnError
 
 FALSE_FINDING_LEVEL = 0.05  # of a false finding
 MAX_FINDINGS = 3
@@ -43,13 +46,14 @@ class Finding:
     increase of the log-likelihood over the findings before.
 
     from_zero: whether the plots distinguish a key's value from zero. turning: the cost of a smaller manoeuvre variance.
-    """
+    rival: hard manoeuvres, where these explain the plots about as well as outliers."""
 
     name: str
     value: float
     gain: float
     from_zero: bool = True
     turning: TurnError | None = None
+    rival: Rival | None = None
 
 
 @dataclass(frozen=True)
@@ -126,7 +130,7 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
     """Errors in the configured numbers, the one with most weight first; empty if nothing is wrong."""
     from scipy.stats import chi2
 
-    counted, names = CountedLikelihood(likelihood, progress), [*likelihood.keys, *likelihood.explains]
+    counted, names = CountedLikelihood(likelihood, progress), [*likelihood.keys, *single_explanations(likelihood)]
     needed = 0.5 * float(chi2.ppf(1 - FALSE_FINDING_LEVEL / len(names), 1))
     chosen_names: list[str] = []
     start: dict[str, float] = {}
@@ -137,8 +141,15 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
         values, top = trials[best_name]
         if top - value_so_far < needed:
             break
+        rival = rival_of_outliers(counted, values) if best_name == OUTLIERS else None
+        if rival is not None and rival.is_clear:
+            if rival.gain > 0:
+                names = [MANOEUVRES if name == OUTLIERS else name for name in names]
+                best_name = MANOEUVRES
+                values, top = maximise(counted, [*chosen_names, best_name], start)
+            rival = None
         values, top = _polish_values(counted, values)
-        results.append(Finding(best_name, values[best_name], top - value_so_far))
+        results.append(Finding(best_name, values[best_name], top - value_so_far, rival=rival))
         chosen_names, start, value_so_far = [*chosen_names, best_name], values, top
     return [
         replace(

@@ -23,16 +23,19 @@ from radarsim.recordings.fit.likelihood_slice import (
     CountedLikelihood,
     LikelihoodSlice,
     Progress,
+    Rival,
     climb,
     maximise,
     no_progress,
+    rival_of_outliers,
+    single_explanations,
 )
 from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, FittedKey, LikelihoodSearch
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
 from radarsim.recordings.track_rows import split_by_track
-from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, Likelihood
+from radarsim.studies.recording_interface import CORRELATION, MANOEUVRES, NEAR, NEAR_PART, OUTLIERS, Likelihood
 
 SECOND_FIT_COST = 1.5  # evaluations of a fit that allows for more, in those of the plain one
 
@@ -56,7 +59,8 @@ class FitStages:
         return self.report
 
 
-MAX_PLAUSIBLE_OUTLIERS = 0.3  # of plots that may have ten times their σ; with more, the errors follow another law
+MAX_PLAUSIBLE_OUTLIERS = 0.3  # of numbers that may be far outliers; with more, the errors follow another law
+OUTLIER_PROBABILITY = 0.5  # from which a number is named as an outlier
 CORRELATION_TIME_KEY = "correlation_time_s"
 ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
 PLAIN_GAIN = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
@@ -76,15 +80,26 @@ class Fit:
     gain: float
     further_explanation: "FurtherExplanation | None" = None
     plain: "Fit | None" = None
+    outlier_rows: tuple["OutlierRow", ...] = ()
     doubles: int = 0  # further plots of a track in a scan, left out
 
 
 class FurtherExplanation(NamedTuple):
-    """An explanation besides the keys, one of EXPLANATIONS: its value, and the increase of the log-likelihood by it."""
+    """An explanation besides the keys, one of EXPLANATIONS: its value, and the increase of the log-likelihood by it;
+    rival: hard manoeuvres, where these explain the plots about as well as outliers."""
 
     name: str
     value: float
     gain: float
+    rival: Rival | None = None
+
+
+class OutlierRow(NamedTuple):
+    """A number of a recording that is an outlier: its track (an index), time and column."""
+
+    track: int
+    t_s: float
+    column: str
 
 
 class CorrelatedLikelihood:
@@ -99,11 +114,28 @@ class CorrelatedLikelihood:
         self.usual_s = likelihood.usual_s
         self.keys, self.stated = (*likelihood.keys, CORRELATION_TIME_KEY), np.append(likelihood.stated, 0.0)
         self.least = np.append(likelihood.least, ZERO_CORRELATION_TIME * likelihood.usual_s)
-        self.explains = tuple(name for name in likelihood.explains if name != CORRELATION)
+        self.explains = tuple(name for name in likelihood.explains if name not in (CORRELATION, MANOEUVRES))
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+    def __call__(
+        self,
+        values: np.ndarray,
+        outliers: float = 0.0,
+        bias: float = 0.0,
+        correlation: float = 0.0,
+        manoeuvres: float = 0.0,
+        near: float = NEAR_PART,
+    ) -> float:
         """The logarithm of the likelihood; `correlation` is that of the last of the values (n,), whatever is given."""
-        return self.likelihood(values[:-1], outliers, bias, math.exp(-self.usual_s / values[-1]) if values[-1] else 0.0)
+        return self.likelihood(values[:-1], outliers, bias, self._correlation(values), manoeuvres, near)
+
+    def soundness(
+        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    ) -> list[Mapping[str, np.ndarray]]:
+        """As the likelihood's, with the correlation of the last of the values."""
+        return self.likelihood.soundness(values[:-1], outliers, near, self._correlation(values))
+
+    def _correlation(self, values: np.ndarray) -> float:
+        return math.exp(-self.usual_s / values[-1]) if values[-1] else 0.0
 
     def by_number(self, values: np.ndarray) -> Mapping[str, float]:
         """The same for the keys alone, without correlation."""
@@ -234,8 +266,9 @@ def fit_likelihood(
 
 
 def _is_plain_error(explanation: FurtherExplanation) -> bool:
-    """Whether outliers or correlation raise the likelihood by more than chance does in one recording of 1000."""
-    return explanation.name in (OUTLIERS, CORRELATION) and explanation.gain > PLAIN_GAIN
+    """Whether outliers or correlation raise the likelihood by more than chance does in one recording of 1000, and
+    nothing else does as well."""
+    return explanation.name in (OUTLIERS, CORRELATION) and explanation.gain > PLAIN_GAIN and explanation.rival is None
 
 
 def check_explanations(likelihood: Likelihood, allowing: Sequence[str]) -> None:
@@ -265,8 +298,9 @@ def fit_keys(
         search.raise_zero_keys()
     if search.top <= IMPOSSIBLE_LOG_LIKELIHOOD:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
-    share = float(search.to_values(search.best)[-1]) if robust else None
-    if share is not None and share > MAX_PLAUSIBLE_OUTLIERS:
+    outliers = search.outliers(search.best)
+    share = outliers.get(OUTLIERS)
+    if share is not None and share * (1 - outliers[NEAR]) > MAX_PLAUSIBLE_OUTLIERS:
         raise ConfigError(f"robust: {100 * share:.0f} % of the plots would have to be outliers: their errors follow "
                           "another law (few different values?); fit without it")  # fmt: skip
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
@@ -280,6 +314,22 @@ def fit_keys(
         share,
         gain,
         _find_further_explanation(search, likelihood),
+        outlier_rows=_outlier_rows(search, likelihood),
+    )
+
+
+def _outlier_rows(search: "LikelihoodSearch", likelihood: Likelihood) -> tuple[OutlierRow, ...]:
+    """The numbers that are probably outliers at the maximum; none where outliers are not allowed for."""
+    outliers = search.outliers(search.best)
+    if not outliers.get(OUTLIERS):
+        return ()
+    probabilities = likelihood.soundness(search.to_values(search.best)[: len(likelihood.keys)], **outliers)
+    return tuple(
+        OutlierRow(number, float(track["t_s"][row]), name)
+        for number, track in enumerate(probabilities)
+        for row in range(len(track["t_s"]))
+        for name in track
+        if name != "t_s" and track[name][row] < 1 - OUTLIER_PROBABILITY
     )
 
 
@@ -290,8 +340,8 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
     from scipy.stats import chi2
 
     fitted_values = search.to_values(search.best).tolist()
-    fixed = dict(zip((*likelihood.keys, OUTLIERS), fitted_values, strict=False))
-    names = [name for name in likelihood.explains if name not in fixed]
+    fixed = dict(zip(likelihood.keys, fitted_values, strict=False)) | search.outliers(search.best)
+    names = [name for name in single_explanations(likelihood) if name not in fixed]
     expected = search.evaluations + EXPLANATION_EVALUATIONS * len(names)
     counted_likelihood = CountedLikelihood(likelihood, search.progress, search.evaluations, expected)
     maxima = [maximise(counted_likelihood, [name], {}, fixed) for name in names]
@@ -309,11 +359,15 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
         return None
     values, maximum = max(maxima, key=lambda maximum: maximum[1])
     needed_gain = 0.5 * float(chi2.ppf(0.95 ** (1 / len(maxima)), 1))
-    return (
-        FurtherExplanation(*next(iter(values.items())), maximum - search.top)
-        if maximum > search.top + needed_gain
-        else None
-    )
+    if maximum <= search.top + needed_gain:
+        return None
+    ((name, value),) = values.items()
+    rival = rival_of_outliers(counted_likelihood, fixed | values) if name == OUTLIERS else None
+    if rival is not None and rival.is_clear:
+        if rival.gain > 0:
+            name, value, maximum = MANOEUVRES, rival.share, maximum + rival.gain
+        rival = None
+    return FurtherExplanation(name, value, maximum - search.top, rival)
 
 
 def fitted_settings(fit_: Fit) -> dict[str, float]:

@@ -1,12 +1,13 @@
 """Maximise a likelihood along some of its keys and explanations, with rough accuracy."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from radarsim.studies.recording_interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS, Likelihood
+from radarsim.studies.recording_interface import BIAS, CORRELATION, EXPLANATIONS, MANOEUVRES, NEAR, OUTLIERS, Likelihood
 
 ROUGH_ACCURACY = 0.01  # relative accuracy, of a key and of the likelihood, to which explanations are compared
 MIN_LOG_FACTOR, MAX_LOG_FACTOR = np.log(1e-4), np.log(1e4)  # of a key's factor
@@ -14,10 +15,13 @@ MAX_BIAS_SIGMAS = 50.0  # in σ of the velocity
 SHARE_LIMITS = {
     OUTLIERS: (1e-3, 0.4, 3.0),
     CORRELATION: (1e-3, 0.99, 0.0),
+    MANOEUVRES: (1e-3, 0.4, 3.0),
 }  # least, most, logit at the start of the search
 FAR_FROM_ZERO = 1e4  # times the value of a key that counts as zero
 IMPOSSIBLE_LOG_LIKELIHOOD = -1e300  # stands for the logarithm of zero likelihood: a search needs a number
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
+RIVAL_STARTS = (0.03, 0.2)  # of the share of hard manoeuvres
+CLEAR_RIVAL_GAIN = 3.0  # of the log-likelihood, a factor of twenty, from which one of two explanations is clear
 SEARCH_STARTS = (-2.0, 0.0, 2.0)  # of a search
 Progress = Callable[[int, int | None], None]  # likelihoods computed, and their expected number where known
 
@@ -30,6 +34,11 @@ def starting_values(likelihood: Likelihood) -> np.ndarray:
     """Starting values of the keys: the configured ones; a key that is zero starts far above what counts as zero."""
     is_zero = np.asarray(likelihood.stated) <= likelihood.least
     return np.where(is_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
+
+
+def single_explanations(likelihood: Likelihood) -> list[str]:
+    """The explanations that are tried by themselves: hard manoeuvres are compared with outliers alone."""
+    return [name for name in likelihood.explains if name != MANOEUVRES]
 
 
 class CountedLikelihood:
@@ -49,7 +58,7 @@ def log_likelihood(likelihood: CountedLikelihood, changes: Mapping[str, float]) 
     """The log-likelihood with some keys changed and some explanations applied."""
     configured = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changes.get(key, value) for key, value in configured])
-    result = likelihood(values, {name: changes[name] for name in EXPLANATIONS if name in changes})
+    result = likelihood(values, {name: changes[name] for name in (*EXPLANATIONS, NEAR) if name in changes})
     return result if np.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
 
 
@@ -98,6 +107,36 @@ def climb(slice_: LikelihoodSlice, start: Mapping[str, float]) -> tuple[dict[str
     options: Any = {"initial_simplex": simplex, "xatol": ROUGH_ACCURACY, "fatol": ROUGH_ACCURACY, "maxfev": 400}
     result = minimize(cost, point, method="Nelder-Mead", options=options)
     return slice_.to_values(result.x), -float(result.fun)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Hard manoeuvres in place of outliers: their share of the intervals, and by how much the logarithm of the
+    likelihood is larger than with outliers."""
+
+    share: float
+    gain: float
+
+    @property
+    def is_clear(self) -> bool:
+        return abs(self.gain) > CLEAR_RIVAL_GAIN
+
+
+def rival_of_outliers(likelihood: CountedLikelihood, values: Mapping[str, float]) -> Rival | None:
+    """Compare outliers, of the given values of keys and explanations, with hard manoeuvres, each with all keys fitted;
+    None where the likelihood knows no hard manoeuvres."""
+    if MANOEUVRES not in likelihood.likelihood.explains or CORRELATION in values:
+        return None
+    configured = dict(zip(likelihood.keys, starting_values(likelihood.likelihood).tolist(), strict=True))
+    least = dict(zip(likelihood.keys, np.asarray(likelihood.likelihood.least).tolist(), strict=True))
+    fixed = {name: value for name, value in values.items() if name not in (OUTLIERS, NEAR)}
+    keys = [key for key in likelihood.keys if fixed.get(key, configured[key]) > least[key]]
+    maxima = {}
+    for name, shares in ((OUTLIERS, [values[OUTLIERS]]), (MANOEUVRES, RIVAL_STARTS)):
+        slice_ = LikelihoodSlice(likelihood, [*keys, name], fixed)
+        starts = ({**configured, **fixed, name: share} for share in shares)
+        maxima[name] = max((climb(slice_, start) for start in starts), key=lambda maximum: maximum[1])
+    return Rival(maxima[MANOEUVRES][0][MANOEUVRES], maxima[MANOEUVRES][1] - maxima[OUTLIERS][1])
 
 
 def _search_scale(name: str, starting: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:

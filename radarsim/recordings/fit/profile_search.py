@@ -14,10 +14,11 @@ from radarsim.recordings.fit.likelihood_slice import (
     IMPOSSIBLE_LOG_LIKELIHOOD,
     ROUGH_ACCURACY,
     Progress,
+    single_explanations,
     starting_values,
 )
 from radarsim.recordings.fit.newton_steps import FIRST_STEP, TOLERANCE, Curvature, polish_maximum
-from radarsim.studies.recording_interface import Likelihood
+from radarsim.studies.recording_interface import NEAR, NEAR_PART, OUTLIERS, Likelihood
 
 # likelihood evaluations of a key to the maximum and to an end; of an explanation
 MAXIMUM_EVALUATIONS = 130
@@ -33,7 +34,11 @@ TRIAL_FALLS = np.array([2.0, 4.0, 6.0])  # below these a key that may be zero is
 TRIAL_RISES = np.arange(1.0, 16.0)  # above what counts as zero: where a key at zero is tried
 NEAR_ZERO_LOG = 7.0  # above the value that counts as zero, in that logarithm: zero is tried
 SMALL_GAIN_FACTOR = 300.0  # times the accuracy: a Newton step that gains no more ends the search
-MIN_OUTLIER_SHARE, MAX_OUTLIER_SHARE = 1e-6, 0.5  # of outliers; fewer are none
+MIN_OUTLIER_SHARE = 1e-6  # of near or far outliers; fewer are none
+# Of near and far outliers. More of those near would make the sound plots a minority: all plots as outliers of a third
+# of the σ are as likely as none.
+MAX_OUTLIER_SHARES = np.array([0.2, 0.4])
+FIRST_OUTLIER_SHARE = 0.03  # where the search of either begins
 NEAR_MAXIMUM_EVALUATIONS = 30  # as MAXIMUM_EVALUATIONS, from near the maximum
 # factor on the value that counts as zero where the likelihood jumps by more there
 ZERO_REFINEMENT = 1e-3
@@ -64,7 +69,7 @@ class _ProfilePoint(NamedTuple):
 
 class LikelihoodSearch:
     """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and the
-    logit of the share of outliers."""
+    logits of the shares of near and far outliers."""
 
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, start_point: np.ndarray | None = None):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
@@ -73,8 +78,12 @@ class LikelihoodSearch:
         self.highest = start + math.log(INTERVAL_REACH)
         if robust:
             start, self.lowest, self.highest = (
-                np.append(keys, math.log(share / (1 - share)))
-                for keys, share in ((start, 0.05), (self.lowest, MIN_OUTLIER_SHARE), (self.highest, MAX_OUTLIER_SHARE))
+                np.append(keys, np.log(shares / (1 - shares)))
+                for keys, shares in (
+                    (start, np.full(2, FIRST_OUTLIER_SHARE)),
+                    (self.lowest, np.full(2, MIN_OUTLIER_SHARE)),
+                    (self.highest, MAX_OUTLIER_SHARES),
+                )
             )
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
         self.curvature_model = Curvature(self._log_likelihood)
@@ -125,28 +134,36 @@ class LikelihoodSearch:
         return point if value > self.top + TOLERANCE else None
 
     def to_values(self, point: np.ndarray) -> np.ndarray:
-        """The keys, and the share of outliers at the end if allowed for: at most MAX_OUTLIER_SHARE, since all plots
-        as outliers of a tenth of the σ are as likely as none."""
+        """The keys, and the shares of near and far outliers at the end if allowed for."""
         count = len(self.likelihood.stated)
         keys = np.exp(np.clip(point[:count], -200, 200))
         keys = np.where(keys <= self.likelihood.least, 0.0, keys)
-        share = 1 / (1 + np.exp(-point[count:]))
-        share = np.where(share <= MIN_OUTLIER_SHARE, 0.0, np.minimum(share, MAX_OUTLIER_SHARE))
-        return np.append(keys, share) if self.robust else keys
+        if not self.robust:
+            return keys
+        shares = 1 / (1 + np.exp(-point[count:]))
+        return np.append(keys, np.where(shares <= MIN_OUTLIER_SHARE, 0.0, np.minimum(shares, MAX_OUTLIER_SHARES)))
+
+    def outliers(self, point: np.ndarray) -> dict[str, float]:
+        """The share of outliers and the part of them that is near, as a likelihood takes them; empty if not allowed
+        for."""
+        if not self.robust:
+            return {}
+        shares = self.to_values(point)[-2:]
+        return {OUTLIERS: float(shares.sum()), NEAR: float(shares[0] / shares.sum()) if shares.any() else NEAR_PART}
 
     def _log_likelihood(self, point: np.ndarray) -> float:
         values = self.to_values(point)
         self.evaluations += 1
         self.progress(self.evaluations, self._expected_evaluations())
         count = len(self.likelihood.stated)
-        result = self.likelihood(values[:count], float(values[count]) if self.robust else 0.0)
+        result = self.likelihood(values[:count], **self.outliers(point))
         return result if math.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
 
     def _expected_evaluations(self) -> int:
         """Expected number of evaluations: the maximum and each end at their usual cost, or at that of those found so
         far."""
-        end_count, size = 2 * len(self.likelihood.keys), len(self.likelihood.keys) + self.robust
-        explanation_cost = EXPLANATION_EVALUATIONS * (len(self.likelihood.explains) - self.robust)
+        end_count, size = 2 * len(self.likelihood.keys), self.lowest.size
+        explanation_cost = EXPLANATION_EVALUATIONS * (len(single_explanations(self.likelihood)) - self.robust)
         maximum_cost = self.ends_started_at or max(self.maximum_cost, self.evaluations)
         end_cost = (
             (self.evaluations - self.ends_started_at) / self.end_count if self.end_count else END_EVALUATIONS * size

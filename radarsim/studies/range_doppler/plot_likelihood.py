@@ -14,7 +14,8 @@ from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filter_design import noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import recorded_rows
 from radarsim.studies.range_doppler.tracking import MEASURED, START_RANGES, configured_variances
-from radarsim.studies.recording_interface import EXPLANATIONS, usual_interval_s
+from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
+from radarsim.studies.recording_interface import EXPLANATIONS, NEAR_PART, outlier_shares, usual_interval_s
 
 MIN_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 WIDE_VELOCITY_MPS, WIDE_ACCELERATION_MPS2 = 3e4, 3e3  # standard deviations before the first plot: nothing is known
@@ -46,73 +47,101 @@ class PlotLikelihood:
         self.keys, self.stated = tuple(configured), np.array(list(configured.values()), dtype=float)
         self.least = self.stated * np.array([1e-4] * self.observes + [MIN_MANOEUVRE])
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
-        self.problems = [problem for columns in tracks if (problem := self._problem(columns)) is not None]
+        self.columns = tuple(name for name, _ in MEASURED[: self.observes])
+        self.span = data_span(tracks, self.columns)
+        self.given_tracks = list(tracks)
+        self.cleaned_tracks = [without_gross_starts(columns, self.columns, START_RANGES) for columns in tracks]
+        problems = (self._problem(number, columns) for number, columns in enumerate(self.cleaned_tracks))
+        self.problems = [problem for problem in problems if problem is not None]
 
-    def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
-        """A track from its first range on; None where it has none."""
-        has_range = np.isfinite(columns["range_m"])
-        if not has_range.any():
-            return None
-        first = int(has_range.argmax())
-        t = columns["t_s"][first:]
-        dt = np.diff(t, prepend=t[0])
-        z = np.stack([columns["range_m"], columns["velocity_mps"]], axis=1)[first:, : self.observes]
+    def _problem(self, track: int, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
+        """A track from its first range on, its rows that measure something; None where it has no range."""
+        z = np.stack([columns[name] for name in self.columns], axis=1)
         present = np.isfinite(z)
+        if not present[:, 0].any():
+            return None
+        first = int(present[:, 0].argmax())
+        rows = first + np.flatnonzero(present[first:].any(axis=1))
+        t, z, present = columns["t_s"][rows], z[rows], present[rows]
+        settled = int(np.searchsorted(np.cumsum(present[:, 0]), START_RANGES, side="right"))
         present[0, 0] = False  # it starts the track
+        dt = np.diff(t, prepend=t[0])
         F, Q = np.stack([transition(step) for step in dt]), unpack(recorded_rows.noise_over(self.noise, dt))
         H = np.tile(observation(self.observes), (len(t), 1, 1))
-        settled = int(np.searchsorted(np.cumsum(has_range[first:]), START_RANGES, side="right"))
-        return _Problem(F, Q, H, np.where(np.isfinite(z), z, 0.0), present, settled, dt / self.usual_s)
+        return _Problem(track, rows, F, Q, H, np.where(present, z, 0.0), z[0, 0], present, settled, dt / self.usual_s)
 
-    def _scores(self, values: np.ndarray, outliers: float, bias: float, correlation: float) -> np.ndarray:
-        """Sums over all tracks for each number that counts; the first plots, which find the state, are left out."""
-        manoeuvre = float(values[self.observes])
-        variances, total = np.square(values[: self.observes]), np.zeros(self.observes)
+    def _score(
+        self, problem: "_Problem", values: np.ndarray, shares: np.ndarray, bias: float = 0.0, correlation: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The log-densities (n, m) of a track's numbers, and their probabilities to be no outliers."""
+        variances, manoeuvre = np.square(values[: self.observes]), float(values[self.observes])
+        x, P = np.zeros(3), np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
+        P[0, 0] *= start_factor(shares)
+        x[0] = problem.start
+        score, soundness, spread = (*np.empty((2, *problem.z.shape)), np.tile(variances, (len(problem.z), 1)))
         offset = np.zeros(self.observes)
         offset[1:] = bias * values[1 : self.observes]
+        z = problem.z - offset if bias else problem.z
+        model, scale, white = (x, P, problem.F, problem.Q, problem.H), manoeuvre, 1.0
+        if correlation:
+            error_covariance = np.zeros((3, self.observes))  # it is where the first plot is, and errs by its error
+            error_covariance[0, 0] = -math.sqrt(variances[0])
+            noise, shares_left = manoeuvre * problem.Q, correlation**problem.intervals
+            model = with_lasting_errors(x, P, error_covariance, problem.F, noise, problem.H, spread, shares_left)
+            scale, white = 1.0, 0.0
+        log_likelihood(*model, z, spread, problem.present, scale, shares, self.span, white, score, soundness)
+        return score, soundness
+
+    def _scores(
+        self, values: np.ndarray, shares: np.ndarray, bias: float = 0.0, correlation: float = 0.0
+    ) -> np.ndarray:
+        """Sums over all tracks for each number that counts; the first plots, which find the state, are left out."""
+        total = np.zeros(self.observes)
         for problem in self.problems:
-            x, P = np.zeros(3), np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
-            x[0] = problem.z[0, 0]
-            score, spread = np.empty(problem.z.shape), np.tile(variances, (len(problem.z), 1))
-            z = problem.z - offset if bias else problem.z
-            model, scale, white = (x, P, problem.F, problem.Q, problem.H), manoeuvre, 1.0
-            if correlation:
-                error_covariance = np.zeros((3, self.observes))  # it is where the first plot is, and errs by its error
-                error_covariance[0, 0] = -math.sqrt(variances[0])
-                model = with_lasting_errors(
-                    x,
-                    P,
-                    error_covariance,
-                    problem.F,
-                    manoeuvre * problem.Q,
-                    problem.H,
-                    spread,
-                    correlation**problem.intervals,
-                )
-                scale, white = 1.0, 0.0
-            log_likelihood(*model, z, spread, problem.there, scale, outliers, white, score)
+            score, _ = self._score(problem, values, shares, bias, correlation)
             total += score[problem.settled :].sum(axis=0)
         return total
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+    def __call__(
+        self,
+        values: np.ndarray,
+        outliers: float = 0.0,
+        bias: float = 0.0,
+        correlation: float = 0.0,
+        manoeuvres: float = 0.0,
+        near: float = NEAR_PART,
+    ) -> float:
         """The logarithm of the likelihood; bias: of the velocity, in its σ."""
-        return float(self._scores(values, outliers, bias, correlation).sum())
+        shares = outlier_shares(outliers, near, manoeuvres)
+        return float(self._scores(values, shares, bias, correlation).sum())
+
+    def soundness(
+        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    ) -> list[dict[str, np.ndarray]]:
+        """The probability of each number that it is no outlier; zero of gross errors before the start."""
+        shares = outlier_shares(outliers, near, 0.0)
+        scored = [
+            (problem.track, problem.rows, self._score(problem, values, shares, 0.0, correlation)[1])
+            for problem in self.problems
+        ]
+        return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, scored)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of range and velocity."""
-        total = self._scores(values, 0.0, 0.0, 0.0)
-        return {name: float(part) for (name, _), part in zip(MEASURED[: self.observes], total, strict=False)}
+        total = self._scores(values, np.zeros(3))
+        return {name: float(part) for name, part in zip(self.columns, total, strict=True)}
 
 
 class _Problem(NamedTuple):
-    """A track for the kernel: transitions and process noises of unit variance (n, 3, 3), the rows (n, m, 3) of its
-    numbers (n, m), which of these count, the row from which the state is known, and the time (n,) since the row before
-    in usual intervals."""
+    """A track for the kernel: its number, and the rows of it that measure something, from the first range on."""
 
-    F: np.ndarray
-    Q: np.ndarray
-    H: np.ndarray
-    z: np.ndarray
-    there: np.ndarray
-    settled: int
-    intervals: np.ndarray
+    track: int
+    rows: np.ndarray  #: (n,)
+    F: np.ndarray  #: (n, 3, 3) transitions to each row
+    Q: np.ndarray  #: (n, 3, 3) process noise of unit variance
+    H: np.ndarray  #: (n, m, 3)
+    z: np.ndarray  #: (n, m) the numbers
+    start: float  #: the first range
+    present: np.ndarray  #: (n, m) which numbers count
+    settled: int  #: row from which the state is known
+    intervals: np.ndarray  #: (n,) time since the row before, in usual intervals

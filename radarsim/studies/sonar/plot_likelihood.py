@@ -8,7 +8,15 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
 from radarsim.physics.motion import manoeuvre_covariance, transition
-from radarsim.studies.recording_interface import CORRELATION, OUTLIERS, usual_interval_s
+from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
+from radarsim.studies.recording_interface import (
+    CORRELATION,
+    MANOEUVRES,
+    NEAR_PART,
+    OUTLIERS,
+    outlier_shares,
+    usual_interval_s,
+)
 from radarsim.studies.sonar import conversion
 from radarsim.studies.sonar.scene import lateral_scale, third_coordinate
 from radarsim.studies.sonar.tracking import BEARING, RANGE, THIRD_COLUMN_AND_KEY, unwrap_bearings
@@ -46,31 +54,40 @@ class PlotLikelihood:
             configured.append(member.manoeuvre_variance or 0.0)
             smallest.append(MIN_MANOEUVRE_SHARE * (sensor.sigma_range_m / sensor.scan_period_s**self.size) ** 2)
         self.keys, self.stated, self.least = tuple(names), np.array(configured), np.array(smallest)
-        problems = (self._problem(list(columns.values()), scale) for columns in tracks)
+        if member.kind == "kalman":
+            self.explains = (*self.explains, MANOEUVRES)
+        self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
+        self.span = data_span(tracks, self.columns)
+        if self.spec.frame != "polar":
+            self.span[:2] = 2 * max(float(np.nanmax(np.abs(track["range_m"]), initial=0.0)) for track in tracks)
+        smooth_tracks = [{**track, "bearing_rad": unwrap_bearings(track["bearing_rad"])} for track in tracks]
+        self.cleaned_tracks = [without_gross_starts(track, self.columns, STARTING_PLOTS) for track in smooth_tracks]
+        problems = (self._problem(number, track, scale) for number, track in enumerate(self.cleaned_tracks))
         self.problems = [problem for problem in problems if problem is not None]
 
-    def _problem(self, columns: Sequence[np.ndarray], scale: np.ndarray) -> "_TrackProblem | None":
-        """A track from its first complete plot on; None if it has none."""
-        t, *values = columns
-        is_whole = np.isfinite(np.stack(values)).all(axis=0)
+    def _problem(self, track: int, columns: Mapping[str, np.ndarray], scale: np.ndarray) -> "_TrackProblem | None":
+        """A track from its first complete plot on, its rows that measure something; None if it has none."""
+        z, C, size = np.stack([columns[name] for name in self.columns]), self.coordinates, self.size
+        is_whole = np.isfinite(z).all(axis=0)
         if not is_whole.any():
             return None
-        first, C, size = int(is_whole.argmax()), self.coordinates, self.size
-        t, z = t[first:], np.stack(values)[:, first:]
-        z[1] = unwrap_bearings(z[1])
         is_used = np.isfinite(z).T.copy()
         if self.spec.frame != "polar":
             is_used[:, :2] = is_used[:, :2].all(axis=1, keepdims=True)
+        first = int(is_whole.argmax())
+        rows = first + np.flatnonzero(is_used[first:].any(axis=1))
+        t, z, is_used, is_whole = columns["t_s"][rows], z[:, rows], is_used[rows], is_whole[rows]
         steps = np.diff(t, prepend=t[0])
         eye = np.eye(C)
         F = np.stack([np.kron(eye, transition(step, size)) for step in steps])
         Q = np.stack([np.kron(np.diag(scale), manoeuvre_covariance(1.0, step, size)) for step in steps])
-        settled = int(np.searchsorted(np.cumsum(is_whole[first:]), STARTING_PLOTS, side="right"))
+        settled = int(np.searchsorted(np.cumsum(is_whole), STARTING_PLOTS, side="right"))
         usual_interval_s = float(np.median(steps[1:])) if len(steps) > 1 else self.spec.sensor.scan_period_s
         rates = WIDE_RATE_SIGMAS * usual_interval_s ** -np.arange(1.0, size)
         is_used[0] = False  # it starts the track
-        second_whole = int(is_whole[first + 1 :].argmax()) + 1 if is_whole[first + 1 :].any() else 0
-        problem = _TrackProblem(F, Q, np.where(np.isfinite(z), z, 0.0), is_used, t - t[0], rates, second_whole, settled)
+        second_whole = int(is_whole[1:].argmax()) + 1 if is_whole[1:].any() else 0
+        z, t = np.where(np.isfinite(z), z, 0.0), t - t[0]
+        problem = _TrackProblem(track, rows, F, Q, z, is_used, t, rates, second_whole, settled)
         _, directions, variance = self._numbers(problem, self.stated[:C])  # the stated errors, whatever is tried
         position_sigma = np.sqrt(np.diag(directions[0].T @ np.diag(variance[0]) @ directions[0]))
         return problem._replace(rates=np.outer(rates, position_sigma))
@@ -93,47 +110,77 @@ class PlotLikelihood:
             variance[:, :2], directions[:, :2, :2] = np.maximum(values, 0.0), np.swapaxes(vectors, 1, 2)
         return positions, directions, variance
 
-    def _score(self, values: np.ndarray, outliers: float, correlation: float = 0.0) -> float:
+    def _track_score(
+        self, problem: "_TrackProblem", values: np.ndarray, shares: np.ndarray, correlation: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The log-densities (n, C) of a track's numbers, and their probabilities to be no outliers."""
         sigma, C, size = values[: self.coordinates], self.coordinates, self.size
-        manoeuvre, total = float(values[C]) if len(values) > C else 0.0, 0.0
-        for problem in self.problems:
-            positions, directions, variance = self._numbers(problem, sigma)
-            H = np.zeros((*directions.shape[:2], C * size))
-            H[:, :, ::size] = directions
-            z = np.einsum("nij,nj->ni", directions, positions)
-            x, P = np.zeros(C * size), np.zeros((C * size, C * size))
-            x[::size] = positions[0]
-            if problem.second_whole:
-                x[1::size] = (positions[problem.second_whole] - positions[0]) / problem.t[problem.second_whole]
-            start = directions[0].T @ np.diag(variance[0]) @ directions[0]
-            P[::size, ::size] = start
-            for i, rate in enumerate(problem.rates, start=1):
-                P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
-            model, scale, white = (x, P, problem.F, problem.Q, H), manoeuvre, 1.0
-            if correlation:
-                error_loading = np.zeros((C * size, C))
-                coordinates = np.arange(C)
-                error_loading[coordinates * size, coordinates] = -sigma
-                shares = correlation ** (np.diff(problem.t, prepend=0.0) / self.usual_s)
-                model = with_lasting_errors(x, P, error_loading, problem.F, manoeuvre * problem.Q, H, variance, shares)
-                scale, white = 1.0, 0.0
-            score = np.empty(z.shape)
-            log_likelihood(*model, z, variance, problem.is_used, scale, outliers, white, score)
-            total += float(score[problem.settled :].sum())
-        return total
+        manoeuvre = float(values[C]) if len(values) > C else 0.0
+        positions, directions, variance = self._numbers(problem, sigma)
+        H = np.zeros((*directions.shape[:2], C * size))
+        H[:, :, ::size] = directions
+        z = np.einsum("nij,nj->ni", directions, positions)
+        x, P = np.zeros(C * size), np.zeros((C * size, C * size))
+        x[::size] = positions[0]
+        if problem.second_whole:
+            x[1::size] = (positions[problem.second_whole] - positions[0]) / problem.t[problem.second_whole]
+        start = directions[0].T @ np.diag(variance[0]) @ directions[0]
+        P[::size, ::size] = start * start_factor(shares)
+        for i, rate in enumerate(problem.rates, start=1):
+            P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
+        model, scale, white = (x, P, problem.F, problem.Q, H), manoeuvre, 1.0
+        if correlation:
+            error_loading = np.zeros((C * size, C))
+            coordinates = np.arange(C)
+            error_loading[coordinates * size, coordinates] = -sigma
+            lasting = correlation ** (np.diff(problem.t, prepend=0.0) / self.usual_s)
+            model = with_lasting_errors(x, P, error_loading, problem.F, manoeuvre * problem.Q, H, variance, lasting)
+            scale, white = 1.0, 0.0
+        score, soundness = np.empty((2, *z.shape))
+        log_likelihood(*model, z, variance, problem.is_used, scale, shares, self.span, white, score, soundness)
+        return score, soundness
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
+    def _score(self, values: np.ndarray, shares: np.ndarray, correlation: float = 0.0) -> float:
+        """The sum over all tracks; the first plots, which find the state, are left out."""
+        return sum(
+            float(self._track_score(problem, values, shares, correlation)[0][problem.settled :].sum())
+            for problem in self.problems
+        )
+
+    def __call__(
+        self,
+        values: np.ndarray,
+        outliers: float = 0.0,
+        bias: float = 0.0,
+        correlation: float = 0.0,
+        manoeuvres: float = 0.0,
+        near: float = NEAR_PART,
+    ) -> float:
         """The logarithm of the likelihood; a bias is not part of the model."""
-        return self._score(values, outliers, correlation)
+        return self._score(values, outlier_shares(outliers, near, manoeuvres), correlation)
+
+    def soundness(
+        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    ) -> list[dict[str, np.ndarray]]:
+        """The probability of each number that it is no outlier; in x and y of range and bearing together."""
+        shares, judged = outlier_shares(outliers, near, 0.0), []
+        for problem in self.problems:
+            soundness = self._track_score(problem, values, shares, correlation)[1]
+            if self.spec.frame != "polar":
+                soundness[:, :2] = soundness[:, :2].min(axis=1, keepdims=True)
+            judged.append((problem.track, problem.rows, soundness))
+        return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The logarithm of the likelihood of complete plots: their numbers are not independent in every frame."""
-        return {"plot": self._score(values, 0.0)}
+        return {"plot": self._score(values, np.zeros(3))}
 
 
 class _TrackProblem(NamedTuple):
     """A recorded track as the kernel needs it, from its first complete plot on."""
 
+    track: int  #: its number
+    rows: np.ndarray  #: (n,) of the track, those that measure something
     F: np.ndarray  #: (n, d, d) transitions
     Q: np.ndarray  #: (n, d, d) process noise of unit variance
     z: np.ndarray  #: (C, n) values as measured

@@ -1,0 +1,84 @@
+"""Gross errors at the start of recorded tracks, and which numbers of a track are outliers.
+
+A filter starts from the first plots. One of them that is far off would make outliers of all that follow, so it is left
+out: from the first plots the parabola is found that passes nearest to the majority (least median of squares, Rousseeuw
+1984), and a number far from it is a gross error."""
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from radarsim.kernels.likelihood import FAR, FAR_WIDTH, NEAR, NEAR_WIDTH
+
+START_PLOTS = 15  # from which the parabola is found
+MIN_START_PLOTS = 8
+TRIPLE_STRIDE = 4  # of all triples of them every so manieth: enough to have some without an error
+GROSS_SIGMAS = 6.0  # of the scale that is found, of a gross error: of sound tracks in 3 of 1000
+
+
+def without_gross_starts(
+    columns: Mapping[str, np.ndarray], measured: Sequence[str], start_count: int
+) -> dict[str, np.ndarray]:
+    """Columns (n,) of a track, of those measured with not-a-number for gross errors among the first plots, until
+    `start_count` sound ones have come."""
+    cleaned = dict(columns)
+    for name in measured:
+        finite = np.flatnonzero(np.isfinite(columns[name]))[:START_PLOTS]
+        gross = gross_errors(columns["t_s"][finite], columns[name][finite])
+        gross &= np.cumsum(~gross) < start_count
+        if gross.any():
+            cleaned[name] = columns[name].copy()
+            cleaned[name][finite[gross]] = np.nan
+    return cleaned
+
+
+def gross_errors(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Which numbers z (n,) at times t are gross errors (n,): none where too few tell."""
+    count = len(z)
+    if count < MIN_START_PLOTS:
+        return np.zeros(count, dtype=bool)
+    times = (t - t[0]) / (t[-1] - t[0])
+    powers = times[:, None] ** np.arange(3)
+    triples = np.array(list(itertools.combinations(range(count), 3)))[::TRIPLE_STRIDE]
+    coefficients = np.linalg.solve(powers[triples], z[triples][..., None])[..., 0]
+    residuals = np.abs(z - coefficients @ powers.T)
+    majority = np.sort(residuals, axis=1)[:, (count + 3) // 2]
+    best = int(majority.argmin())
+    # The median of a normal law, and the correction for few plots, as Rousseeuw and Leroy (1987) have them.
+    scale = 1.4826 * (1 + 5 / (count - 3)) * float(majority[best])
+    return residuals[best] > GROSS_SIGMAS * scale if scale > 0 else np.zeros(count, dtype=bool)
+
+
+def data_span(tracks: Sequence[Mapping[str, np.ndarray]], measured: Sequence[str]) -> np.ndarray:
+    """The span of the data of all tracks, of each column measured (m,); zero where nothing is."""
+    columns = [np.concatenate([track[name] for track in tracks]) for name in measured]
+    finite = [column[np.isfinite(column)] for column in columns]
+    return np.array([float(np.ptp(column)) if column.size else 0.0 for column in finite])
+
+
+def start_factor(shares: np.ndarray) -> float:
+    """The factor on the variance of a plot that starts a track, where it may be an outlier that is no gross error."""
+    return 1.0 + (NEAR_WIDTH**2 - 1.0) * float(shares[NEAR]) + (FAR_WIDTH**2 - 1.0) * float(shares[FAR])
+
+
+def soundness_by_column(
+    measured: Sequence[str],
+    tracks: Sequence[Mapping[str, np.ndarray]],
+    cleaned_tracks: Sequence[Mapping[str, np.ndarray]],
+    judged: Sequence[tuple[int, np.ndarray, np.ndarray]],
+) -> list[dict[str, np.ndarray]]:
+    """The times t_s of tracks, and the probability of each number that it is no outlier, by column; not-a-number where it
+    is missing; (n,) each.
+
+    cleaned_tracks: the same `without_gross_starts`. judged: the number of a track, rows of it (k,), and their
+    probabilities (k, m)."""
+    result = [{name: np.where(np.isfinite(track[name]), 1.0, np.nan) for name in measured} for track in tracks]
+    for number, rows, soundness in judged:
+        for i, name in enumerate(measured):
+            column = result[number][name]
+            column[rows] = np.where(np.isfinite(column[rows]), soundness[:, i], np.nan)
+    for track, cleaned, probabilities in zip(tracks, cleaned_tracks, result, strict=True):
+        for name in measured:
+            probabilities[name][np.isfinite(track[name]) & ~np.isfinite(cleaned[name])] = 0.0
+    return [{"t_s": track["t_s"], **probabilities} for track, probabilities in zip(tracks, result, strict=True)]
