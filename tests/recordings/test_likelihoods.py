@@ -6,7 +6,7 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal as normal
 
 from radarsim.api.load_experiments import load_all
-from radarsim.kernels.likelihood import OUTLIER_FACTOR, log_likelihood, with_lasting_errors
+from radarsim.kernels.likelihood import HARD_FACTOR, log_likelihood, with_lasting_errors
 from radarsim.physics import frames
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.recordings import simulate_plots
@@ -14,6 +14,7 @@ from radarsim.recordings.fit import advice, fit
 from radarsim.recordings.study_part import recording_interface
 from radarsim.studies.multimodel.model_bank import start_weights
 from radarsim.studies.sonar import conversion
+from tests.recordings.error_laws import error_laws
 from tests.tolerances import Z, assert_rounded, polynomial_condition, rounding, scaled_condition
 
 
@@ -31,6 +32,11 @@ def recording(config, *overrides, number=0):
 
 def likelihood(case, name, *tracks):
     return recording_interface(case).likelihood(case, name, list(tracks))
+
+
+def no_outliers(numbers):
+    """The arguments of the kernel for which there are neither outliers nor hard manoeuvres."""
+    return np.zeros(3), np.ones(numbers)
 
 
 def density_size(off, spread):
@@ -64,7 +70,7 @@ def test_the_kernel_is_the_density_of_all_numbers_together():
     off = (z.ravel() - rows @ np.concatenate(means))[chosen]
     expected = normal.logpdf(off, cov=spread)
     score = np.empty((n, 2))
-    log_likelihood(x.copy(), P.copy(), F, Q, H, z, variance, there, q, 0.0, 1.0, score)
+    log_likelihood(x.copy(), P.copy(), F, Q, H, z, variance, there, q, *no_outliers(2), 1.0, score, np.empty((n, 2)))
     assert_rounded(score.sum(), expected, density_size(off, spread), operations=len(off))
     assert np.all(score[~there] == 0)
 
@@ -90,7 +96,7 @@ def test_nothing_known_before_the_first_plot_costs_no_digits():
     there[0] = False
     rows = np.tile(np.eye(3)[:2], (n, 1, 1)), z, np.tile(variance, (n, 1)), there
     start = np.array([z[0, 0], 0.0, 0.0]), wide
-    log_likelihood(*start, np.tile(F, (n, 1, 1)), np.tile(Q, (n, 1, 1)), *rows, q, 0.0, 1.0, score)
+    log_likelihood(*start, np.tile(F, (n, 1, 1)), np.tile(Q, (n, 1, 1)), *rows, q, *no_outliers(1), 1.0, score, np.empty(score.shape))
     assert_rounded(score.sum(), float(expected), size)
 
 
@@ -123,25 +129,51 @@ def test_errors_that_last_have_the_density_of_their_correlations():
     expected = normal.logpdf(off, cov=spread)
     variance, score = np.tile(sigma**2, (n, 1)), np.empty((n, m))
     model = with_lasting_errors(x, P, first, F, q * Q, H, variance, rho**steps)
-    log_likelihood(*model, z, variance, there, 1.0, 0.0, 0.0, score)
+    log_likelihood(*model, z, variance, there, 1.0, *no_outliers(m), 0.0, score, np.empty((n, m)))
     assert_rounded(score.sum(), expected, density_size(off, spread), operations=len(off))
 
 
-def test_an_outlier_leaves_the_moments_of_both_explanations():
+def test_an_outlier_leaves_the_moments_of_all_explanations():
     """Of the second number, after a first that is a mixture: Bayes' rule by hand."""
-    P, variance, share, z = 4.0, 1.0, 0.2, np.array([[7.0], [1.0]])
-    spreads, chances = P + variance * np.array([1, OUTLIER_FACTOR**2]), np.array([1 - share, share])
+    P, variance, shares, span, z = 4.0, 1.0, np.array([0.2, 0.1, 0.0]), 500.0, np.array([[7.0], [1.0]])
+    chances, widths = error_laws(shares, span, variance)
+    spreads = P + variance * widths**2
     first = chances * np.exp(-0.5 * z[0] ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
     w = first / first.sum()
     means, variances = P / spreads * z[0], P - P**2 / spreads
     mean = w @ means
     merged = w @ (variances + (means - mean) ** 2)
-    spreads = merged + variance * np.array([1, OUTLIER_FACTOR**2])
+    spreads = merged + variance * widths**2
     second = chances * np.exp(-0.5 * (z[1] - mean) ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
-    one, score = np.ones((2, 1, 1)), np.empty((2, 1))
-    there = np.ones((2, 1), dtype=bool)
-    log_likelihood(np.zeros(1), np.array([[P]]), one, 0 * one, one, z, np.ones((2, 1)), there, 0.0, share, 1.0, score)
-    assert_rounded(score[:, 0], np.log([first.sum(), second.sum()]), operations=30)
+    one, (score, sound) = np.ones((2, 1, 1)), np.empty((2, 2, 1))
+    there, x, P = np.ones((2, 1), dtype=bool), np.zeros(1), np.array([[P]])
+    given = z, np.ones((2, 1)), there, 0.0, shares, np.array([span]), 1.0
+    log_likelihood(x, P, one, 0 * one, one, *given, score, sound)
+    assert_rounded(score[:, 0], np.log([first.sum(), second.sum()]), operations=60)
+    assert_rounded(sound[:, 0], np.array([w[0], second[0] / second.sum()]), operations=60)
+
+
+def test_a_hard_manoeuvre_is_a_second_process_noise():
+    """Of two numbers in a row, before which the target may have manoeuvred hard: the mixture of two joint densities;
+    the state after it has the moments of both."""
+    P, q, share, z, F = np.array([[4.0, 0.3], [0.3, 1.0]]), 0.2, 0.3, np.array([1.0, 6.0]), transition(2.0, 2)
+    Q, H = manoeuvre_covariance(1.0, 2.0, 2), np.array([[1.0, 0.0], [0.3, 1.0]])
+    parts = []
+    for chance, noise in ((1 - share, q), (share, HARD_FACTOR * q)):
+        predicted = F @ P @ F.T + noise * Q
+        S = H @ predicted @ H.T + np.eye(2)
+        K = predicted @ H.T @ np.linalg.inv(S)
+        parts.append((chance * normal.pdf(z, np.zeros(2), S), K @ z, predicted - K @ S @ K.T))
+    total = sum(part[0] for part in parts)
+    mean, spread = merged([part[0] / total for part in parts], [part[1:] for part in parts])
+    rows, (score, sound) = np.stack([np.zeros(2), z]), np.empty((2, 2, 2))
+    there = np.array([[False, False], [True, True]])
+    x, P, shares = np.zeros(2), P.copy(), np.array([0.0, 0.0, share])
+    twice = [np.stack([matrix] * 2) for matrix in (F, Q, H)]
+    log_likelihood(x, P, *twice, rows, np.ones((2, 2)), there, q, shares, np.ones(2), 1.0, score, sound)
+    assert_rounded(score.sum(), np.log(total), density_size(z, S), operations=60)
+    assert_rounded(x, mean, scaled_condition(S), operations=60)
+    assert_rounded(P, spread, scaled_condition(S) * np.abs(spread).max(), operations=60)
 
 
 # ---- sonar -----------------------------------------------------------------------------------------------------------
@@ -272,26 +304,30 @@ def density_rounding(case, columns):
     return rounding(scaled_condition(local_plots(case.spec, columns)[1]).max(), 200)
 
 
-def interacting(case, options, columns, T, share=0.0):
+def interacting(case, options, columns, T, shares=(0.0, 0.0)):
     """IMM of the book over a track (one model: a Kalman filter), with outliers merged by moments; T: over the scan."""
     spec, t = case.spec, columns["t_s"]
     z, R = local_plots(spec, columns)
     a, b, g = start_weights(t[:3], spec.start_acceleration_mps2).reshape(3, 3)
     x = np.concatenate([[a @ z[:3, i], b @ z[:3, i], 0.0] for i in range(3)])
     lifts = [np.kron(np.eye(3), np.array([[a[k]], [b[k]], [0.0]])) for k in range(3)]
-    P = sum(lift @ R[k] @ lift.T for k, lift in enumerate(lifts)) + np.kron(np.eye(3), np.outer(g, g))
+    wider = 1 + 8 * shares[0] + 99 * shares[1]  # the mean square of an error in a plot that starts the track
+    P = wider * sum(lift @ R[k] @ lift.T for k, lift in enumerate(lifts)) + np.kron(np.eye(3), np.outer(g, g))
     M, H = len(options.models), np.kron(np.eye(3), np.array([[1.0, 0, 0]]))
     bank, p, total = [(x, P)] * M, np.full(M, 1 / M), 0.0
     for k in range(3, len(t)):
         c = T @ p
-        scores, parts = np.zeros((M, 2)), []
+        smallest = np.linalg.eigvalsh(R[k])[0]
+        chances, widths = error_laws((*shares, 0.0), np.ptp(columns["range_m"]), smallest)
+        possible = [(chance, width**2 * R[k]) for chance, width in zip(chances, widths, strict=True) if chance > 0]
+        scores, parts = np.zeros((M, len(possible))), []
         for i, (F, Q) in enumerate(models_over(options, t[k] - t[k - 1])):
             mean, P = merged(T[i] * p / c[i], bank)
             mean, P = F @ mean, F @ P @ F.T + Q
             parts.append([])
-            for wild, noise in enumerate((R[k], OUTLIER_FACTOR**2 * R[k])):
+            for law, (chance, noise) in enumerate(possible):
                 S = H @ P @ H.T + noise
-                scores[i, wild] = normal.logpdf(z[k], H @ mean, S) + np.log((1 - share, share or 1e-300)[wild])
+                scores[i, law] = normal.logpdf(z[k], H @ mean, S) + np.log(chance)
                 K = P @ H.T @ np.linalg.inv(S)
                 parts[-1].append((mean + K @ (z[k] - H @ mean), P - K @ S @ K.T))
         scores += np.log(c)[:, None]
@@ -316,14 +352,15 @@ PAIR = (
 )
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1])
-def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(share):
+@pytest.mark.parametrize("shares", [(0.0, 0.0), (0.03, 0.07)])
+def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(shares):
     case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
     for name, T in (("two", np.array([[0.9, 0.1], [0.1, 0.9]])), ("one", np.ones((1, 1)))):
         one = likelihood(case, name, columns)
         (options,) = (each for each in case.spec.filters if each.name == name)
-        expected = interacting(case, options, columns, T, share)
-        assert one(one.stated, share) == pytest.approx(expected, rel=density_rounding(case, columns))
+        expected = interacting(case, options, columns, T, shares)
+        near = shares[0] / (sum(shares) or 1)
+        assert one(one.stated, sum(shares), near=near) == pytest.approx(expected, rel=density_rounding(case, columns))
 
 
 def test_the_multimodel_likelihood_does_not_leap():

@@ -6,6 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.kernels.lanes import WIDTH
+from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH, NEAR_WIDTH
+from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
 from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Filter, Keys
 from radarsim.studies.multimodel.kernels import filter_strip, layout, likelihood
@@ -13,7 +16,7 @@ from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.study import banks
 from radarsim.studies.multimodel.tracking import lane_rows, sigmas
-from radarsim.studies.recording_interface import OUTLIERS, usual_interval_s
+from radarsim.studies.recording_interface import NEAR_PART, OUTLIERS, outlier_shares, usual_interval_s
 
 MIN_VALUE_RATIO = 1e-4  # to a key's configured value: smaller values count as zero
 
@@ -38,22 +41,30 @@ class PlotLikelihood:
         self.keys = (*names, f"filters.{filter_index}.models.{self.hardest}.sigma_acceleration_mps2")
         self.stated = np.array([*self.spec.sensor.sigma, spreads[self.hardest]])
         self.least = np.append(MIN_VALUE_RATIO * self.stated[:3], MIN_VALUE_RATIO * (self.stated[3] or 1.0))
-        self.measured = np.concatenate([np.stack(list(columns.values())[1:], axis=1) for columns in tracks])
+        self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
+        self.span = float(data_span(tracks, self.columns[:1] if "range_m" in self.columns else self.columns).max())
+        self.cleaned_tracks = [without_gross_starts(columns, self.columns, layout.START) for columns in tracks]
+        self.measured = np.concatenate(
+            [np.stack([columns[name] for name in self.columns], axis=1) for columns in self.cleaned_tracks]
+        )
         is_valid = local_plots(self.spec.sensor, self.measured)[2]
         last_rows = np.cumsum([len(columns["t_s"]) for columns in tracks])
         times_and_starts = (
             (columns["t_s"], end - len(columns["t_s"])) for columns, end in zip(tracks, last_rows, strict=True)
         )
         problems = (
-            _make_problem(self.spec, self.options, t, first, is_valid[first : first + len(t)])
-            for t, first in times_and_starts
+            _make_problem(self.spec, self.options, number, t, first, is_valid[first : first + len(t)])
+            for number, (t, first) in enumerate(times_and_starts)
         )
         self.problems = [problem for problem in problems if problem is not None]
         self.frame = sensor_frame(self.spec.sensor)
         self.probabilities = model_bank.stationary(model_bank.transition_matrix(self.options.transition))
 
-    def _score(self, values: np.ndarray, merge: str, outliers: float) -> float:
-        """The log likelihood of all tracks, for given values of the keys and a merging rule."""
+    def _track_scores(
+        self, values: np.ndarray, merge: str, shares: np.ndarray
+    ) -> list[tuple["_Problem", np.ndarray, np.ndarray]]:
+        """For each track the log-densities (n,) of its later plots, and their probabilities to be no outliers, for
+        given values of the keys and a merging rule."""
         names = [key.partition(".")[2] for key in self.keys[:3]]
         sensor = self.spec.sensor.model_copy(update=dict(zip(names, values[:3].tolist(), strict=True)))
         models = list(self.options.models)
@@ -63,42 +74,87 @@ class PlotLikelihood:
         filter_bank = banks(self.spec.model_copy(update={"filters": (options,)}), np.ones(1))
         design, numbers = filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
         z, R, is_valid = local_plots(sensor, self.measured)
-        plots, total = np.concatenate([z, R, is_valid[:, None]], axis=1), 0.0
+        plots, result = np.concatenate([z, R, is_valid[:, None]], axis=1), []
+        widths = self._widths(R)
         for problem in self.problems:
             work, state = work_arrays()
-            filter_strip.start_strip(
-                work, state, lane_rows(plots[problem.start_rows]), problem.weights, self.probabilities
-            )
-            later_plots, score = lane_rows(plots[problem.later_plots]), np.empty(len(problem.intervals))
+            start = plots[problem.start_rows]
+            start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= start_factor(shares)
+            filter_strip.start_strip(work, state, lane_rows(start), problem.weights, self.probabilities)
+            later_plots, (score, soundness) = lane_rows(plots[problem.later_plots]), np.empty((2, len(problem.intervals)))
             arguments = design, problem.transitions, problem.intervals, problem.times, numbers, self.frame
-            likelihood.log_likelihood(work, state, later_plots, *arguments, outliers, score)
-            total += float(score.sum())
-        return total
+            later_widths = widths[problem.later_plots]
+            likelihood.log_likelihood(work, state, later_plots, later_widths, *arguments, shares, score, soundness)
+            result.append((problem, score, soundness))
+        return result
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
-        """The log likelihood; bias and correlation are ignored."""
-        return self._score(values, "moment", outliers)
+    def _widths(self, R: np.ndarray) -> np.ndarray:
+        """The factors (n, WIDTH) on the packed covariances R (n, 6) of plots in the lanes, for each law of errors; the
+        widest spans the data in the direction of the smallest error."""
+        xx, xy, xz, yy, yz, zz = R.T
+        matrices = np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), 2, 0)
+        smallest = np.full(len(R), np.nan)
+        finite = np.isfinite(R).all(axis=1)
+        smallest[finite] = np.linalg.eigvalsh(matrices[finite])[:, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(smallest > 0, np.maximum(self.span**2 / (FAR_WIDTH**2 * smallest), 1.0), 1.0)
+        far = FAR_WIDTH**2 * ratio[:, None] ** np.linspace(0, 1, FAR_COUNT)
+        result = np.ones((len(R), WIDTH))
+        result[:, 1], result[:, 2 : 2 + FAR_COUNT] = NEAR_WIDTH**2, far
+        return result
+
+    def __call__(
+        self,
+        values: np.ndarray,
+        outliers: float = 0.0,
+        bias: float = 0.0,
+        correlation: float = 0.0,
+        manoeuvres: float = 0.0,
+        near: float = NEAR_PART,
+    ) -> float:
+        """The log likelihood; of the explanations only outliers are part of the model."""
+        return self._total(values, "moment", outlier_shares(outliers, near, 0.0))
+
+    def _total(self, values: np.ndarray, merge: str, shares: np.ndarray) -> float:
+        """The log likelihood of all tracks."""
+        return sum(float(score.sum()) for _, score, _ in self._track_scores(values, merge, shares))
+
+    def soundness(
+        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    ) -> list[dict[str, np.ndarray]]:
+        """The probability of each plot that it is no outlier, for all its numbers the same."""
+        scores = self._track_scores(values, "moment", outlier_shares(outliers, near, 0.0))
+        judged = [
+            (problem.track, problem.later_rows, np.repeat(soundness[:, None], 3, axis=1))
+            for problem, _, soundness in scores
+        ]
+        return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The log likelihood of the plots, with the filter's own merging rule."""
-        return {"plot": self._score(values, self.options.merge, 0.0)}
+        return {"plot": self._total(values, self.options.merge, np.zeros(3))}
 
 
 class _Problem(NamedTuple):
     """A track for the kernel: the rows and weights of the plots that start it, and the later plots.
 
-    For these the number of the interval before each, the distinct intervals (s), and the transition probabilities."""
+    For these the number of the interval before each, the distinct intervals (s), the transition probabilities, and
+    their rows in the track of this number."""
 
+    track: int
     start_rows: np.ndarray
     weights: np.ndarray
     later_plots: slice
     intervals: np.ndarray
     times: np.ndarray
     transitions: np.ndarray
+    later_rows: np.ndarray
 
 
-def _make_problem(spec: Keys, options: Filter, t: np.ndarray, start: int, is_valid: np.ndarray) -> _Problem | None:
-    """A track at times t (n,) that begins at row `start` of all plots; None if it never starts.
+def _make_problem(
+    spec: Keys, options: Filter, track: int, t: np.ndarray, start: int, is_valid: np.ndarray
+) -> _Problem | None:
+    """A track of a number, at times t (n,), that begins at row `start` of all plots; None if it never starts.
 
     is_valid (n,): which of its plots are valid."""
     start_rows = np.flatnonzero(is_valid)[: layout.START]
@@ -108,10 +164,12 @@ def _make_problem(spec: Keys, options: Filter, t: np.ndarray, start: int, is_val
     transitions = banks(spec.model_copy(update={"filters": (options,)}), times).transitions[0]
     weights = model_bank.start_weights(t[start_rows], spec.start_acceleration_mps2)
     return _Problem(
+        track,
         start + start_rows,
         weights,
         slice(start + start_rows[-1] + 1, start + len(t)),
         index[1:].copy(),
         times,
         transitions,
+        np.arange(start_rows[-1] + 1, len(t)),
     )

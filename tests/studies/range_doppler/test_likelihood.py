@@ -8,6 +8,7 @@ from radarsim.api.load_experiments import load_all
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.studies.range_doppler.plot_likelihood import WIDE_ACCELERATION_MPS2, WIDE_VELOCITY_MPS, PlotLikelihood
 from radarsim.studies.range_doppler.tracking import START_RANGES
+from tests.recordings.error_laws import error_laws
 from tests.tolerances import rounding
 
 T_S = np.array([0.0, 4.0, 9.0, 12.0, 20.0, 26.0, 30.0, 33.0])
@@ -103,13 +104,15 @@ def test_range_alone_ignores_the_velocities():
     assert likelihood(likelihood.stated) == without(likelihood.stated)
 
 
-def twin(columns, values, share, bias):
+def twin(columns, values, shares, bias):
     """Textbook: both explanations of each number updated by themselves, then merged by their moments."""
     sigma, total, x, P = values[:2], 0.0, None, None
     z = np.stack([columns["range_m"], columns["velocity_mps"] - bias * values[1]], axis=1)
+    wider = 1 + 8 * shares[0] + 99 * shares[1]  # the mean square of the first error, which starts the track
+    spans = [np.ptp(column[np.isfinite(column)]) for column in (columns["range_m"], columns["velocity_mps"])]
     for k in range(len(T_S)):
         if k == 0:
-            x, P = np.array([z[0, 0], 0.0, 0.0]), PRIOR + np.diag([sigma[0] ** 2, 0, 0])
+            x, P = np.array([z[0, 0], 0.0, 0.0]), PRIOR + np.diag([wider * sigma[0] ** 2, 0, 0])
         else:
             F, Q = transition(T_S[k] - T_S[k - 1]), manoeuvre_covariance(values[2], T_S[k] - T_S[k - 1])
             x, P = F @ x, F @ P @ F.T + Q
@@ -117,8 +120,8 @@ def twin(columns, values, share, bias):
             if (k == 0 and m == 0) or np.isnan(z[k, m]):
                 continue
             h, made = np.eye(3)[m], []
-            for weight, variance in ((1 - share, sigma[m] ** 2), (share, 100 * sigma[m] ** 2)):
-                S = h @ P @ h + variance
+            for weight, width in zip(*error_laws((*shares, 0), spans[m], sigma[m] ** 2), strict=True):
+                S = h @ P @ h + (width * sigma[m]) ** 2
                 K = P @ h / S
                 density = weight * norm(x @ h, S**0.5).pdf(z[k, m])
                 made.append((density, x + K * (z[k, m] - x @ h), P - np.outer(K, K) * S))
@@ -130,11 +133,15 @@ def twin(columns, values, share, bias):
     return total
 
 
-@pytest.mark.parametrize(("share", "bias"), [(0.0, 0.0), (0.05, 0.0), (0.3, 1.5), (0.0, -2.0)])
-def test_outliers_and_bias_against_a_textbook_twin(share, bias):
+@pytest.mark.parametrize(
+    ("shares", "bias"), [((0.0, 0.0), 0.0), ((0.0, 0.05), 0.0), ((0.1, 0.2), 1.5), ((0.0, 0.0), -2.0)]
+)
+def test_outliers_and_bias_against_a_textbook_twin(shares, bias):
     columns, values = drawn(3, share=0.2), np.array([250.0, 15.0, 1e-3])
-    found = PlotLikelihood(case(), None, [columns])(values, share, bias)
-    assert found == pytest.approx(twin(columns, values, share, bias), abs=precision(found, values))
+    found = PlotLikelihood(case(), None, [columns])(
+        values, sum(shares), bias, near=shares[0] / (sum(shares) or 1)
+    )
+    assert found == pytest.approx(twin(columns, values, shares, bias), abs=precision(found, values))
 
 
 def test_tracks_add_up():

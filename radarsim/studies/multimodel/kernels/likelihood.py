@@ -1,46 +1,61 @@
 """The log likelihood of recorded plots under a filter: the density that its bank gives each plot.
 
-The filter is that of the simulation, run scan by scan. There its eight lanes are eight realisations; here lane 0 takes
-the plots with the configured σ, lane 1 as outliers, with OUTLIER_FACTOR times the σ. If there may be outliers, the two
-lanes of each model are merged by moments after every plot."""
+The filter is that of the simulation, run scan by scan. There its eight lanes are eight realisations; here each takes
+the plots with another law of the errors, those of `radarsim.kernels.likelihood`: lane 0 with the configured σ, lane 1
+as near outliers, the others as far ones of one width each. If there may be outliers, the lanes of each model are merged
+by moments after every plot."""
 
 import numpy as np
 
 from radarsim.kernels.compiler import inline, kernel
 from radarsim.kernels.lanes import WIDTH, address
-from radarsim.kernels.likelihood import OUTLIER_FACTOR
+from radarsim.kernels.likelihood import FAR, FAR_COUNT, NEAR
 from radarsim.studies.multimodel.kernels import layout
 from radarsim.studies.multimodel.kernels.filter_strip import Scans, make_rules, run_strip
 
 
 @kernel
-def log_likelihood(work, numbers, plots, models, transitions, intervals, times, rules, frame, share, score):
-    """Fill score (n,) with the logarithm of each plot's density given the earlier plots; zero where there is no plot.
+def log_likelihood(
+    work, numbers, plots, widths, models, transitions, intervals, times, rules, frame, shares, score, soundness
+):
+    """Fill score (n,) with the logarithm of each plot's density given the earlier plots, and soundness (n,) with its
+    probability to be no outlier; zero and one where there is no plot.
 
-    work, numbers: a filter's memory, started; plots (n · PLOT rows), of which lane 1 gets FACTOR times the σ; models,
-    transitions, intervals (n,), times, rules, frame as in `filter_strip`; share: of outliers."""
+    work, numbers: a filter's memory, started; plots (n · PLOT rows), the same in all lanes, of which lane l gets
+    widths[k, l] times the variance (n, WIDTH); models, transitions, intervals (n,), times, rules, frame as in
+    `filter_strip`; shares: of near and far outliers."""
     n, filter_rules = score.size, make_rules(rules, models.size // layout.MODEL_NUMBERS)
     out, reported = np.empty(n * layout.OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
     for k in range(n):
         for i in range(6):
-            plots[(k * layout.PLOT + layout.COVARIANCE + i) * WIDTH + 1] *= OUTLIER_FACTOR * OUTLIER_FACTOR
+            for lane in range(WIDTH):
+                plots[(k * layout.PLOT + layout.COVARIANCE + i) * WIDTH + lane] *= widths[k, lane]
     listed = np.zeros(layout.MAX_MODELS, dtype=np.int64)
     memory = address(work), address(numbers), address(listed)
     design = filter_rules, address(models), address(transitions)
+    may_be_outlier, chances, densities = shares[NEAR] + shares[FAR] > 0.0, np.empty(WIDTH), np.empty(WIDTH)
+    chances[0], chances[1], chances[2:] = 1.0 - shares[NEAR] - shares[FAR], shares[NEAR], shares[FAR] / FAR_COUNT
     for k in range(n):
         scans = Scans(k, k + 1, address(intervals), address(times), address(reported))
         run_strip(*memory, *design, scans, address(plots), address(frame), address(out))
-        score[k] = 0.0
+        score[k], soundness[k] = 0.0, 1.0
         if plots[(k * layout.PLOT + layout.DETECTED) * WIDTH] > 0.5:
             new = numbers[layout.CURRENT] * layout.BANK
-            regular = density(work, layout.BANK - new, new, filter_rules, 0)
-            outlier = density(work, layout.BANK - new, new, filter_rules, 1)
-            score[k] = regular
-            if share > 0.0:
-                regular, outlier = regular + np.log(1.0 - share), outlier + np.log(share)
-                greatest = max(regular, outlier)
-                score[k] = greatest + np.log(np.exp(regular - greatest) + np.exp(outlier - greatest))
-                merge_lanes(work, new, filter_rules, np.exp(regular - score[k]), np.exp(outlier - score[k]))
+            score[k] = density(work, layout.BANK - new, new, filter_rules, 0)
+            if may_be_outlier:
+                for lane in range(WIDTH):
+                    densities[lane] = -np.inf
+                    if chances[lane] > 0.0:
+                        d = density(work, layout.BANK - new, new, filter_rules, lane)
+                        densities[lane] = np.log(chances[lane]) + d
+                greatest, total = densities.max(), 0.0
+                for lane in range(WIDTH):
+                    total += np.exp(densities[lane] - greatest)
+                score[k] = greatest + np.log(total)
+                for lane in range(WIDTH):
+                    densities[lane] = np.exp(densities[lane] - score[k])
+                soundness[k] = densities[0]
+                merge_lanes(work, new, filter_rules, densities)
 
 
 @inline
@@ -88,42 +103,57 @@ def probability(work, bank, lane, i):
 
 
 @kernel
-def merge_lanes(work, bank, rules, regular, outlier):
-    """Merge each model's hypotheses of lanes 0 and 1, with probabilities regular and outlier, into both lanes."""
+def merge_lanes(work, bank, rules, chances):
+    """Merge each model's hypotheses of all lanes, of these probabilities (WIDTH,), into every lane."""
+    weights = np.empty(WIDTH)
     for i in range(rules.size):
-        first = (bank + i * layout.HYPOTHESIS) * WIDTH
-        p, q = regular * probability(work, bank, 0, i), outlier * probability(work, bank, 1, i)
-        # GPB1 has one hypothesis, the first, whatever the models' probabilities are.
-        a, b = (regular, outlier) if rules.family == layout.GPB1 else (p, q)
-        weight_sum = a + b
+        first, total = (bank + i * layout.HYPOTHESIS) * WIDTH, 0.0
+        for lane in range(WIDTH):
+            # GPB1 has one hypothesis, the first, whatever the models' probabilities are.
+            p = chances[lane] * probability(work, bank, lane, i) if chances[lane] > 0.0 else 0.0
+            weights[lane] = chances[lane] if rules.family == layout.GPB1 else p
+            total += p
+        weight_sum = weights.sum()
         if weight_sum > 0.0:
-            merge_states(work, first, a / weight_sum, b / weight_sum)
-        work[first + layout.PROBABILITY * WIDTH] = work[first + layout.PROBABILITY * WIDTH + 1] = p + q
+            for lane in range(WIDTH):
+                weights[lane] /= weight_sum
+            merge_states(work, first, weights)
+        for lane in range(WIDTH):
+            work[first + layout.PROBABILITY * WIDTH + lane] = total
 
 
 @kernel
-def merge_states(work, first, a, b):
-    """Merge mean and covariance of lanes 0 and 1 of a hypothesis, with weights a and b, into both lanes."""
-    d = np.empty(layout.STATES)
+def merge_states(work, first, weights):
+    """Merge mean and covariance of all lanes of a hypothesis, with weights (WIDTH,), into every lane."""
+    d = np.empty((layout.STATES, WIDTH))
     for s in range(layout.STATES):
-        element = first + s * WIDTH
-        d[s] = work[element + 1] - work[element]
-        work[element] = work[element + 1] = work[element] + b * d[s]
+        element, mean = first + s * WIDTH, 0.0
+        for lane in range(WIDTH):
+            if weights[lane] > 0.0:
+                mean += weights[lane] * work[element + lane]
+        for lane in range(WIDTH):
+            d[s, lane] = work[element + lane] - mean
+            work[element + lane] = mean
     for axis in range(3):
         element = layout.OWN + 6 * axis
         for i in range(3):
             for j in range(i, 3):
-                put_merged_element(work, first + element * WIDTH, a, b, d[3 * axis + i] * d[3 * axis + j])
+                put_merged_element(work, first + element * WIDTH, weights, d[3 * axis + i], d[3 * axis + j])
                 element += 1
     for pair in range(3):
         row_axis, column_axis = (0, 1 + pair) if pair < 2 else (1, 2)
         for i in range(3):
             for j in range(3):
                 element = layout.CROSS + 9 * pair + 3 * i + j
-                put_merged_element(work, first + element * WIDTH, a, b, d[3 * row_axis + i] * d[3 * column_axis + j])
+                put_merged_element(work, first + element * WIDTH, weights, d[3 * row_axis + i], d[3 * column_axis + j])
 
 
-@inline
-def put_merged_element(work, element, a, b, spread):
-    """Write an element of the merged covariance into lanes 0 and 1."""
-    work[element] = work[element + 1] = a * work[element] + b * work[element + 1] + a * b * spread
+@kernel
+def put_merged_element(work, element, weights, row_offsets, column_offsets):
+    """Write an element of the merged covariance into every lane; offsets (WIDTH,) of the lanes' means from theirs."""
+    merged = 0.0
+    for lane in range(WIDTH):
+        if weights[lane] > 0.0:
+            merged += weights[lane] * (work[element + lane] + row_offsets[lane] * column_offsets[lane])
+    for lane in range(WIDTH):
+        work[element + lane] = merged
