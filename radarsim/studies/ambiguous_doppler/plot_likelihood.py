@@ -11,8 +11,10 @@ from radarsim.studies.ambiguous_doppler.fold_resolver import FoldResolver
 from radarsim.studies.ambiguous_doppler.followers import list_limits, packed_motion, prior_covariance
 from radarsim.studies.ambiguous_doppler.kernels import recorded_rows
 from radarsim.studies.ambiguous_doppler.tracking import MEASURED, plot_rows
-from radarsim.studies.recording_interface import BIAS, usual_interval_s
+from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
+from radarsim.studies.recording_interface import BIAS, NEAR_PART, OUTLIERS, outlier_shares, usual_interval_s
 
+START_RANGES = 3  # of a track, among which gross errors are left out
 MIN_SIGMA_RATIO, MIN_VARIANCE_RATIO = 1e-4, 1e-6  # to the configured values: smaller ones count as zero
 
 
@@ -21,7 +23,7 @@ class PlotLikelihood:
 
     The state before the first plot has the prior's distribution."""
 
-    explains: tuple[str, ...] = (BIAS,)
+    explains: tuple[str, ...] = (OUTLIERS, BIAS)
 
     def __init__(self, case: Case, options: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec: Any = case.spec
@@ -38,9 +40,13 @@ class PlotLikelihood:
             self.stated[: self.observes], self.stated[-1] or one_sigma_variance
         )
         if self.observes == 1:
-            self.explains = ()
+            self.explains = (OUTLIERS,)
         (self.member,) = filter_design.members(options)
-        self.problems = [self._problem(columns) for columns in tracks]
+        self.columns = tuple(name for name, _ in MEASURED[: self.observes])
+        self.span = np.append(data_span(tracks, self.columns), 0.0)[:2]
+        self.given_tracks = list(tracks)
+        self.cleaned_tracks = [without_gross_starts(columns, self.columns[:1], START_RANGES) for columns in tracks]
+        self.problems = [self._problem(columns) for columns in self.cleaned_tracks]
 
     def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem":
         """The arrays of a track for the kernel."""
@@ -55,23 +61,30 @@ class PlotLikelihood:
             row[3] = folds.span
         return _Problem(f, q, rows[:, 1:])
 
-    def _scores(self, values: np.ndarray, bias: float) -> np.ndarray:
-        """Log likelihoods (2,) of range and velocity over all tracks; minus infinity if a row cannot be taken."""
+    def _track_scores(self, values: np.ndarray, shares: np.ndarray, bias: float) -> list[np.ndarray]:
+        """For each track the log-densities of its ranges and velocities, and their probabilities to be no outliers
+        (2, n, 2); empty if a row cannot be taken."""
         sigma = np.ones(2)
         sigma[: self.observes] = values[: self.observes]
         reach = (1 if self.options.hypotheses == 1 else 2) if self.member.doppler == "folded" else 0
-        prior, total = np.array(prior_covariance(self.member, self.spec)), np.zeros(2)
+        prior, result = np.array(prior_covariance(self.member, self.spec)), []
         for problem in self.problems:
-            score = np.empty((len(problem.rows), 2))
+            scores = np.empty((2, len(problem.rows), 2))
             rows = self._velocities(problem.rows, bias * sigma[1])
             present = np.isfinite(rows[:, :2])
             arguments = np.where(np.isfinite(rows), rows, 0.0), present, prior, sigma**2, float(values[-1])
-            if not recorded_rows.log_likelihood(
-                problem.F, problem.Q, *arguments, reach, *list_limits(self.options), score
-            ):
-                return np.full(2, -np.inf)
+            hypotheses, law = (reach, *list_limits(self.options)), (shares, self.span, start_factor(shares))
+            if not recorded_rows.log_likelihood(problem.F, problem.Q, *arguments, *hypotheses, *law, *scores):
+                return []
+            result.append(scores)
+        return result
+
+    def _scores(self, values: np.ndarray, shares: np.ndarray, bias: float = 0.0) -> np.ndarray:
+        """Log likelihoods (2,) of range and velocity over all tracks; minus infinity if a row cannot be taken."""
+        scores, total = self._track_scores(values, shares, bias), np.zeros(2)
+        for score, _ in scores:
             total += score.sum(axis=0)
-        return total
+        return total if scores else np.full(2, -np.inf)
 
     def _velocities(self, rows: np.ndarray, offset: float) -> np.ndarray:
         """The rows (n, 3) with velocities as the filter takes them, minus an offset."""
@@ -86,16 +99,30 @@ class PlotLikelihood:
                 shifted[i, 1] = folds.remainder(shifted[i, 1])
         return shifted
 
-    def __call__(self, values: np.ndarray, outliers: float = 0.0, bias: float = 0.0, correlation: float = 0.0) -> float:
-        """The log likelihood. bias: of the velocity, in units of its σ; outliers and correlation are ignored."""
-        return float(self._scores(values, bias).sum())
+    def __call__(
+        self,
+        values: np.ndarray,
+        outliers: float = 0.0,
+        bias: float = 0.0,
+        correlation: float = 0.0,
+        manoeuvres: float = 0.0,
+        near: float = NEAR_PART,
+    ) -> float:
+        """The log likelihood. bias: of the velocity, in units of its σ; correlation and manoeuvres are ignored."""
+        return float(self._scores(values, outlier_shares(outliers, near, 0.0), bias).sum())
+
+    def soundness(
+        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    ) -> list[dict[str, np.ndarray]]:
+        """The probability of each number that it is no outlier."""
+        scores = self._track_scores(values, outlier_shares(outliers, near, 0.0), 0.0)
+        judged = [(i, np.arange(len(part)), part[:, : self.observes]) for i, (_, part) in enumerate(scores)]
+        return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The log likelihoods of range and velocity."""
-        return {
-            name: float(score)
-            for (name, _), score in zip(MEASURED[: self.observes], self._scores(values, 0.0), strict=False)
-        }
+        total = self._scores(values, np.zeros(3))
+        return {name: float(score) for name, score in zip(self.columns, total, strict=False)}
 
 
 class _Problem(NamedTuple):

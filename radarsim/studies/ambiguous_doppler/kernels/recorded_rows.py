@@ -16,6 +16,7 @@ from radarsim.kernels.kalman_algebra import (
     take_rate,
     take_value,
 )
+from radarsim.kernels.likelihood import FAR, LAW_COUNT, NEAR, NEAR_WIDTH, fill_laws
 
 FARTHEST = 9.0  # standard deviations of the velocity's innovation within which folds are tried
 MAX_SEQUENCES = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
@@ -55,6 +56,35 @@ def take_range(x, w, P, R, z):
 
 
 @kernel
+def take_range_of_laws(x, w, P, R, z, shares, span, laws):
+    """As `take_range`, of a range that may be an outlier, whose laws are those of `radarsim.kernels.likelihood`; merged
+    by moments. Returns the logarithm of its density and the probability that it is no outlier. laws: a work array
+    (2, LAW_COUNT)."""
+    p, S = (P[0], P[1], P[2]), P[0] + R
+    prior_log_weight, chances, square = log_sum_exp(w), np.zeros(LAW_COUNT), 0.0
+    e, posterior = np.empty(w.size), np.empty((LAW_COUNT, w.size))
+    for i in range(w.size):
+        e[i] = z - x[0, i]
+        fill_laws(laws, e[i], S, R, shares, span)
+        posterior[:, i] = w[i] + laws[0]
+    density = log_sum_exp(posterior)
+    posterior = np.exp(posterior - density)
+    for law in range(LAW_COUNT):
+        chances[law] = posterior[law].sum()
+    gain, square_gain = (chances / laws[1]).sum(), (chances / (laws[1] * laws[1])).sum()
+    for i in range(w.size):
+        weight = posterior[:, i].sum()
+        square += weight * e[i] * e[i]
+        w[i] = np.log(weight) if weight > 0.0 else -1e300
+        x[0, i], x[1, i], x[2, i] = add_scaled((x[0, i], x[1, i], x[2, i]), gain * e[i], p)
+    shrink = gain - square * max(square_gain - gain * gain, 0.0)
+    updated_P = add_outer((P[0], P[1], P[2], P[3], P[4], P[5]), -shrink, p)
+    for i in range(6):
+        P[i] = updated_P[i]
+    return density - prior_log_weight, chances[0]
+
+
+@kernel
 def nearby_folds(S, D):
     """The number of folds to either side that may matter for an innovation of variance S."""
     return int(FARTHEST * math.sqrt(S) / D) + 1
@@ -84,12 +114,13 @@ def likeliest(w, max_count, min_ratio):
 
 
 @kernel
-def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio):
-    """Update with a velocity v of variance R; returns states and weights, the likeliest first, and the logarithm of the
-    density of v over all hypotheses and folds. P is updated in place.
+def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, shares, span):
+    """Update with a velocity v of variance R; returns states and weights, the likeliest first, the logarithm of the
+    density of v over all hypotheses and folds, and the probability that v is no outlier. P is updated in place.
 
     max_fold: folds to either side of the nearest that are tried; -1: none, v is not folded. merge: hypotheses are
-    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best."""
+    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. shares: of near outliers, and of
+    far ones, which are uniform over the span D of folded velocities, or `span` of the data; merged by moments."""
     updated_P, gain, S = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), R, 1.0)
     n, folds = w.size, 2 * max(max_fold, 0) + 1
     e, weight = np.empty((n, folds)), np.empty((n, folds))
@@ -100,15 +131,38 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio):
         for j in range(folds):
             e[i, j] = innovation + D * (j - folds // 2)
             weight[i, j] = w[i] - e[i, j] * e[i, j] / (2.0 * S)
-    density = log_sum_exp(weight) - log_sum_exp(w) - 0.5 * np.log(2.0 * np.pi * S)
+    log_norm, factor, soundness, spread = 0.5 * np.log(2.0 * np.pi * S), 1.0, 1.0, 0.0
+    if shares[NEAR] + shares[FAR] > 0.0:
+        T = S + (NEAR_WIDTH * NEAR_WIDTH - 1.0) * R
+        width = D if max_fold >= 0 else max(span, math.sqrt(T))
+        far, near, factor, sound, square = shares[FAR] * math.exp(log_norm) / (width * folds), 0.0, 0.0, 0.0, 0.0
+        best, total = w.max(), 0.0
+        for i in range(n):
+            for j in range(folds):
+                e2 = e[i, j] * e[i, j]
+                regular = (1.0 - shares[NEAR] - shares[FAR]) * math.exp(-0.5 * e2 / S)
+                near = shares[NEAR] * math.sqrt(S / T) * math.exp(-0.5 * e2 / T)
+                prior = math.exp(w[i] - best)
+                total += prior * (regular + near + far)
+                sound += prior * regular
+                factor += prior * (regular + near * S / T)
+                square += prior * (regular + near * S / T) * e2
+                weight[i, j] = w[i] + math.log(regular + near + far) if regular + near + far > 0.0 else -1e300
+        factor, soundness = factor / total, sound / total
+        spread = (1.0 - factor) * square / total
+        P_before = (P[0], P[1], P[2], P[3], P[4], P[5])
+        updated_P = add_outer(P_before, spread - factor * S, gain)
+    density = log_sum_exp(weight) - log_sum_exp(w) - log_norm
     best = weight.max()
     if merge:
+        e *= factor
         p = np.exp(weight[0] - best)
         p /= p.sum()
         mean = (p * e[0]).sum()
         updated_P = add_outer(updated_P, (p * (e[0] - mean) ** 2).sum(), gain)
         order, e[0, 0], weight[0, 0] = np.zeros(1, dtype=np.int64), mean, best
     else:
+        e *= factor
         order = likeliest(weight.ravel() - best, max_count, min_ratio)
     for i in range(6):
         P[i] = updated_P[i]
@@ -117,31 +171,50 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio):
         i, j = order[k] // folds, order[k] % folds
         states[0, k], states[1, k], states[2, k] = add_scaled((x[0, i], x[1, i], x[2, i]), e[i, j], gain)
         weights[k] = weight[i, j] - best
-    return states, weights, density
+    return states, weights, density, soundness
 
 
 @kernel
 def log_likelihood(
-    F, Q, rows, present, prior, variances, manoeuvre_variance, reach, merge, max_count, min_ratio, score
+    F,
+    Q,
+    rows,
+    present,
+    prior,
+    variances,
+    manoeuvre_variance,
+    reach,
+    merge,
+    max_count,
+    min_ratio,
+    shares,
+    span,
+    start_factor,
+    score,
+    soundness,
 ):
     """Fill in the log likelihoods of a track of n rows under a filter; false where the filter leaves too many folds.
 
     F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span; present (n, 2):
     which of the first two count (a kernel has no not-a-number); prior (6,): covariance before the first plot;
     variances (2,) of range and velocity; reach: 0: velocities are not folded, 1: the nearest fold, 2: all folds that
-    matter; merge, max_count, min_ratio as in `take_velocity`. Filled: score (n, 2), zero where nothing is measured."""
-    x, w, P, started = np.zeros((3, 1)), np.zeros(1), prior.copy(), False
+    matter; merge, max_count, min_ratio as in `take_velocity`; shares: of near and far outliers; span (2,): of the data;
+    start_factor: on the variance of the first range. Filled: score (n, 2), zero where nothing is measured, and
+    soundness (n, 2), the probabilities that the numbers are no outliers."""
+    x, w, P, started, laws = np.zeros((3, 1)), np.zeros(1), prior.copy(), False, np.empty((2, LAW_COUNT))
     for k in range(len(rows)):
         z, v, D = rows[k, 0], rows[k, 1], rows[k, 2]
         if k > 0:
             extrapolate(x, P, F[k], Q[k], manoeuvre_variance)
-        score[k] = 0.0
+        score[k], soundness[k] = 0.0, 1.0
         if present[k, 0]:
-            if started:
+            if started and shares[NEAR] + shares[FAR] > 0.0:
+                score[k, 0], soundness[k, 0] = take_range_of_laws(x, w, P, variances[0], z, shares, span[0], laws)
+            elif started:
                 score[k, 0] = take_range(x, w, P, variances[0], z)
             else:
                 x[0, :] = z
-                P[0], P[1], P[2], started = variances[0], 0.0, 0.0, True
+                P[0], P[1], P[2], started = start_factor * variances[0], 0.0, 0.0, True
         if started and present[k, 1]:
             S, max_fold = P[3] + variances[1], reach - 1
             if not S > 0.0:
@@ -153,5 +226,8 @@ def log_likelihood(
                 if 2.0 * FARTHEST * math.sqrt(S) / D * w.size > MAX_SEQUENCES:
                     return False
                 max_fold = nearby_folds(S, D)
-            x, w, score[k, 1] = take_velocity(x, w, P, variances[1], v, D, max_fold, merge, max_count, min_ratio)
+            hypotheses = max_fold, merge, max_count, min_ratio
+            x, w, score[k, 1], soundness[k, 1] = take_velocity(
+                x, w, P, variances[1], v, D, *hypotheses, shares, span[1]
+            )
     return True
