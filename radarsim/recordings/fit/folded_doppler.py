@@ -4,7 +4,8 @@ The ranges of the same plots show whether velocities are folded, whatever errors
 is ambiguous by a span D lies between -D / 2 and D / 2, and differs from the rate of the range by a whole number of
 spans. So if no velocity exceeds A / 2 in size, the span is at least A, and a range that changes faster than A / 2
 proves folding. The differences determine the span, if there are enough of them. A common error of all velocities looks
-different: it shows in the velocities themselves."""
+different: it shows in the velocities themselves. A speed V of the wrong sign looks like one that is folded by 2 V, but
+range and velocity then agree but for their noise, where a fold by D leaves 2 V - D: that is tested."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from radarsim.report.wording import significant_digits
 
 RATE_ACCURACY = 1 / 8  # of the least span: the standard deviation required of the rate of the range
 MIN_ACCURATE_SHARE = 0.6  # of the plots must have it
+MAX_MISFIT = 12.0  # of a parabola, in its expected sum of squares: a range that is far off makes no velocity
 MAX_EXAMINED_PLOTS = 1000  # examined at most
 MAX_WINDOW_LENGTH = 2.0  # times its usual length that a window of plots may last
 CLEAR_SIGMAS = 4.0  # standard deviations by which a range changes faster than a velocity can be
@@ -25,6 +27,9 @@ MIN_FOLDED_PLOTS, MIN_FOLDED_SHARE = 3, 0.1  # of the plots examined that must d
 # standard deviations that distinguish whole spans from chance: for a known span, for any
 KNOWN_SPAN_SCORE = 1.0
 ANY_SPAN_SCORE = 3.0
+# A residue of the other sign is noise up to so many standard deviations, or up to this share of the differences.
+MAX_NOISE_SIGMAS, MAX_RESIDUE_SHARE = 3.5, 0.03
+MIN_SEGMENT_PLOTS = 6  # of a stretch of a track over which the residue is taken
 VELOCITY_COLUMN = "velocity_mps"
 SPAN_SEARCH_STEPS = 200  # of a search for the span, in which the phase of the largest velocity turns once
 
@@ -46,23 +51,22 @@ def detect_folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float |
     arrays = [np.stack([columns["t_s"], columns["range_m"], columns["velocity_mps"]]) for columns in tracks]
     arrays = [array[:, np.isfinite(array).all(axis=0)] for array in arrays]
     fastest = max((float(np.abs(array[2]).max()) for array in arrays if array.size), default=0.0)
-    fits = _range_rates(arrays, 2 * fastest)
+    is_known = span_mps is not None and 2 * fastest <= span_mps * (1 + 1e-9)
+    fits = _range_rates(arrays, span_mps if span_mps is not None and is_known else 2 * fastest)
     if fits is None:
         return None
     rates, velocities, sigma = fits
     differences = rates - velocities
-    folded_count = int((np.abs(differences) > fastest + CLEAR_SIGMAS * sigma).sum())
-    opposite_sign_difference = np.median(np.abs(rates + velocities))  # with the other sign, twice their size
-    if folded_count < max(
-        MIN_FOLDED_PLOTS, MIN_FOLDED_SHARE * differences.size
-    ) or opposite_sign_difference < 0.5 * np.median(np.abs(differences)):
+    is_beyond = np.abs(differences) > fastest + CLEAR_SIGMAS * sigma
+    if is_beyond.sum() < max(MIN_FOLDED_PLOTS, MIN_FOLDED_SHARE * differences.size):
+        return None
+    if _is_sign_turned(arrays, rates, velocities, span_mps if is_known else None):
         return None
     span = _fit_span(differences, 2 * fastest)
-    is_configured = span_mps is not None and 2 * fastest <= span_mps * (1 + 1e-9)
-    is_configured = is_configured and (
+    is_configured = is_known and (
         span is None or bool(_whole_span_score(differences, np.array([span_mps]))[0] > KNOWN_SPAN_SCORE)
     )
-    rate = float(np.abs(rates[np.abs(differences) > fastest + CLEAR_SIGMAS * sigma]).max())
+    rate = float(np.abs(rates[is_beyond]).max())
     return Folding(fastest, rate, span_mps if is_configured else span, is_configured)
 
 
@@ -103,6 +107,48 @@ def folding_message(folding: Folding, case: Case | None = None) -> str:
     return "; ".join(clauses)
 
 
+def _is_sign_turned(
+    tracks: Sequence[np.ndarray], rates: np.ndarray, velocities: np.ndarray, span_mps: float | None
+) -> bool:
+    """Whether velocities have the opposite sign rather than folds: with it they agree with the ranges.
+
+    rates, velocities (m,) at plots of tracks (3, n); span_mps: where it is known, and may hold."""
+    opposite, differences = np.median(np.abs(rates + velocities)), rates - velocities
+    if opposite >= 0.5 * np.median(np.abs(differences)):
+        return False
+    if span_mps is not None:
+        unfolded = np.median(differences - span_mps * np.rint(differences / span_mps))
+        if abs(unfolded) <= abs(np.median(rates + velocities)):
+            return False
+    limit = MAX_RESIDUE_SHARE * float(np.median(np.abs(differences)))
+    stretches = [_opposite_residues(track) for track in tracks if track.shape[1] >= MIN_SEGMENT_PLOTS]
+    departs = [np.any(np.abs(drift) > np.maximum(limit, MAX_NOISE_SIGMAS * noise)) for drift, noise in stretches]
+    return not departs or float(np.mean(departs)) < 0.5
+
+
+def _opposite_residues(track: np.ndarray) -> np.ndarray:
+    """The rates (2, s) at which the range departs from that which velocities of the opposite sign give, over a track
+    (3, n) and its halves, and their standard deviations: of straight lines through the differences."""
+    t, r, v = track
+    departure = r + np.append(0.0, np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t)))
+    rows = []
+    for rows_used in (np.arange(t.size), *np.array_split(np.arange(t.size), 2)):
+        times, duration = t[rows_used] - t[rows_used].mean(), np.ptp(t[rows_used])
+        if rows_used.size >= MIN_SEGMENT_PLOTS and duration > 0:
+            slope = times @ departure[rows_used] / (times @ times)
+            # Noise of the ranges, and of velocities, whose sum wanders: from differences of neighbours.
+            sigma_r, sigma_v = (_noise_sigma(numbers[rows_used]) for numbers in (departure, v))
+            wandering = sigma_v * np.hypot(np.sqrt(1.2 / rows_used.size), np.diff(t[rows_used]).max() / duration)
+            rows.append((slope, np.hypot(sigma_r / np.sqrt(times @ times), wandering)))
+    return np.array(rows).T.reshape(2, -1)
+
+
+def _noise_sigma(numbers: np.ndarray) -> float:
+    """The standard deviation of the noise of numbers (n,) about a smooth course, from their second differences: their
+    lower quarter, as noise may fold some velocities the other way."""
+    return float(np.quantile(np.abs(np.diff(numbers, n=2)), 0.25)) / (0.3186 * np.sqrt(6))
+
+
 def _range_rates(tracks: Sequence[np.ndarray], min_span: float) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """The rate of the range at plots, the velocities there, and the standard deviations of the rates, (m,) each: from
     parabolas through the smallest number of ranges around each that gives RATE_ACCURACY for most plots.
@@ -120,6 +166,7 @@ def _range_rates(tracks: Sequence[np.ndarray], min_span: float) -> tuple[np.ndar
         sigma = np.sqrt(np.median(residual_squares) / (freedom * (1 - 2 / (9 * freedom)) ** 3))
         is_accurate = sigma * slope_spread <= RATE_ACCURACY * min_span
         if is_accurate.mean() >= MIN_ACCURATE_SHARE:
+            is_accurate &= residual_squares <= MAX_MISFIT * freedom * sigma**2
             return rates[is_accurate], velocities[is_accurate], sigma * slope_spread[is_accurate]
         half += 1 + half // 4
     return None

@@ -49,7 +49,7 @@ class DopplerCheck:
                 notes = [tr("the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the "
                             "other sign by {turned:.1f} m/s: {cure}", **fields)]  # fmt: skip
         folding = folded_doppler.detect_folding(spanless_tracks)
-        return notes if folding is None else [*notes, folded_doppler.folding_message(folding)]
+        return notes if folding is None else [folded_doppler.folding_message(folding)]
 
 
 def _doppler_offsets(track: np.ndarray) -> np.ndarray:
