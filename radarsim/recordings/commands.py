@@ -260,7 +260,7 @@ def track(
     metavar="NAME",
     help="The filter whose model is fitted; default: the one that uses most of a plot.",
 )
-@click.option("--robust", is_flag=True, help="Allow for outliers: plots with errors of ten times their σ.")
+@click.option("--robust", is_flag=True, help="Allow for outliers of any size, and name them.")
 @click.option("--correlated", is_flag=True, help="Fit the correlation time of the errors, correlation_time_s, too.")
 @click.option("--plain", is_flag=True, help="Allow for neither; default: for those that the plots show plainly.")
 @click.option(

@@ -90,6 +90,9 @@ def print_fit(fitted: "Fit") -> None:
         lines.append(line)
     if fitted.outliers is not None:
         lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * fitted.outliers, "#.2g")))
+    if fitted.outlier_rows:
+        rows = sentences.outlier_rows_text(fitted.outlier_rows)
+        lines.append(labelled_line("", tr("far off: {rows}", rows=rows)))
     settings = " ".join(f"--set {key}={value:g}" for key, value in fit.fitted_settings(fitted).items())
     if fitted.further_explanation is not None:
         lines.append(
@@ -97,7 +100,7 @@ def print_fit(fitted: "Fit") -> None:
                 "",
                 tr(
                     "the intervals are not valid: {what}",
-                    what=sentences.explanation_text(*fitted.further_explanation[:2]),
+                    what=sentences.rivals_text(*fitted.further_explanation[:2], fitted.further_explanation.rival),
                 ),
             )
         )

@@ -13,7 +13,6 @@ from radarsim.recordings import csv_rows, simulate_plots
 from radarsim.recordings import read_plots as recordings_read_plots
 from radarsim.recordings import track as recordings_track
 from radarsim.recordings.fit import fit as fit_fit
-from radarsim.recordings.fit import likelihood_slice
 from radarsim.recordings.formats import asterix
 from radarsim.recordings.registration import register as registration_register
 from radarsim.recordings.registration import result, sentences
@@ -151,10 +150,9 @@ def fit(
     import pandas as pd
 
     if allowing is not None and (
-        not isinstance(allowing, list | tuple)
-        or any(name not in list(likelihood_slice.SHARE_LIMITS) for name in allowing)
+        not isinstance(allowing, list | tuple) or any(name not in fit_fit.FITTED_EXPLANATIONS for name in allowing)
     ):
-        raise ConfigError(f"allowing: must be a list of {', '.join(likelihood_slice.SHARE_LIMITS)}, got {allowing!r}")
+        raise ConfigError(f"allowing: must be a list of {', '.join(fit_fit.FITTED_EXPLANATIONS)}, got {allowing!r}")
     experiment = load(config, overrides)
     fitted = _with_file(recorded, lambda path: fit_fit.fit_plots(experiment, path, filter_name, allowing))
     return pd.DataFrame(fit_fit.fit_rows(fitted))

@@ -101,7 +101,7 @@ class Likelihood(Protocol):
 
     def soundness(
         self, values: "np.ndarray", outliers: float, near: float = NEAR_PART, correlation: float = 0.0
-    ) -> "list[Mapping[str, np.ndarray]]":
+    ) -> "Sequence[Mapping[str, np.ndarray]]":
         """The times t_s of each track, and the probability of each number that it is no outlier, by column; (n,) each."""
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:

@@ -96,7 +96,17 @@ def test_nothing_known_before_the_first_plot_costs_no_digits():
     there[0] = False
     rows = np.tile(np.eye(3)[:2], (n, 1, 1)), z, np.tile(variance, (n, 1)), there
     start = np.array([z[0, 0], 0.0, 0.0]), wide
-    log_likelihood(*start, np.tile(F, (n, 1, 1)), np.tile(Q, (n, 1, 1)), *rows, q, *no_outliers(1), 1.0, score, np.empty(score.shape))
+    log_likelihood(
+        *start,
+        np.tile(F, (n, 1, 1)),
+        np.tile(Q, (n, 1, 1)),
+        *rows,
+        q,
+        *no_outliers(1),
+        1.0,
+        score,
+        np.empty(score.shape),
+    )
     assert_rounded(score.sum(), float(expected), size)
 
 

@@ -8,13 +8,14 @@ continues with it included. For a recording with correct numbers nothing is repo
 The advice is about the filter that takes most columns of a plot. A filter that takes fewer says nothing about the
 others, and may predict the ranges best just because the velocities are bad."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.recordings.doppler_scale import DopplerScale, detect_case_doppler_scale
+from radarsim.recordings.fit.fit import OutlierRow, find_outlier_rows
 from radarsim.recordings.fit.folded_doppler import Folding, detect_case_folding
 from radarsim.recordings.fit.likelihood_slice import (
     CountedLikelihood,
@@ -34,7 +35,7 @@ from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
 from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
 from radarsim.recordings.target_speed import impossible_column_speed
 from radarsim.recordings.tracking_result import TrackingResult
-from radarsim.studies.recording_interface import MANOEUVRES, OUTLIERS, Likelihood, TurnError
+from radarsim.studies.recording_interface import CORRELATION, MANOEUVRES, OUTLIERS, Likelihood, TurnError
 
 FALSE_FINDING_LEVEL = 0.05  # of a false finding
 MAX_FINDINGS = 3
@@ -46,7 +47,7 @@ class Finding:
     increase of the log-likelihood over the findings before.
 
     from_zero: whether the plots distinguish a key's value from zero. turning: the cost of a smaller manoeuvre variance.
-    rival: hard manoeuvres, where these explain the plots about as well as outliers."""
+    rival: hard manoeuvres, where these explain the plots about as well as outliers. rows: numbers that are outliers."""
 
     name: str
     value: float
@@ -54,6 +55,7 @@ class Finding:
     from_zero: bool = True
     turning: TurnError | None = None
     rival: Rival | None = None
+    rows: tuple[OutlierRow, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -156,9 +158,17 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
             finding,
             value=start[finding.name],
             from_zero=_is_distinguished_from_zero(counted, finding.name, start, value_so_far),
+            rows=_rows_of_outliers(likelihood, start) if finding.name == OUTLIERS else (),
         )
         for finding in results
     ]
+
+
+def _rows_of_outliers(likelihood: Likelihood, found: Mapping[str, float]) -> tuple[OutlierRow, ...]:
+    """The rows that are outliers, for the values of keys and explanations found."""
+    stated = zip(likelihood.keys, likelihood.stated, strict=True)
+    values = np.array([found.get(key, value) for key, value in stated])
+    return find_outlier_rows(likelihood, values, found[OUTLIERS], correlation=found.get(CORRELATION, 0.0))
 
 
 def _is_distinguished_from_zero(

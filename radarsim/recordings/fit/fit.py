@@ -37,6 +37,7 @@ from radarsim.recordings.target_speed import impossible_column_speed, speed_mess
 from radarsim.recordings.track_rows import split_by_track
 from radarsim.studies.recording_interface import CORRELATION, MANOEUVRES, NEAR, NEAR_PART, OUTLIERS, Likelihood
 
+FITTED_EXPLANATIONS = (OUTLIERS, CORRELATION)  # for which a fit can allow
 SECOND_FIT_COST = 1.5  # evaluations of a fit that allows for more, in those of the plain one
 
 
@@ -80,7 +81,7 @@ class Fit:
     gain: float
     further_explanation: "FurtherExplanation | None" = None
     plain: "Fit | None" = None
-    outlier_rows: tuple["OutlierRow", ...] = ()
+    outlier_rows: tuple["OutlierRow", ...] = ()  # the numbers that are probably outliers
     doubles: int = 0  # further plots of a track in a scan, left out
 
 
@@ -95,9 +96,10 @@ class FurtherExplanation(NamedTuple):
 
 
 class OutlierRow(NamedTuple):
-    """A number of a recording that is an outlier: its track (an index), time and column."""
+    """A number of a recording that is an outlier: its track (its name; an index where tracks have none), time and
+    column."""
 
-    track: int
+    track: str | int
     t_s: float
     column: str
 
@@ -130,7 +132,7 @@ class CorrelatedLikelihood:
 
     def soundness(
         self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
-    ) -> list[Mapping[str, np.ndarray]]:
+    ) -> Sequence[Mapping[str, np.ndarray]]:
         """As the likelihood's, with the correlation of the last of the values."""
         return self.likelihood.soundness(values[:-1], outliers, near, self._correlation(values))
 
@@ -142,12 +144,21 @@ class CorrelatedLikelihood:
         return self.likelihood.by_number(values[:-1])
 
 
+class FileLikelihoods(NamedTuple):
+    """The likelihood of a filter over all tracks of a file, and over a sample of its rows; the tracks' names, None where
+    they have none; and how many further plots of a track in a scan are left out."""
+
+    complete: Likelihood
+    rough: Likelihood | None
+    track_names: list[str | None]
+    doubles: int
+
+
 def file_likelihoods(
     experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None
-) -> tuple[Likelihood, Likelihood | None, int]:
-    """The likelihood of a filter of an experiment's one case over all tracks of a file, and over a sample of its rows;
-    without a name, of the filter that takes most columns of a plot. And how many further plots of a track in a scan are
-    left out. Raises ConfigError."""
+) -> FileLikelihoods:
+    """The likelihoods of a filter of an experiment's one case over a file; without a name, of the filter that takes most
+    columns of a plot. Raises ConfigError."""
     case = single_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
     refuse_inherited_part(case, "likelihood")
     interface = recording_interface(case)
@@ -157,7 +168,8 @@ def file_likelihoods(
         why = ": it is written in Python, and radarsim does not know its keys" if filter_name in user_filters else ""
         raise ConfigError(f"filter: must be one of {', '.join(filter_names)}; got {filter_name}{why}")
     tracks, doubles = _read_tracks(source, interface.columns(case.spec), interface.from_any_origin)
-    long_tracks = [columns for columns in tracks if len(columns["t_s"]) >= MIN_TRACK_ROWS]
+    names = [name for name, columns in tracks.items() if len(columns["t_s"]) >= MIN_TRACK_ROWS]
+    long_tracks = [tracks[name] for name in names]
     if not long_tracks:
         raise ConfigError(f"{source}: must have a track of at least {MIN_TRACK_ROWS} rows")
     if constant_columns := [
@@ -174,11 +186,8 @@ def file_likelihoods(
                 case, filter_name, [name for name in filter_names if interface.likelihood(case, name, long_tracks)]
             )
         )
-    return (
-        likelihood,
-        interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked))),
-        doubles,
-    )
+    rough = interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked)))
+    return FileLikelihoods(likelihood, rough, names, doubles)
 
 
 def _refuse_impossible_motion(
@@ -213,18 +222,19 @@ def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters:
 
 def _read_tracks(
     source: str | os.PathLike, choices: Sequence[Sequence[str]], any_origin: bool
-) -> tuple[list[dict[str, np.ndarray]], int]:
-    """The columns (n,) of each track of a file of plots, and how many further plots of a scan are left out."""
+) -> tuple[dict[str | None, dict[str, np.ndarray]], int]:
+    """The columns (n,) of each track of a file of plots, by its name, and how many further plots of a scan are left
+    out."""
     pieces_by_track, doubles = dict[str | None, list[dict[str, np.ndarray]]](), 0
     for piece in read_plots.pieces(source, choices, any_origin=any_origin):
         doubles = piece.doubles
         for rows in split_by_track(piece):
             if rows.name != "":
                 pieces_by_track.setdefault(rows.name, []).append(rows.columns)
-    tracks = [
-        {key: np.concatenate([piece[key] for piece in track_pieces]) for key in track_pieces[0]}
-        for track_pieces in pieces_by_track.values()
-    ]
+    tracks = {
+        name: {key: np.concatenate([piece[key] for piece in track_pieces]) for key in track_pieces[0]}
+        for name, track_pieces in pieces_by_track.items()
+    }
     return tracks, doubles
 
 
@@ -237,8 +247,12 @@ def fit_plots(
 ) -> Fit:
     """Fit the config's numbers to the plots of a file; allowing: for these of OUTLIERS and CORRELATION; None: for those
     that are plain. progress is called with the number of likelihoods computed. Raises ConfigError."""
-    likelihood, rough, doubles = file_likelihoods(experiment, source, filter_name)
-    return replace(fit_likelihood(likelihood, rough, allowing, progress), doubles=doubles)
+    likelihoods = file_likelihoods(experiment, source, filter_name)
+    fitted = fit_likelihood(likelihoods.complete, likelihoods.rough, allowing, progress)
+    rows = tuple(
+        row._replace(track=likelihoods.track_names[int(row.track)] or row.track) for row in fitted.outlier_rows
+    )
+    return replace(fitted, doubles=likelihoods.doubles, outlier_rows=rows)
 
 
 def fit_likelihood(
@@ -268,7 +282,7 @@ def fit_likelihood(
 def _is_plain_error(explanation: FurtherExplanation) -> bool:
     """Whether outliers or correlation raise the likelihood by more than chance does in one recording of 1000, and
     nothing else does as well."""
-    return explanation.name in (OUTLIERS, CORRELATION) and explanation.gain > PLAIN_GAIN and explanation.rival is None
+    return explanation.name in FITTED_EXPLANATIONS and explanation.gain > PLAIN_GAIN and explanation.rival is None
 
 
 def check_explanations(likelihood: Likelihood, allowing: Sequence[str]) -> None:
@@ -319,17 +333,25 @@ def fit_keys(
 
 
 def _outlier_rows(search: "LikelihoodSearch", likelihood: Likelihood) -> tuple[OutlierRow, ...]:
-    """The numbers that are probably outliers at the maximum; none where outliers are not allowed for."""
-    outliers = search.outliers(search.best)
-    if not outliers.get(OUTLIERS):
+    """The numbers that are probably outliers at the maximum, and the gross errors before the start of a track."""
+    values = search.to_values(search.best)[: len(likelihood.keys)]
+    return find_outlier_rows(likelihood, values, **({OUTLIERS: 0.0} | search.outliers(search.best)))
+
+
+def find_outlier_rows(
+    likelihood: Likelihood, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+) -> tuple[OutlierRow, ...]:
+    """The numbers that are probably outliers for values of the keys and explanations; none where the likelihood knows
+    no outliers."""
+    if OUTLIERS not in likelihood.explains:
         return ()
-    probabilities = likelihood.soundness(search.to_values(search.best)[: len(likelihood.keys)], **outliers)
+    tracks = likelihood.soundness(values, outliers, near, correlation)
     return tuple(
         OutlierRow(number, float(track["t_s"][row]), name)
-        for number, track in enumerate(probabilities)
-        for row in range(len(track["t_s"]))
+        for number, track in enumerate(tracks)
         for name in track
-        if name != "t_s" and track[name][row] < 1 - OUTLIER_PROBABILITY
+        if name != "t_s"
+        for row in np.flatnonzero(track[name] < 1 - OUTLIER_PROBABILITY)
     )
 
 

@@ -10,6 +10,8 @@ from radarsim.language.translate import join_names, plural, shorten_names, term,
 from radarsim.recordings.doppler_scale import doppler_scale_message
 from radarsim.recordings.fit import folded_doppler
 from radarsim.recordings.fit.advice import Advice, FilterComparison, Finding, UsedRows
+from radarsim.recordings.fit.fit import OutlierRow
+from radarsim.recordings.fit.likelihood_slice import Rival
 from radarsim.recordings.report.innovation_tests import (
     FITS,
     FOLD_LOST,
@@ -23,10 +25,11 @@ from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.report.output_labels import labelled_line
 from radarsim.report.wording import number, significant_digits
 from radarsim.report.wording import unit as unit_of
-from radarsim.studies.recording_interface import BIAS, CORRELATION, OUTLIERS, TurnError
+from radarsim.studies.recording_interface import BIAS, CORRELATION, MANOEUVRES, OUTLIERS, TurnError
 
 MAX_RATIO_POWER = 6  # a larger power of ten of a ratio of likelihoods says no more than that one model is wrong
 EQUAL_FILTERS_GAIN = 1e-6  # difference of the log-likelihood below which two filters are the same
+MAX_NAMED_ROWS = 5  # of a column's outliers
 CLEAR_GAIN = 3.0  # difference of the log-likelihood, a factor of twenty, from which one filter is clearly the best
 
 
@@ -216,7 +219,10 @@ def likelihood_ratio_text(gain: float) -> str:
 def finding_text(finding: Finding, filter_name: str) -> str:
     """An error in the configured numbers, its weight, and the cost of a smaller manoeuvre variance."""
     if finding.from_zero:
-        fields = {"what": explanation_text(finding.name, finding.value), "times": likelihood_ratio_text(finding.gain)}
+        what = rivals_text(finding.name, finding.value, finding.rival)
+        if finding.rows:
+            what = tr("{what}: {rows}", what=what, rows=outlier_rows_text(finding.rows))
+        fields = {"what": what, "times": likelihood_ratio_text(finding.gain)}
         text = tr("{what}; the plots are then {times} times as likely", **fields)
     else:
         text = tr("{key}: the plots cannot distinguish it from zero; that is no reason to lower it", key=finding.name)
@@ -242,11 +248,39 @@ def _turn_cost(turn: TurnError, filter_name: str) -> str:
     )
 
 
+def rivals_text(name: str, value: float, rival: Rival | None) -> str:
+    """The text of an explanation, and of its rival where the plots cannot distinguish the two."""
+    text = explanation_text(name, value)
+    if rival is None:
+        return text
+    other = explanation_text(MANOEUVRES, rival.share)
+    return tr("{what}, or {other}: the plots cannot distinguish these", what=text, other=other)
+
+
+def outlier_rows_text(rows: Sequence[OutlierRow]) -> str:
+    """Where numbers are outliers: range_m at 120 s, 124 s; velocity_mps at 8 s; with the names of several tracks."""
+    places: dict[str, list[str]] = {}
+    for row in rows:
+        place = f"{row.t_s:g} s" if isinstance(row.track, int) else f"{row.t_s:g} s ({row.track})"
+        places.setdefault(row.column, []).append(place)
+    texts = []
+    for column, times in places.items():
+        more = len(times) - MAX_NAMED_ROWS
+        named = ", ".join(times[:MAX_NAMED_ROWS])
+        if more > 0:
+            named = tr("{named} and {count} more", named=named, count=more)
+        texts.append(tr("{column} at {times}", column=column, times=named))
+    return "; ".join(texts)
+
+
 def explanation_text(name: str, value: float) -> str:
     """The text of an explanation: a key with its value, or one of EXPLANATIONS."""
     if name == OUTLIERS:
         share = significant_digits(100 * value, "#.2g")
-        return tr("outliers: {share} % of the plots have errors of ten times their σ", share=share)
+        return tr("outliers: {share} % of the plots have errors of several times their σ, or far more", share=share)
+    if name == MANOEUVRES:
+        share = significant_digits(100 * value, "#.2g")
+        return tr("the target manoeuvres unevenly: far harder in {share} % of the intervals", share=share)
     if name == BIAS:
         size = significant_digits(value, "#.3g")
         return tr("the measured velocities have a common bias of {size} of their σ", size=size)

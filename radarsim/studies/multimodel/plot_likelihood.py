@@ -81,7 +81,10 @@ class PlotLikelihood:
             start = plots[problem.start_rows]
             start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= start_factor(shares)
             filter_strip.start_strip(work, state, lane_rows(start), problem.weights, self.probabilities)
-            later_plots, (score, soundness) = lane_rows(plots[problem.later_plots]), np.empty((2, len(problem.intervals)))
+            later_plots, (score, soundness) = (
+                lane_rows(plots[problem.later_plots]),
+                np.empty((2, len(problem.intervals))),
+            )
             arguments = design, problem.transitions, problem.intervals, problem.times, numbers, self.frame
             later_widths = widths[problem.later_plots]
             likelihood.log_likelihood(work, state, later_plots, later_widths, *arguments, shares, score, soundness)

@@ -138,9 +138,7 @@ def twin(columns, values, shares, bias):
 )
 def test_outliers_and_bias_against_a_textbook_twin(shares, bias):
     columns, values = drawn(3, share=0.2), np.array([250.0, 15.0, 1e-3])
-    found = PlotLikelihood(case(), None, [columns])(
-        values, sum(shares), bias, near=shares[0] / (sum(shares) or 1)
-    )
+    found = PlotLikelihood(case(), None, [columns])(values, sum(shares), bias, near=shares[0] / (sum(shares) or 1))
     assert found == pytest.approx(twin(columns, values, shares, bias), abs=precision(found, values))
 
 
