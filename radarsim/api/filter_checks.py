@@ -10,6 +10,7 @@ import numpy as np
 
 from radarsim.api.case_work import CaseWork
 from radarsim.api.estimate_files import UNIT_FACTORS
+from radarsim.api.estimate_time import time_warnings
 from radarsim.config.experiment import Case
 from radarsim.config.seeds import OTHER_NOISE, other_seed
 from radarsim.errors import AUTHOR_ERRORS, ConfigError
@@ -44,12 +45,16 @@ def check_user_filter(case: Case, member: UserFilter) -> list[str]:
         member.name, output, plot_arrays.n, len(plan.world.t_s), plan.names, member.components
     )
     component_indices = estimates.columns_of(member.name, x.shape[2], plan.names, member.components)
-    _check_order(plan, member, x, plot_arrays.truth_of(plan.axes.components), component_indices, inner)
+    truth = plot_arrays.truth_of(plan.axes.components)
+    _check_order(plan, member, x, truth, component_indices, inner)
     sees_plots = not isinstance(member, StoredEstimates | EstimateChunks)
     if not sees_plots:
         _check_follows_plots(case, member, errors.error, inner)
     rms = np.sqrt(_mean(np.square(errors.error), (0, 1)))[component_indices]
     lines = _rounding_warnings(member, estimates.plain(estimates.parts(output)[0]), x, rms)
+    measured = [column for column in plot_arrays.columns.values() if column.shape == x.shape[:2]]
+    if measured:
+        lines += time_warnings(member.name, x, truth[..., component_indices], np.stack(measured, axis=-1))
     if sees_plots:
         columns = plot_arrays.columns
         if any(not np.array_equal(plots[name], columns[name], equal_nan=True) for name in columns):

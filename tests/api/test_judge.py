@@ -195,6 +195,27 @@ def test_half_of_the_realisations_shifted_are_still_those_of_the_plots(estimates
     assert tried(noisy) == []
 
 
+@pytest.mark.parametrize("components", [1, 2, 3])
+def test_estimates_of_another_scan_are_found_by_the_truth_of_that_scan(estimates, components):
+    moved = np.full_like(estimates, np.nan)
+    moved[:, 1:] = estimates[:, :-1]
+    (late,) = tried(moved[..., :components])
+    assert "fit the truth of 1 scan before" in late
+    moved = np.full_like(estimates, np.nan)
+    moved[:, :-2] = estimates[:, 2:]
+    (early,) = tried(moved[..., :components])
+    assert "fit the truth of 2 scans after" in early
+
+
+@pytest.mark.parametrize("components", [1, 2, 3])
+def test_estimates_from_before_the_plot_owe_nothing_to_it(estimates, components):
+    predicted = np.full_like(estimates, np.nan)
+    predicted[:, 1:] = estimates[:, :-1] @ naive.transition(10.0).T
+    (line,) = tried(predicted[..., :components])
+    assert "owe nothing to the plot of their scan" in line
+    assert tried(estimates[..., :components]) == []
+
+
 def test_names_are_those_of_no_other_filter(estimates):
     assert "there is a filter 'r+Vr' already" in refusal(estimates, name="r+Vr")
     assert refusal(estimates, name="../mine") == "name: must be no path, got '../mine'"
