@@ -4,8 +4,8 @@ Letters as in the book: x state, P its covariance, F transition, Q process noise
 that was measured, S variance of its innovation e, K = p / S gain with p = P h. A plot is taken in one number after the
 other, each with an error of its own.
 
-An outlier is a number whose error follows another law: it is near, of NEAR_WIDTH times the stated σ, or far, of any
-size: the logarithm of its σ is uniform between FAR_WIDTH times the stated one and the span of the data, taken at
+An outlier is a number whose error follows another law: it is near, of a width of some times the stated σ, or far, of
+any size: the logarithm of its σ is uniform between FAR_WIDTH times the stated one and the span of the data, taken at
 FAR_COUNT values. One law of one width would lift σ with the size of the farthest. A hard manoeuvre is an interval in
 which the process noise is HARD_FACTOR times as large. The explanations of x and P are merged by moments (GPB1).
 
@@ -16,11 +16,11 @@ import numpy as np
 
 from radarsim.kernels.compiler import kernel
 
-NEAR_WIDTH, FAR_WIDTH = 3.0, 10.0  # of an outlier, in σ of a number
+NEAR_WIDTH, FAR_WIDTH = 3.0, 10.0  # of an outlier, in σ of a number: the usual one of near ones, the least of far ones
 FAR_COUNT = 6  # widths of far outliers
 LAW_COUNT = 2 + FAR_COUNT  # of errors: the stated one, that of near outliers, those of far ones
 HARD_FACTOR = 100.0  # on the process noise in a hard manoeuvre
-NEAR, FAR, HARD = 0, 1, 2  # of the shares
+NEAR, FAR, HARD, WIDTH = range(4)  # of the shares, and the width of near outliers
 
 
 @kernel
@@ -29,8 +29,8 @@ def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, shares, span,
 
     x (d,) and P (d, d) are what is known at the first row, and are overwritten; F, Q (n, d, d): transition to each row
     and what the manoeuvre of unit variance adds; H (n, m, d), z, variance (n, m): the numbers, where `present`;
-    manoeuvre: its variance; shares (3,): of near and far outliers among the numbers, of hard manoeuvres among the
-    intervals; span (m,): of the data; white: 1, or 0 where the errors are states. Out: log_densities (n, m), the
+    manoeuvre: its variance; shares (4,): of near and far outliers among the numbers, of hard manoeuvres among the
+    intervals, and the width of near outliers in σ; span (m,): of the data; white: 1, or 0 where the errors are states. Out: log_densities (n, m), the
     logarithm of each number's density given those before it, zero where it is missing; soundness (n, m): the
     probability that it is no outlier."""
     product, p, laws = np.zeros_like(P), np.zeros_like(x), np.empty((2, LAW_COUNT))
@@ -129,7 +129,7 @@ def fill_laws(laws, e, S, variance, shares, span):
         if i == 0:
             share, laws[1, i] = 1.0 - shares[NEAR] - shares[FAR], S
         elif i == 1:
-            share, laws[1, i] = shares[NEAR], S + (NEAR_WIDTH * NEAR_WIDTH - 1.0) * variance
+            share, laws[1, i] = shares[NEAR], S + (shares[WIDTH] * shares[WIDTH] - 1.0) * variance
         else:
             share, laws[1, i] = shares[FAR] / FAR_COUNT, S + (width - 1.0) * variance
             width *= ratio

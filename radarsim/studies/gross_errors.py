@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from radarsim.kernels.likelihood import FAR, FAR_WIDTH, NEAR, NEAR_WIDTH
+from radarsim.kernels.likelihood import FAR, FAR_WIDTH, NEAR, WIDTH
 
 START_PLOTS = 15  # from which the parabola is found
 MIN_START_PLOTS = 8
@@ -59,7 +59,7 @@ def data_span(tracks: Sequence[Mapping[str, np.ndarray]], measured: Sequence[str
 
 def start_factor(shares: np.ndarray) -> float:
     """The factor on the variance of a plot that starts a track, where it may be an outlier that is no gross error."""
-    return 1.0 + (NEAR_WIDTH**2 - 1.0) * float(shares[NEAR]) + (FAR_WIDTH**2 - 1.0) * float(shares[FAR])
+    return 1.0 + (float(shares[WIDTH]) ** 2 - 1.0) * float(shares[NEAR]) + (FAR_WIDTH**2 - 1.0) * float(shares[FAR])
 
 
 def soundness_by_column(

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from radarsim.studies.linear_design import period
 from radarsim.studies.gross_errors import data_span, soundness_by_column
+from radarsim.studies.linear_design import period
 from radarsim.studies.recording_interface import (
     CORRELATION,
     MANOEUVRES,
@@ -191,21 +191,27 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
+        near_width: float = 3.0,
     ) -> float:
         """The logarithm of the likelihood."""
-        return float(self._scores(values, outlier_shares(outliers, near, manoeuvres), correlation).sum())
+        return float(self._scores(values, outlier_shares(outliers, near, near_width, manoeuvres), correlation).sum())
 
     def soundness(
-        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+        self,
+        values: np.ndarray,
+        outliers: float,
+        near: float = NEAR_PART,
+        near_width: float = 3.0,
+        correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""
-        scores = self._track_scores(values, outlier_shares(outliers, near, 0.0), correlation)
+        scores = self._track_scores(values, outlier_shares(outliers, near, near_width), correlation)
         judged = [(i, np.arange(len(soundness)), soundness) for i, (_, soundness) in enumerate(scores)]
         return soundness_by_column(self.model.columns, self.given_tracks, self.given_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of each number of a plot."""
-        return dict(zip(self.model.columns, self._scores(values, np.zeros(3), 0.0).tolist(), strict=True))
+        return dict(zip(self.model.columns, self._scores(values, np.zeros(4), 0.0).tolist(), strict=True))
 
 
 def _changed(model: Any, path: Sequence[str], value: float) -> Any:

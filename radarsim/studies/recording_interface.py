@@ -65,6 +65,7 @@ MAX_PREPARED = 4  # cases that stay prepared: those whose plots were drawn last
 
 OUTLIERS, BIAS, CORRELATION, MANOEUVRES = EXPLANATIONS = ("outliers", "bias", "correlation", "manoeuvres")
 NEAR, NEAR_PART = "near", 0.5  # the part of outliers that is near, where it is not fitted
+NEAR_WIDTH = "near_width"  # their width, in σ
 
 
 class Likelihood(Protocol):
@@ -91,16 +92,22 @@ class Likelihood(Protocol):
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
+        near_width: float = 3.0,
     ) -> float:
         """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
 
-        outliers: their share among the numbers, of which the part `near` has a few times its σ and the rest any size
-        (`radarsim.kernels.likelihood`); bias: a constant error of a number that can show one, in its σ; correlation: of
+        outliers: their share among the numbers, of which the part `near` has `near_width` times its σ and the rest any
+        size (`radarsim.kernels.likelihood`); bias: a constant error of a number that can show one, in its σ; correlation: of
         the errors of neighbouring plots, at the recording's usual interval; manoeuvres: the share of intervals in which
         the target manoeuvres far harder than in the others."""
 
     def soundness(
-        self, values: "np.ndarray", outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+        self,
+        values: "np.ndarray",
+        outliers: float,
+        near: float = NEAR_PART,
+        near_width: float = 3.0,
+        correlation: float = 0.0,
     ) -> "Sequence[Mapping[str, np.ndarray]]":
         """The times t_s of each track, and the probability of each number that it is no outlier, by column; (n,) each."""
 
@@ -116,11 +123,11 @@ def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:
     return float(np.median(medians)) if medians else 1.0
 
 
-def outlier_shares(outliers: float, near: float, manoeuvres: float) -> "np.ndarray":
-    """The shares (3,) of near and far outliers and of hard manoeuvres, as `radarsim.kernels.likelihood` takes them."""
+def outlier_shares(outliers: float, near: float, near_width: float, manoeuvres: float = 0.0) -> "np.ndarray":
+    """The shares of near and far outliers and of hard manoeuvres, and the width of near outliers (4,), as `radarsim.kernels.likelihood` takes them."""
     import numpy as np
 
-    return np.array([outliers * near, outliers * (1 - near), manoeuvres])
+    return np.array([outliers * near, outliers * (1 - near), manoeuvres, near_width])
 
 
 class TurnError(NamedTuple):

@@ -36,7 +36,7 @@ def likelihood(case, name, *tracks):
 
 def no_outliers(numbers):
     """The arguments of the kernel for which there are neither outliers nor hard manoeuvres."""
-    return np.zeros(3), np.ones(numbers)
+    return np.zeros(4), np.ones(numbers)
 
 
 def density_size(off, spread):
@@ -145,7 +145,7 @@ def test_errors_that_last_have_the_density_of_their_correlations():
 
 def test_an_outlier_leaves_the_moments_of_all_explanations():
     """Of the second number, after a first that is a mixture: Bayes' rule by hand."""
-    P, variance, shares, span, z = 4.0, 1.0, np.array([0.2, 0.1, 0.0]), 500.0, np.array([[7.0], [1.0]])
+    P, variance, shares, span, z = 4.0, 1.0, np.array([0.2, 0.1, 0.0, 3.0]), 500.0, np.array([[7.0], [1.0]])
     chances, widths = error_laws(shares, span, variance)
     spreads = P + variance * widths**2
     first = chances * np.exp(-0.5 * z[0] ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
@@ -178,7 +178,7 @@ def test_a_hard_manoeuvre_is_a_second_process_noise():
     mean, spread = merged([part[0] / total for part in parts], [part[1:] for part in parts])
     rows, (score, sound) = np.stack([np.zeros(2), z]), np.empty((2, 2, 2))
     there = np.array([[False, False], [True, True]])
-    x, P, shares = np.zeros(2), P.copy(), np.array([0.0, 0.0, share])
+    x, P, shares = np.zeros(2), P.copy(), np.array([0.0, 0.0, share, 3.0])
     twice = [np.stack([matrix] * 2) for matrix in (F, Q, H)]
     log_likelihood(x, P, *twice, rows, np.ones((2, 2)), there, q, shares, np.ones(2), 1.0, score, sound)
     assert_rounded(score.sum(), np.log(total), density_size(z, S), operations=60)
@@ -328,7 +328,7 @@ def interacting(case, options, columns, T, shares=(0.0, 0.0)):
     for k in range(3, len(t)):
         c = T @ p
         smallest = np.linalg.eigvalsh(R[k])[0]
-        chances, widths = error_laws((*shares, 0.0), np.ptp(columns["range_m"]), smallest)
+        chances, widths = error_laws((*shares, 0.0, 3.0), np.ptp(columns["range_m"]), smallest)
         possible = [(chance, width**2 * R[k]) for chance, width in zip(chances, widths, strict=True) if chance > 0]
         scores, parts = np.zeros((M, len(possible))), []
         for i, (F, Q) in enumerate(models_over(options, t[k] - t[k - 1])):

@@ -126,15 +126,21 @@ class CorrelatedLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
+        near_width: float = 3.0,
     ) -> float:
         """The logarithm of the likelihood; `correlation` is that of the last of the values (n,), whatever is given."""
-        return self.likelihood(values[:-1], outliers, bias, self._correlation(values), manoeuvres, near)
+        return self.likelihood(values[:-1], outliers, bias, self._correlation(values), manoeuvres, near, near_width)
 
     def soundness(
-        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+        self,
+        values: np.ndarray,
+        outliers: float,
+        near: float = NEAR_PART,
+        near_width: float = 3.0,
+        correlation: float = 0.0,
     ) -> Sequence[Mapping[str, np.ndarray]]:
         """As the likelihood's, with the correlation of the last of the values."""
-        return self.likelihood.soundness(values[:-1], outliers, near, self._correlation(values))
+        return self.likelihood.soundness(values[:-1], outliers, near, near_width, self._correlation(values))
 
     def _correlation(self, values: np.ndarray) -> float:
         return math.exp(-self.usual_s / values[-1]) if values[-1] else 0.0
@@ -339,13 +345,18 @@ def _outlier_rows(search: "LikelihoodSearch", likelihood: Likelihood) -> tuple[O
 
 
 def find_outlier_rows(
-    likelihood: Likelihood, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+    likelihood: Likelihood,
+    values: np.ndarray,
+    outliers: float,
+    near: float = NEAR_PART,
+    near_width: float = 3.0,
+    correlation: float = 0.0,
 ) -> tuple[OutlierRow, ...]:
     """The numbers that are probably outliers for values of the keys and explanations; none where the likelihood knows
     no outliers."""
     if OUTLIERS not in likelihood.explains:
         return ()
-    tracks = likelihood.soundness(values, outliers, near, correlation)
+    tracks = likelihood.soundness(values, outliers, near, near_width, correlation)
     return tuple(
         OutlierRow(number, float(track["t_s"][row]), name)
         for number, track in enumerate(tracks)

@@ -7,7 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.studies.recording_interface import BIAS, CORRELATION, EXPLANATIONS, MANOEUVRES, NEAR, OUTLIERS, Likelihood
+from radarsim.studies.recording_interface import (
+    BIAS,
+    CORRELATION,
+    EXPLANATIONS,
+    MANOEUVRES,
+    NEAR,
+    NEAR_WIDTH,
+    OUTLIERS,
+    Likelihood,
+)
 
 ROUGH_ACCURACY = 0.01  # relative accuracy, of a key and of the likelihood, to which explanations are compared
 MIN_LOG_FACTOR, MAX_LOG_FACTOR = np.log(1e-4), np.log(1e4)  # of a key's factor
@@ -58,7 +67,7 @@ def log_likelihood(likelihood: CountedLikelihood, changes: Mapping[str, float]) 
     """The log-likelihood with some keys changed and some explanations applied."""
     configured = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changes.get(key, value) for key, value in configured])
-    result = likelihood(values, {name: changes[name] for name in (*EXPLANATIONS, NEAR) if name in changes})
+    result = likelihood(values, {name: changes[name] for name in (*EXPLANATIONS, NEAR, NEAR_WIDTH) if name in changes})
     return result if np.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
 
 
@@ -129,7 +138,7 @@ def rival_of_outliers(likelihood: CountedLikelihood, values: Mapping[str, float]
         return None
     configured = dict(zip(likelihood.keys, starting_values(likelihood.likelihood).tolist(), strict=True))
     least = dict(zip(likelihood.keys, np.asarray(likelihood.likelihood.least).tolist(), strict=True))
-    fixed = {name: value for name, value in values.items() if name not in (OUTLIERS, NEAR)}
+    fixed = {name: value for name, value in values.items() if name not in (OUTLIERS, NEAR, NEAR_WIDTH)}
     keys = [key for key in likelihood.keys if fixed.get(key, configured[key]) > least[key]]
     maxima = {}
     for name, shares in ((OUTLIERS, [values[OUTLIERS]]), (MANOEUVRES, RIVAL_STARTS)):

@@ -18,7 +18,7 @@ from radarsim.recordings.fit.likelihood_slice import (
     starting_values,
 )
 from radarsim.recordings.fit.newton_steps import FIRST_STEP, TOLERANCE, Curvature, polish_maximum
-from radarsim.studies.recording_interface import NEAR, NEAR_PART, OUTLIERS, Likelihood
+from radarsim.studies.recording_interface import NEAR, NEAR_PART, NEAR_WIDTH, OUTLIERS, Likelihood
 
 # likelihood evaluations of a key to the maximum and to an end; of an explanation
 MAXIMUM_EVALUATIONS = 130
@@ -39,6 +39,9 @@ MIN_OUTLIER_SHARE = 1e-6  # of near or far outliers; fewer are none
 # of the σ are as likely as none.
 MAX_OUTLIER_SHARES = np.array([0.2, 0.4])
 FIRST_OUTLIER_SHARE = 0.03  # where the search of either begins
+MIN_NEAR_WIDTH, MAX_NEAR_WIDTH = 2.5, 100.0  # of near outliers, in σ
+NEAR_WIDTH_STARTS = (3.0, 10.0)
+NO_ZERO = -1e3  # below the logarithm of a number that has no zero
 NEAR_MAXIMUM_EVALUATIONS = 30  # as MAXIMUM_EVALUATIONS, from near the maximum
 # factor on the value that counts as zero where the likelihood jumps by more there
 ZERO_REFINEMENT = 1e-3
@@ -69,7 +72,7 @@ class _ProfilePoint(NamedTuple):
 
 class LikelihoodSearch:
     """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and the
-    logits of the shares of near and far outliers."""
+    logits of the shares of near and far outliers, and the logarithm of the width of near ones."""
 
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, start_point: np.ndarray | None = None):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
@@ -85,6 +88,8 @@ class LikelihoodSearch:
                     (self.highest, MAX_OUTLIER_SHARES),
                 )
             )
+            widths = np.log([NEAR_WIDTH_STARTS[0]]), [NO_ZERO], np.log([MAX_NEAR_WIDTH])
+            start, self.lowest, self.highest = map(np.append, (start, self.lowest, self.highest), widths)
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
         self.curvature_model = Curvature(self._log_likelihood)
         self.best, self.top = self._climb(start if start_point is None else start_point, None, ROUGH_TOLERANCE)
@@ -98,9 +103,20 @@ class LikelihoodSearch:
                 candidate, value = self._climb(candidate, None, ROUGH_TOLERANCE)
             if value > self.top + 1e-6:
                 self.best, self.top = candidate, value
+        if robust and start_point is None:
+            self._try_near_widths()
         self.top = -math.inf
         self._polish(self.best)
         self.raise_zero_keys()
+
+    def _try_near_widths(self) -> None:
+        """Search from several widths of near outliers: few of one size and many of a smaller one may both be maxima."""
+        for width in NEAR_WIDTH_STARTS:
+            start = self.best.copy()
+            start[-3], start[-1] = math.log(FIRST_OUTLIER_SHARE / (1 - FIRST_OUTLIER_SHARE)), math.log(width)
+            candidate, value = self._climb(start, None, ROUGH_ACCURACY, SIMPLEX_EVALUATIONS[:1])
+            if value > self.top + ROUGH_ACCURACY:
+                self.best, self.top = self._climb(candidate, None, ROUGH_TOLERANCE)
 
     def _polish(self, start: np.ndarray) -> bool:
         """Take the maximum near a point as the best if it is higher, and return whether it is."""
@@ -117,7 +133,9 @@ class LikelihoodSearch:
         self.curvature_model = Curvature(self._log_likelihood)
         self.curvature_model.step(self.best, self.top, np.arange(self.best.size))
         self.curvature = self.curvature_model.H
-        self.raised_keys = {i: self._raised_log(i) for i in range(self.best.size) if self._may_be_zero(i)}
+        self.raised_keys = {
+            i: self._raised_log(i) for i in np.flatnonzero(self.lowest > NO_ZERO) if self._may_be_zero(i)
+        }
         self.ends_started_at = self.evaluations
 
     def _raised_point(self) -> np.ndarray | None:
@@ -134,22 +152,25 @@ class LikelihoodSearch:
         return point if value > self.top + TOLERANCE else None
 
     def to_values(self, point: np.ndarray) -> np.ndarray:
-        """The keys, and the shares of near and far outliers at the end if allowed for."""
+        """The keys, and the shares of near and far outliers and the width of near ones at the end if allowed for."""
         count = len(self.likelihood.stated)
         keys = np.exp(np.clip(point[:count], -200, 200))
         keys = np.where(keys <= self.likelihood.least, 0.0, keys)
         if not self.robust:
             return keys
-        shares = 1 / (1 + np.exp(-point[count:]))
-        return np.append(keys, np.where(shares <= MIN_OUTLIER_SHARE, 0.0, np.minimum(shares, MAX_OUTLIER_SHARES)))
+        shares = 1 / (1 + np.exp(-point[count:-1]))
+        shares = np.where(shares <= MIN_OUTLIER_SHARE, 0.0, np.minimum(shares, MAX_OUTLIER_SHARES))
+        width = math.exp(min(max(point[-1], math.log(MIN_NEAR_WIDTH)), math.log(MAX_NEAR_WIDTH)))
+        return np.concatenate([keys, shares, [width]])
 
     def outliers(self, point: np.ndarray) -> dict[str, float]:
-        """The share of outliers and the part of them that is near, as a likelihood takes them; empty if not allowed
+        """The share of outliers, the part of them that is near and the width of these, as a likelihood takes them; empty if not allowed
         for."""
         if not self.robust:
             return {}
-        shares = self.to_values(point)[-2:]
-        return {OUTLIERS: float(shares.sum()), NEAR: float(shares[0] / shares.sum()) if shares.any() else NEAR_PART}
+        near, far, width = self.to_values(point)[-3:].tolist()
+        part = near / (near + far) if near + far else NEAR_PART
+        return {OUTLIERS: near + far, NEAR: part, NEAR_WIDTH: width}
 
     def _log_likelihood(self, point: np.ndarray) -> float:
         values = self.to_values(point)

@@ -163,7 +163,7 @@ class SingleFollower:
             self.nis[1] = e**2 / S
         max_fold = max_fold if self.options.hypotheses != 1 else min(max_fold, 0)
         arguments = v, self.folds.span, max_fold, *list_limits(self.options)
-        self.x, self.w, *_ = recorded_rows.take_velocity(self.x, self.w, self.P, R, *arguments, np.zeros(3), 0.0)
+        self.x, self.w, *_ = recorded_rows.take_velocity(self.x, self.w, self.P, R, *arguments, np.zeros(4), 0.0)
         self.right_covariance, gain, _ = TAKE[1](self.right_covariance, R, 1.0)
         return np.array(gain)
 

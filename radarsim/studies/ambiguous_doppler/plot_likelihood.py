@@ -107,21 +107,27 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
+        near_width: float = 3.0,
     ) -> float:
         """The log likelihood. bias: of the velocity, in units of its σ; correlation and manoeuvres are ignored."""
-        return float(self._scores(values, outlier_shares(outliers, near, 0.0), bias).sum())
+        return float(self._scores(values, outlier_shares(outliers, near, near_width), bias).sum())
 
     def soundness(
-        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+        self,
+        values: np.ndarray,
+        outliers: float,
+        near: float = NEAR_PART,
+        near_width: float = 3.0,
+        correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""
-        scores = self._track_scores(values, outlier_shares(outliers, near, 0.0), 0.0)
+        scores = self._track_scores(values, outlier_shares(outliers, near, near_width), 0.0)
         judged = [(i, np.arange(len(part)), part[:, : self.observes]) for i, (_, part) in enumerate(scores)]
         return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The log likelihoods of range and velocity."""
-        total = self._scores(values, np.zeros(3))
+        total = self._scores(values, np.zeros(4))
         return {name: float(score) for name, score in zip(self.columns, total, strict=False)}
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.kernels.lanes import WIDTH
-from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH, NEAR_WIDTH
+from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH
+from radarsim.kernels.likelihood import WIDTH as NEAR_WIDTH
 from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
 from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Filter, Keys
@@ -75,7 +76,7 @@ class PlotLikelihood:
         design, numbers = filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
         z, R, is_valid = local_plots(sensor, self.measured)
         plots, result = np.concatenate([z, R, is_valid[:, None]], axis=1), []
-        widths = self._widths(R)
+        widths = self._widths(R, float(shares[NEAR_WIDTH]))
         for problem in self.problems:
             work, state = work_arrays()
             start = plots[problem.start_rows]
@@ -91,7 +92,7 @@ class PlotLikelihood:
             result.append((problem, score, soundness))
         return result
 
-    def _widths(self, R: np.ndarray) -> np.ndarray:
+    def _widths(self, R: np.ndarray, near_width: float) -> np.ndarray:
         """The factors (n, WIDTH) on the packed covariances R (n, 6) of plots in the lanes, for each law of errors; the
         widest spans the data in the direction of the smallest error."""
         xx, xy, xz, yy, yz, zz = R.T
@@ -103,7 +104,7 @@ class PlotLikelihood:
             ratio = np.where(smallest > 0, np.maximum(self.span**2 / (FAR_WIDTH**2 * smallest), 1.0), 1.0)
         far = FAR_WIDTH**2 * ratio[:, None] ** np.linspace(0, 1, FAR_COUNT)
         result = np.ones((len(R), WIDTH))
-        result[:, 1], result[:, 2 : 2 + FAR_COUNT] = NEAR_WIDTH**2, far
+        result[:, 1], result[:, 2 : 2 + FAR_COUNT] = near_width**2, far
         return result
 
     def __call__(
@@ -114,19 +115,25 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
+        near_width: float = 3.0,
     ) -> float:
         """The log likelihood; of the explanations only outliers are part of the model."""
-        return self._total(values, "moment", outlier_shares(outliers, near, 0.0))
+        return self._total(values, "moment", outlier_shares(outliers, near, near_width))
 
     def _total(self, values: np.ndarray, merge: str, shares: np.ndarray) -> float:
         """The log likelihood of all tracks."""
         return sum(float(score.sum()) for _, score, _ in self._track_scores(values, merge, shares))
 
     def soundness(
-        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+        self,
+        values: np.ndarray,
+        outliers: float,
+        near: float = NEAR_PART,
+        near_width: float = 3.0,
+        correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each plot that it is no outlier, for all its numbers the same."""
-        scores = self._track_scores(values, "moment", outlier_shares(outliers, near, 0.0))
+        scores = self._track_scores(values, "moment", outlier_shares(outliers, near, near_width))
         judged = [
             (problem.track, problem.later_rows, np.repeat(soundness[:, None], 3, axis=1))
             for problem, _, soundness in scores
@@ -135,7 +142,7 @@ class PlotLikelihood:
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The log likelihood of the plots, with the filter's own merging rule."""
-        return {"plot": self._total(values, self.options.merge, np.zeros(3))}
+        return {"plot": self._total(values, self.options.merge, np.zeros(4))}
 
 
 class _Problem(NamedTuple):

@@ -10,11 +10,11 @@ from radarsim.config.experiment import Case
 from radarsim.kernels.kalman_algebra import unpack
 from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
 from radarsim.physics.motion import transition
+from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
 from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filter_design import noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import recorded_rows
 from radarsim.studies.range_doppler.tracking import MEASURED, START_RANGES, configured_variances
-from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
 from radarsim.studies.recording_interface import EXPLANATIONS, NEAR_PART, outlier_shares, usual_interval_s
 
 MIN_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
@@ -110,16 +110,22 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
+        near_width: float = 3.0,
     ) -> float:
         """The logarithm of the likelihood; bias: of the velocity, in its σ."""
-        shares = outlier_shares(outliers, near, manoeuvres)
+        shares = outlier_shares(outliers, near, near_width, manoeuvres)
         return float(self._scores(values, shares, bias, correlation).sum())
 
     def soundness(
-        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+        self,
+        values: np.ndarray,
+        outliers: float,
+        near: float = NEAR_PART,
+        near_width: float = 3.0,
+        correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; zero of gross errors before the start."""
-        shares = outlier_shares(outliers, near, 0.0)
+        shares = outlier_shares(outliers, near, near_width)
         scored = [
             (problem.track, problem.rows, self._score(problem, values, shares, 0.0, correlation)[1])
             for problem in self.problems
@@ -128,7 +134,7 @@ class PlotLikelihood:
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of range and velocity."""
-        total = self._scores(values, np.zeros(3))
+        total = self._scores(values, np.zeros(4))
         return {name: float(part) for name, part in zip(self.columns, total, strict=True)}
 
 

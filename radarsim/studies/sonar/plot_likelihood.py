@@ -155,15 +155,21 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
+        near_width: float = 3.0,
     ) -> float:
         """The logarithm of the likelihood; a bias is not part of the model."""
-        return self._score(values, outlier_shares(outliers, near, manoeuvres), correlation)
+        return self._score(values, outlier_shares(outliers, near, near_width, manoeuvres), correlation)
 
     def soundness(
-        self, values: np.ndarray, outliers: float, near: float = NEAR_PART, correlation: float = 0.0
+        self,
+        values: np.ndarray,
+        outliers: float,
+        near: float = NEAR_PART,
+        near_width: float = 3.0,
+        correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; in x and y of range and bearing together."""
-        shares, judged = outlier_shares(outliers, near, 0.0), []
+        shares, judged = outlier_shares(outliers, near, near_width), []
         for problem in self.problems:
             soundness = self._track_score(problem, values, shares, correlation)[1]
             if self.spec.frame != "polar":
@@ -173,7 +179,7 @@ class PlotLikelihood:
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The logarithm of the likelihood of complete plots: their numbers are not independent in every frame."""
-        return {"plot": self._score(values, np.zeros(3))}
+        return {"plot": self._score(values, np.zeros(4))}
 
 
 class _TrackProblem(NamedTuple):

@@ -120,7 +120,7 @@ def twin(columns, values, shares, bias):
             if (k == 0 and m == 0) or np.isnan(z[k, m]):
                 continue
             h, made = np.eye(3)[m], []
-            for weight, width in zip(*error_laws((*shares, 0), spans[m], sigma[m] ** 2), strict=True):
+            for weight, width in zip(*error_laws((*shares, 0, 3.0), spans[m], sigma[m] ** 2), strict=True):
                 S = h @ P @ h + (width * sigma[m]) ** 2
                 K = P @ h / S
                 density = weight * norm(x @ h, S**0.5).pdf(z[k, m])

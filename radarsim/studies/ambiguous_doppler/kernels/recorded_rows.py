@@ -16,7 +16,7 @@ from radarsim.kernels.kalman_algebra import (
     take_rate,
     take_value,
 )
-from radarsim.kernels.likelihood import FAR, LAW_COUNT, NEAR, NEAR_WIDTH, fill_laws
+from radarsim.kernels.likelihood import FAR, LAW_COUNT, NEAR, WIDTH, fill_laws
 
 FARTHEST = 9.0  # standard deviations of the velocity's innovation within which folds are tried
 MAX_SEQUENCES = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
@@ -133,7 +133,7 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, share
             weight[i, j] = w[i] - e[i, j] * e[i, j] / (2.0 * S)
     log_norm, factor, soundness, spread = 0.5 * np.log(2.0 * np.pi * S), 1.0, 1.0, 0.0
     if shares[NEAR] + shares[FAR] > 0.0:
-        T = S + (NEAR_WIDTH * NEAR_WIDTH - 1.0) * R
+        T = S + (shares[WIDTH] * shares[WIDTH] - 1.0) * R
         width = D if max_fold >= 0 else max(span, math.sqrt(T))
         far, near, factor, sound, square = shares[FAR] * math.exp(log_norm) / (width * folds), 0.0, 0.0, 0.0, 0.0
         best, total = w.max(), 0.0
