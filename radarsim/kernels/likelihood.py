@@ -16,7 +16,7 @@ import numpy as np
 
 from radarsim.kernels.compiler import kernel
 
-NEAR_WIDTH, FAR_WIDTH = 3.0, 10.0  # of an outlier, in σ of a number: the usual one of near ones, the least of far ones
+FAR_WIDTH = 10.0  # the least of far outliers, in σ of a number
 FAR_COUNT = 6  # widths of far outliers
 LAW_COUNT = 2 + FAR_COUNT  # of errors: the stated one, that of near outliers, those of far ones
 HARD_FACTOR = 100.0  # on the process noise in a hard manoeuvre
@@ -30,9 +30,9 @@ def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, shares, span,
     x (d,) and P (d, d) are what is known at the first row, and are overwritten; F, Q (n, d, d): transition to each row
     and what the manoeuvre of unit variance adds; H (n, m, d), z, variance (n, m): the numbers, where `present`;
     manoeuvre: its variance; shares (4,): of near and far outliers among the numbers, of hard manoeuvres among the
-    intervals, and the width of near outliers in σ; span (m,): of the data; white: 1, or 0 where the errors are states. Out: log_densities (n, m), the
-    logarithm of each number's density given those before it, zero where it is missing; soundness (n, m): the
-    probability that it is no outlier."""
+    intervals, and the width of near outliers in σ; span (m,): of the data; white: 1, or 0 where the errors are states.
+    Out: log_densities (n, m), the logarithm of each number's density given those before it, zero where it is missing;
+    soundness (n, m): the probability that it is no outlier."""
     product, p, laws = np.zeros_like(P), np.zeros_like(x), np.empty((2, LAW_COUNT))
     hard_x, hard_P, hard_score, hard_soundness = x.copy(), P.copy(), log_densities[0].copy(), soundness[0].copy()
     for k in range(z.shape[0]):

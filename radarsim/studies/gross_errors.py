@@ -68,8 +68,8 @@ def soundness_by_column(
     cleaned_tracks: Sequence[Mapping[str, np.ndarray]],
     judged: Sequence[tuple[int, np.ndarray, np.ndarray]],
 ) -> list[dict[str, np.ndarray]]:
-    """The times t_s of tracks, and the probability of each number that it is no outlier, by column; not-a-number where it
-    is missing; (n,) each.
+    """The times t_s of tracks, and the probability of each number that it is no outlier, by column; not-a-number where
+    it is missing; (n,) each.
 
     cleaned_tracks: the same `without_gross_starts`. judged: the number of a track, rows of it (k,), and their
     probabilities (k, m)."""

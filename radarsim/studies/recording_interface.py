@@ -97,9 +97,9 @@ class Likelihood(Protocol):
         """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
 
         outliers: their share among the numbers, of which the part `near` has `near_width` times its σ and the rest any
-        size (`radarsim.kernels.likelihood`); bias: a constant error of a number that can show one, in its σ; correlation: of
-        the errors of neighbouring plots, at the recording's usual interval; manoeuvres: the share of intervals in which
-        the target manoeuvres far harder than in the others."""
+        size (`radarsim.kernels.likelihood`); bias: a constant error of a number that can show one, in its σ;
+        correlation: of the errors of neighbouring plots, at the recording's usual interval; manoeuvres: the share of
+        intervals in which the target manoeuvres far harder than in the others."""
 
     def soundness(
         self,
@@ -109,7 +109,7 @@ class Likelihood(Protocol):
         near_width: float = 3.0,
         correlation: float = 0.0,
     ) -> "Sequence[Mapping[str, np.ndarray]]":
-        """The times t_s of each track, and the probability of each number that it is no outlier, by column; (n,) each."""
+        """The times t_s of each track, and the probability of each number that it is no outlier, by column; (n,)."""
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
         """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
@@ -124,7 +124,8 @@ def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:
 
 
 def outlier_shares(outliers: float, near: float, near_width: float, manoeuvres: float = 0.0) -> "np.ndarray":
-    """The shares of near and far outliers and of hard manoeuvres, and the width of near outliers (4,), as `radarsim.kernels.likelihood` takes them."""
+    """The shares of near and far outliers and of hard manoeuvres, and the width of near outliers (4,), as
+    `radarsim.kernels.likelihood` takes them."""
     import numpy as np
 
     return np.array([outliers * near, outliers * (1 - near), manoeuvres, near_width])

@@ -200,7 +200,7 @@ def test_all_plots_as_outliers_are_no_fit():
     for share in (0.05, 0.95):
         mirrored = search.best.copy()
         mirrored[:2] += np.log(1 / 3)
-        mirrored[3] = np.log(share / (1 - share))
+        mirrored[[3, 5]] = np.log(share / (1 - share)), np.log(3)
         at, top = search._climb(mirrored, None, newton_steps.TOLERANCE)
         assert search.outliers(at)[OUTLIERS] <= 0.5
         assert top <= search.top + newton_steps.TOLERANCE
@@ -241,11 +241,13 @@ def test_an_end_is_found_where_outliers_have_to_rise_from_none():
 
     def profile(variance):
         def cost(at):
-            near, far = np.minimum(np.exp(at[2:]), profile_search.MAX_OUTLIER_SHARES)
-            return -one(np.array([*np.exp(at[:2]), variance]), near + far, near=near / (near + far))
+            near, far = np.minimum(np.exp(at[2:4]), profile_search.MAX_OUTLIER_SHARES)
+            width = np.exp(np.clip(at[4], np.log(2.5), np.log(100)))
+            values = np.array([*np.exp(at[:2]), variance])
+            return -one(values, near + far, near=near / (near + far), near_width=width)
 
-        shares = ((1e-7, 1e-7), (0.05, 1e-7), (1e-7, 0.05), (0.05, 0.05))
-        starts = [[*np.log(best[:2]), *np.log(pair)] for pair in shares]
+        shares = ((1e-7, 1e-7, 5), (0.05, 1e-7, 3), (0.05, 1e-7, 10), (1e-7, 0.05, 5))
+        starts = [[*np.log(best[:2]), *np.log(shape)] for shape in shares]
         options = {"xatol": 1e-4, "fatol": 1e-6}
         return -min(minimize(cost, start, method="Nelder-Mead", options=options).fun for start in starts)
 
@@ -278,17 +280,17 @@ def test_outliers_do_not_break_the_robust_fit():
 
 
 @pytest.mark.parametrize("where", [0, 1, 30, 59])
-@pytest.mark.parametrize("size_m", [600.0, 60e3, 6e6])
-def test_one_plot_that_is_wrong_by_any_size_leaves_the_robust_fit_as_it_was(size_m, where):
-    """Its row is named, unless it is taken for an error of the start; σ of range is that without it, to a third of the
-    interval."""
-    columns = recording(np.random.default_rng(1))
-    sound = fit.fit_keys(likelihood(columns), (OUTLIERS,)).keys[0]
-    columns["range_m"][where] += size_m * STATED["radar.sigma_range_m"] / 60
-    found = fit.fit_keys(likelihood(columns), (OUTLIERS,))
-    assert abs(np.log(found.keys[0].value / sound.value)) < np.log(sound.hi / sound.lo) / 3
+@pytest.mark.parametrize("size_sigma", [10, 1e3, 1e5])
+def test_one_plot_that_is_wrong_by_any_size_leaves_the_robust_fit_as_it_was(size_sigma, where):
+    """Of 240 in four tracks: σ of range changes by less than a quarter of its interval, and the row is named."""
+    tracks = [recording(np.random.default_rng(seed)) for seed in range(4)]
+    sound = fit.fit_keys(likelihood(*tracks), (OUTLIERS,)).keys[0]
+    tracks[2]["range_m"][where] += size_sigma * STATED["radar.sigma_range_m"]
+    found = fit.fit_keys(likelihood(*tracks), (OUTLIERS,))
+    assert abs(np.log(found.keys[0].value / sound.value)) < np.log(sound.hi / sound.lo) / 4
     assert found.keys[0].lo < STATED["radar.sigma_range_m"] < found.keys[0].hi
-    assert [(row.t_s, row.column) for row in found.outlier_rows] == [(T * where, "range_m")]
+    assert (2, T * where, "range_m") in found.outlier_rows
+    assert len(found.outlier_rows) <= 4
 
 
 def test_advice_names_a_single_wrong_plot_before_a_sigma(tmp_path):

@@ -151,8 +151,8 @@ class CorrelatedLikelihood:
 
 
 class FileLikelihoods(NamedTuple):
-    """The likelihood of a filter over all tracks of a file, and over a sample of its rows; the tracks' names, None where
-    they have none; and how many further plots of a track in a scan are left out."""
+    """The likelihood of a filter over all tracks of a file, and over a sample of its rows; the tracks' names, None
+    where they have none; and how many further plots of a track in a scan are left out."""
 
     complete: Likelihood
     rough: Likelihood | None
@@ -163,8 +163,8 @@ class FileLikelihoods(NamedTuple):
 def file_likelihoods(
     experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None
 ) -> FileLikelihoods:
-    """The likelihoods of a filter of an experiment's one case over a file; without a name, of the filter that takes most
-    columns of a plot. Raises ConfigError."""
+    """The likelihoods of a filter of an experiment's one case over a file; without a name, of the filter that takes
+    most columns of a plot. Raises ConfigError."""
     case = single_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
     refuse_inherited_part(case, "likelihood")
     interface = recording_interface(case)

@@ -88,8 +88,8 @@ class LikelihoodSearch:
                     (self.highest, MAX_OUTLIER_SHARES),
                 )
             )
-            widths = np.log([NEAR_WIDTH_STARTS[0]]), [NO_ZERO], np.log([MAX_NEAR_WIDTH])
-            start, self.lowest, self.highest = map(np.append, (start, self.lowest, self.highest), widths)
+            start = np.append(start, math.log(NEAR_WIDTH_STARTS[0]))
+            self.lowest, self.highest = np.append(self.lowest, NO_ZERO), np.append(self.highest, np.log(MAX_NEAR_WIDTH))
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
         self.curvature_model = Curvature(self._log_likelihood)
         self.best, self.top = self._climb(start if start_point is None else start_point, None, ROUGH_TOLERANCE)
@@ -133,9 +133,8 @@ class LikelihoodSearch:
         self.curvature_model = Curvature(self._log_likelihood)
         self.curvature_model.step(self.best, self.top, np.arange(self.best.size))
         self.curvature = self.curvature_model.H
-        self.raised_keys = {
-            i: self._raised_log(i) for i in np.flatnonzero(self.lowest > NO_ZERO) if self._may_be_zero(i)
-        }
+        may_be_zero = [i for i in range(self.best.size) if self.lowest[i] > NO_ZERO and self._may_be_zero(i)]
+        self.raised_keys = {i: self._raised_log(i) for i in may_be_zero}
         self.ends_started_at = self.evaluations
 
     def _raised_point(self) -> np.ndarray | None:
@@ -164,8 +163,8 @@ class LikelihoodSearch:
         return np.concatenate([keys, shares, [width]])
 
     def outliers(self, point: np.ndarray) -> dict[str, float]:
-        """The share of outliers, the part of them that is near and the width of these, as a likelihood takes them; empty if not allowed
-        for."""
+        """The share of outliers, the part of them that is near and the width of these, as a likelihood takes them;
+        empty if not allowed for."""
         if not self.robust:
             return {}
         near, far, width = self.to_values(point)[-3:].tolist()

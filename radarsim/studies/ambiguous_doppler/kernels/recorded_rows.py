@@ -119,8 +119,9 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, share
     density of v over all hypotheses and folds, and the probability that v is no outlier. P is updated in place.
 
     max_fold: folds to either side of the nearest that are tried; -1: none, v is not folded. merge: hypotheses are
-    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. shares: of near outliers, and of
-    far ones, which are uniform over the span D of folded velocities, or `span` of the data; merged by moments."""
+    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. shares: of
+    near outliers, and of far ones, which are uniform over the span D of folded velocities, or `span` of the data;
+    merged by moments."""
     updated_P, gain, S = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), R, 1.0)
     n, folds = w.size, 2 * max(max_fold, 0) + 1
     e, weight = np.empty((n, folds)), np.empty((n, folds))
