@@ -230,8 +230,8 @@ def test_an_end_is_found_where_another_key_has_to_rise_from_zero():
 
 
 def test_an_end_is_found_where_outliers_have_to_rise_from_none():
-    """At the top there are none to speak of. Where the manoeuvre variance is held too low, some make the plots likelier: the
-    profile by simplexes from several shares."""
+    """At the top there are none to speak of. Where the manoeuvre variance is held too low, some make the plots
+    likelier: the profile by simplexes from several shares."""
     from scipy.optimize import minimize
 
     one = likelihood(recording(np.random.default_rng(3)))

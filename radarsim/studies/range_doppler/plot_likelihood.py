@@ -55,13 +55,13 @@ class PlotLikelihood:
         self.problems = [problem for problem in problems if problem is not None]
 
     def _problem(self, track: int, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
-        """A track from its first range on, its rows that measure something; None where it has no range."""
+        """A track from its first range on; None where it has none."""
         z = np.stack([columns[name] for name in self.columns], axis=1)
         present = np.isfinite(z)
         if not present[:, 0].any():
             return None
         first = int(present[:, 0].argmax())
-        rows = first + np.flatnonzero(present[first:].any(axis=1))
+        rows = np.arange(first, len(z))
         t, z, present = columns["t_s"][rows], z[rows], present[rows]
         settled = int(np.searchsorted(np.cumsum(present[:, 0]), START_RANGES, side="right"))
         present[0, 0] = False  # it starts the track
@@ -139,7 +139,7 @@ class PlotLikelihood:
 
 
 class _Problem(NamedTuple):
-    """A track for the kernel: its number, and the rows of it that measure something, from the first range on."""
+    """A track for the kernel: its number, and its rows from the first range on."""
 
     track: int
     rows: np.ndarray  #: (n,)

@@ -66,7 +66,7 @@ class PlotLikelihood:
         self.problems = [problem for problem in problems if problem is not None]
 
     def _problem(self, track: int, columns: Mapping[str, np.ndarray], scale: np.ndarray) -> "_TrackProblem | None":
-        """A track from its first complete plot on, its rows that measure something; None if it has none."""
+        """A track from its first complete plot on; None if it has none."""
         z, C, size = np.stack([columns[name] for name in self.columns]), self.coordinates, self.size
         is_whole = np.isfinite(z).all(axis=0)
         if not is_whole.any():
@@ -75,7 +75,7 @@ class PlotLikelihood:
         if self.spec.frame != "polar":
             is_used[:, :2] = is_used[:, :2].all(axis=1, keepdims=True)
         first = int(is_whole.argmax())
-        rows = first + np.flatnonzero(is_used[first:].any(axis=1))
+        rows = np.arange(first, len(is_whole))
         t, z, is_used, is_whole = columns["t_s"][rows], z[:, rows], is_used[rows], is_whole[rows]
         steps = np.diff(t, prepend=t[0])
         eye = np.eye(C)
@@ -186,7 +186,7 @@ class _TrackProblem(NamedTuple):
     """A recorded track as the kernel needs it, from its first complete plot on."""
 
     track: int  #: its number
-    rows: np.ndarray  #: (n,) of the track, those that measure something
+    rows: np.ndarray  #: (n,) of the track
     F: np.ndarray  #: (n, d, d) transitions
     Q: np.ndarray  #: (n, d, d) process noise of unit variance
     z: np.ndarray  #: (C, n) values as measured
