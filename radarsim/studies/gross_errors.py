@@ -14,18 +14,20 @@ from radarsim.kernels.likelihood import FAR, FAR_WIDTH, NEAR, WIDTH
 START_PLOTS = 15  # from which the parabola is found
 MIN_START_PLOTS = 8
 TRIPLE_STRIDE = 4  # of all triples of them every so manieth: enough to have some without an error
+LEAST_JUMP = 0.4  # of that distance by which a gross error leaves its neighbours too
+CLEAR_SIGMAS = 20.0  # from which it is named
 GROSS_SIGMAS = 6.0  # of the scale that is found, of a gross error: of sound tracks in 3 of 1000
 
 
 def without_gross_starts(
-    columns: Mapping[str, np.ndarray], measured: Sequence[str], start_count: int
+    columns: Mapping[str, np.ndarray], measured: Sequence[str], start_count: int, limit: float = GROSS_SIGMAS
 ) -> dict[str, np.ndarray]:
     """Columns (n,) of a track, of those measured with not-a-number for gross errors among the first plots, until
-    `start_count` sound ones have come."""
+    `start_count` sound ones have come. limit: of a sound number's distance from its neighbours, in their scale."""
     cleaned = dict(columns)
     for name in measured:
         finite = np.flatnonzero(np.isfinite(columns[name]))[:START_PLOTS]
-        gross = gross_errors(columns["t_s"][finite], columns[name][finite])
+        gross = gross_errors(columns["t_s"][finite], columns[name][finite], limit)
         gross &= np.cumsum(~gross) < start_count
         if gross.any():
             cleaned[name] = columns[name].copy()
@@ -33,7 +35,7 @@ def without_gross_starts(
     return cleaned
 
 
-def gross_errors(t: np.ndarray, z: np.ndarray) -> np.ndarray:
+def gross_errors(t: np.ndarray, z: np.ndarray, limit: float) -> np.ndarray:
     """Which numbers z (n,) at times t are gross errors (n,): none where too few tell."""
     count = len(z)
     if count < MIN_START_PLOTS:
@@ -47,7 +49,20 @@ def gross_errors(t: np.ndarray, z: np.ndarray) -> np.ndarray:
     best = int(majority.argmin())
     # The median of a normal law, and the correction for few plots, as Rousseeuw and Leroy (1987) have them.
     scale = 1.4826 * (1 + 5 / (count - 3)) * float(majority[best])
-    return residuals[best] > GROSS_SIGMAS * scale if scale > 0 else np.zeros(count, dtype=bool)
+    if scale == 0:
+        return np.zeros(count, dtype=bool)
+    gross = residuals[best] > limit * scale
+    for i in np.flatnonzero(gross).tolist():
+        gross[i] = _neighbour_residual(times, z, i) > LEAST_JUMP * residuals[best][i]
+    return np.asarray(gross)
+
+
+def _neighbour_residual(t: np.ndarray, z: np.ndarray, i: int) -> float:
+    """The distance of number i from the parabola through the three numbers after it, of the last ones before it: small
+    where a target manoeuvres, which moves on smoothly."""
+    others = np.arange(i + 1, i + 4) if i + 3 < len(z) else np.arange(i - 3, i)
+    weights = [np.prod([(t[i] - t[k]) / (t[j] - t[k]) for k in others if k != j]) for j in others]
+    return float(abs(z[i] - np.array(weights) @ z[others]))
 
 
 def data_span(tracks: Sequence[Mapping[str, np.ndarray]], measured: Sequence[str]) -> np.ndarray:
@@ -80,5 +95,8 @@ def soundness_by_column(
             column[rows] = np.where(np.isfinite(column[rows]), soundness[:, i], np.nan)
     for track, cleaned, probabilities in zip(tracks, cleaned_tracks, result, strict=True):
         for name in measured:
-            probabilities[name][np.isfinite(track[name]) & ~np.isfinite(cleaned[name])] = 0.0
+            if cleaned[name] is not track[name]:
+                clear = without_gross_starts(track, (name,), START_PLOTS, CLEAR_SIGMAS)[name]
+                is_gross = np.isfinite(track[name]) & ~np.isfinite(cleaned[name])
+                probabilities[name][is_gross & ~np.isfinite(clear)] = 0.0
     return [{"t_s": track["t_s"], **probabilities} for track, probabilities in zip(tracks, result, strict=True)]

@@ -80,7 +80,8 @@ class UsedRows:
 class Advice:
     """Advice from the likelihood of a config's filters over recorded plots: the best filter; the errors in the numbers
     of the one that takes most columns; the rows used. folding, doppler_scale: where the velocities are folded, or a
-    multiple of the change of the range; impossible_speed: that no target has, m/s; nothing else is then examined."""
+    multiple of the change of the range; impossible_speed: that no target has, m/s; nothing else is then examined.
+    start_errors: plots too far off to start a track."""
 
     comparison: FilterComparison
     findings: list[Finding]
@@ -88,6 +89,7 @@ class Advice:
     folding: Folding | None = None
     doppler_scale: DopplerScale | None = None
     impossible_speed: float | None = None
+    start_errors: tuple[OutlierRow, ...] = ()
 
 
 def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice | None:
@@ -116,7 +118,10 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
         return Advice(comparison, [], used_rows, folding, None if folding else scale)
     likelihood = likelihoods[comparison.most_columns]
     findings = [_with_turn_error(case, likelihood, finding) for finding in find_errors(likelihood, progress)]
-    return Advice(comparison, findings, used_rows)
+    start_errors = find_outlier_rows(likelihood, np.asarray(likelihood.stated), 0.0)
+    named_rows = {row for finding in findings for row in finding.rows}
+    start_errors = tuple(row for row in start_errors if row not in named_rows)
+    return Advice(comparison, findings, used_rows, start_errors=start_errors)
 
 
 def _with_turn_error(case: Case, likelihood: Likelihood, finding: Finding) -> Finding:

@@ -168,6 +168,9 @@ def advice_statements(followed: TrackingResult, advice: Advice) -> list[Statemen
             filter=comparison.most_columns,
         )
         statements.append(Statement("advice", text))
+    if advice.start_errors:
+        text = tr("outliers, left out at the start of a track: {rows}", rows=outlier_rows_text(advice.start_errors))
+        statements.append(Statement("advice", text))
     for finding in advice.findings:
         statements.append(Statement("advice", finding_text(finding, comparison.most_columns)))
     return [*statements, *_used_rows_statement(followed, advice.used_rows)]
