@@ -138,6 +138,39 @@ def test_velocities_of_the_other_sign_are_not_taken_for_folded(flown):
     assert detect_folding([flown | {"velocity_mps": -flown["velocity_mps"]}]) is None
 
 
+BOAT = {"D": 19.2, "scans": 61, "period_s": 2.5}  # of an X-band radar at 1.2 kHz
+
+
+def boat(spans, seed, turned=False):
+    """Plots of a boat that comes at so many spans of speed, 15 % missed; turned: of the other sign and not folded."""
+    rng, D = np.random.default_rng(seed), BOAT["D"]
+    t = BOAT["period_s"] * np.flatnonzero(rng.random(BOAT["scans"]) < 0.85)
+    v = -spans * D + rng.normal(0, 0.8, t.size)
+    r = 8000 - spans * D * t + rng.normal(0, 15, t.size)
+    return {"t_s": t, "range_m": r, "velocity_mps": -v if turned else v - D * np.round(v / D)}
+
+
+@pytest.mark.parametrize("spans", [0.55, 0.6, 0.7, 0.75, 0.9, 1.0, 1.5, 2.0, 5.0])
+def test_a_fold_at_any_speed_is_noticed_and_taken_for_no_turned_sign(spans):
+    """In 10 of 10, with the span known; without it the sign explains what is folded by nearly twice the speed."""
+    recordings = [boat(spans, seed) for seed in range(10)]
+    assert all(detect_folding([columns], BOAT["D"]) for columns in recordings)
+    if spans >= 0.6:
+        assert all(detect_folding([columns]) for columns in recordings)
+
+
+@pytest.mark.parametrize("spans", [0.1, 0.3, 0.45])
+def test_a_turned_sign_is_no_fold(spans):
+    for span in (BOAT["D"], None):
+        assert not any(detect_folding([boat(spans, seed, turned=True)], span) for seed in range(10))
+
+
+@pytest.mark.parametrize("size_m", [600.0, 60e3, 6e6])
+def test_wrong_ranges_are_no_folds(flown, size_m):
+    wild = np.random.default_rng(1).random(len(flown["t_s"])) < 0.1
+    assert detect_folding([flown | {"range_m": flown["range_m"] + size_m * wild}]) is None
+
+
 def noticed(config, realisations, span, fold):
     """Of how many realisations the velocities are said to be folded."""
     seen = (measured(config, i) for i in range(realisations))
