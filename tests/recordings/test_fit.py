@@ -251,7 +251,7 @@ def test_an_end_is_found_where_outliers_have_to_rise_from_none():
         options = {"xatol": 1e-4, "fatol": 1e-6}
         return -min(minimize(cost, start, method="Nelder-Mead", options=options).fun for start in starts)
 
-    limit = one(best) - profile_search.HALF_CHI2_95
+    limit = found.gain + one(one.stated) - profile_search.HALF_CHI2_95
     assert profile(0.997 * lo) < limit < profile(1.003 * lo)
 
 

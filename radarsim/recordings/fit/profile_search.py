@@ -41,7 +41,6 @@ MAX_OUTLIER_SHARES = np.array([0.2, 0.4])
 FIRST_OUTLIER_SHARE = 0.03  # where the search of either begins
 MIN_NEAR_WIDTH, MAX_NEAR_WIDTH = 2.5, 100.0  # of near outliers, in σ
 NEAR_WIDTH_STARTS = (3.0, 10.0)
-CLOSE_START = 3.0  # below the maximum so far in log-likelihood, up to which a start with outliers is followed
 NO_ZERO = -1e3  # below the logarithm of a number that has no zero
 NEAR_MAXIMUM_EVALUATIONS = 30  # as MAXIMUM_EVALUATIONS, from near the maximum
 # factor on the value that counts as zero where the likelihood jumps by more there
@@ -288,23 +287,7 @@ class LikelihoodSearch:
                     if self._log_likelihood(start) > value:
                         point, value = self._climb(start, i, TOLERANCE)
                         break
-        for start in self._outlier_starts(point) if self.robust else ():
-            if self._log_likelihood(start) > value - CLOSE_START:
-                trial, trial_value = self._climb(start, i, TOLERANCE)
-                if trial_value > value:
-                    point, value = trial, trial_value
         return value, point
-
-    def _outlier_starts(self, point: np.ndarray) -> list[np.ndarray]:
-        """A point with some near and far outliers, where it has hardly any."""
-        logit, starts = math.log(FIRST_OUTLIER_SHARE / (1 - FIRST_OUTLIER_SHARE)), []
-        for index, width in ((-3, NEAR_WIDTH_STARTS[0]), (-3, NEAR_WIDTH_STARTS[1]), (-2, None)):
-            if point[index] < logit - 2.0:
-                start = point.copy()
-                start[index] = logit
-                start[-1] = math.log(width) if width else start[-1]
-                starts.append(start)
-        return starts
 
     def refine_zero(self) -> bool:
         """Lower the values that count as zero where the likelihood leaps there; return whether any was lowered."""
