@@ -71,6 +71,8 @@ def config_path(stem: str) -> Path | None:
 
 def shipped_stem(experiment: Experiment) -> str:
     """The stem of the shipped config behind an experiment, whatever was overridden; empty for a user's config."""
+    if experiment.like and shipped_file(experiment.like):
+        return experiment.like
     file = shipped_file(experiment.stem)
     is_shipped = file and experiment.path and Path(experiment.path).resolve() == file.resolve()
     return experiment.stem if is_shipped else ""

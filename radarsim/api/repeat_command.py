@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from radarsim.config import find_files
+from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Experiment
+from radarsim.report import provenance
 
 RESULTS = "results"  # the command's default directory
 SHORT_OPTIONS = {"realisations": "-n", "seed": "--seed"}
@@ -21,8 +23,9 @@ def repeat_command(
 
     experiment: as config and overrides give it; done_counts: the realisations of each case in the tables; precision:
     the one that ended the cases, if any."""
-    if experiment.path is None:
-        return "none: the config was given in Python, and is printed below"
+    is_own_path = not provenance.is_portable(experiment.path or "") and not _is_shipped(experiment)
+    if experiment.path is None or is_own_path:
+        return f"radarsim run {CONFIG_FILE}"  # of the result, which stands beside it
     requested_counts = {case.name: case.realisations for case in experiment.cases}
     counts = {done_counts.get(name, 0) for name in requested_counts}
     if all(done_counts.get(name) == count for name, count in requested_counts.items()):
@@ -43,10 +46,7 @@ def command(
     verb: str = "run",
 ) -> str:
     """The command that runs an experiment or reads its result; a shipped config by its stem."""
-    # In a checkout the shipped folder is a link to configs/.
-    folders = {(folder / "configs").resolve() for folder in (find_files.SHIPPED, *find_files.further_folders())}
-    shipped = not experiment.path or Path(experiment.path).resolve().parent in folders
-    words = ["radarsim", verb, experiment.stem if shipped else quote_path(experiment.path or "")]
+    words = ["radarsim", verb, experiment.stem if _is_shipped(experiment) else quote_path(experiment.path or "")]
     for override in overrides:
         key, _, value = override.partition("=")
         words += [SHORT_OPTIONS[key], value] if key in SHORT_OPTIONS else ["--set", override]
@@ -54,6 +54,13 @@ def command(
         percent, quantity_name = precision
         words += ["--precision", f"{percent:.17g}", *(["--of", quantity_name] if quantity_name != "sigma" else [])]
     return shlex.join(words) + out_option(out)
+
+
+def _is_shipped(experiment: Experiment) -> bool:
+    """Whether the stem of an experiment leads to its config: one that is shipped, or given in Python."""
+    # In a checkout the shipped folder is a link to configs/.
+    folders = {(folder / "configs").resolve() for folder in (find_files.SHIPPED, *find_files.further_folders())}
+    return not experiment.path or Path(experiment.path).resolve().parent in folders
 
 
 def out_option(out: str | os.PathLike) -> str:

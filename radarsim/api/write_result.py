@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api import configs
+from radarsim.api.result_config import config_files
 from radarsim.api.result_content import (
     captions,
     case_figures,
@@ -15,6 +16,7 @@ from radarsim.api.result_content import (
     question_text,
     undeclared_figures,
 )
+from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Experiment
 from radarsim.engine.machine import machine_facts
 from radarsim.engine.results import CaseResult
@@ -93,6 +95,8 @@ def write_files(
     if draw:
         contents["figures/captions.md"] = captions(figures_by_name).encode()
     draw_end = time.perf_counter()
+    kept_config = config_files(experiment, results, taken=(*contents, *provenance.RECORD_FILES))
+    contents |= kept_config
     tables_by_name = {name: with_note_texts(table) for name, table in tables_by_name.items()}
     run = {
         **run,
@@ -110,6 +114,7 @@ def write_files(
         cost=case_study.cost(tables.without_user_filters(tables_by_name, results), run),
         agreement=exact_check.agreement_table(tables_by_name["curves"]) if case_study.exact_errors else None,
         drawn_from=case_study.drawn_from(),
+        config_text=kept_config.get(CONFIG_FILE, b"").decode(),
     )
     contents["report.html"] = report.encode()
     contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))

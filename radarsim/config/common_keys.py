@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any, Protocol
 
-from pydantic import ConfigDict, Field, Strict
+from pydantic import ConfigDict, Field, Strict, StringConstraints
 
 from radarsim.config.key_types import Anything, Flag, Name, Stem, WholeNumber, key
 from radarsim.config.model import Model
@@ -11,26 +11,35 @@ from radarsim.config.study_keys import Member, StudyKeys
 
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1
+Realisations = Annotated[int, WholeNumber(1, LARGEST_REALISATIONS)]
 
 
 class CommonKeys(Model):
     """Keys that every config may have, whatever its study."""
 
+    name: Name | None = key("name", "name of the experiment and of its results; default: that of the file", None)
+    like: Stem | None = key("like", "shipped config of which this is a version; results say so", None)
     study: Stem | None = key("study", "the study; it determines the other keys", None)
-    include: Annotated[tuple[Stem, ...], Field(min_length=1)] | None = key(
-        "included configs", "stems of other configs to run together; study keys given beside it override theirs", None
+    include: Annotated[tuple[Stem | dict[str, Anything], ...], Field(min_length=1)] | None = key(
+        "included configs",
+        "stems of other configs to run together, or whole configs with a name; study keys given beside it override "
+        "theirs",
+        None,
     )
     sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = key(
         "swept keys", "a case for each combination of values: key or dotted path, and its list of values", None
     )
-    realisations: Annotated[int, WholeNumber(1, LARGEST_REALISATIONS)] | None = key(
-        "realisations", "how often the experiment is repeated", None
+    realisations: Realisations | dict[Name, Realisations] | None = key(
+        "realisations", "how often the experiment is repeated; or for each case, by its name", None
     )
     seed: Annotated[int, WholeNumber(0, LARGEST_SEED)] | None = key("seed", "seed of the noise; default 1", None)
     figures: tuple[Name, ...] | dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = key(
         "figures that are drawn",
         "names or patterns with * and ?, in the report's order; or a mapping to the cases of each; default and []: all",
         (),
+    )
+    scenarios: dict[Stem, dict[str, Anything]] | None = key(
+        "scenarios", "scenarios by the stems under which this config names them, in place of files", None
     )
 
     def cases_of_figures(self) -> dict[str, tuple[str, ...]]:
@@ -45,6 +54,9 @@ class UserFilterKeys(Member):
 
     python: Annotated[str, Strict()] = key(
         "own code", "FILE.py:NAME, of a file beside the config, or MODULE:NAME: a class or a function of yours"
+    )
+    source: Annotated[str, Strict(), StringConstraints(pattern="^[0-9a-f]{8,64}$")] | None = key(
+        "source", "hash of the code, as a result records it: other code is refused", None
     )
     one_by_one: Flag = key("one by one", "whether the function takes the plots of one realisation at a time", False)
     identity: Annotated[str, Strict()] | Annotated[int, Strict()] | Annotated[float, Strict()] | None = key(

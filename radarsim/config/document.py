@@ -47,6 +47,14 @@ class Document:
         """The document without these top-level keys."""
         return self.with_data((), {key: value for key, value in self.data.items() if key not in keys})
 
+    def below(self, path: KeyPath) -> "Document":
+        """The value at a path as a document of its own; errors in it are reported with the keys of this one."""
+
+        def inner_origins(origins: Mapping[KeyPath, Origin]) -> dict[KeyPath, Origin]:
+            return {p[len(path) :]: origin for p, origin in origins.items() if p[: len(path)] == path}
+
+        return replace(self, data=self.get(path), values=inner_origins(self.values), keys=inner_origins(self.keys))
+
     def with_data(self, path: KeyPath, value: object) -> "Document":
         """The document with other data at a path; all values keep their origins."""
         return replace(self, data=_with_value(self.data, path, value))

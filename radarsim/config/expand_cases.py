@@ -2,18 +2,34 @@
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path as FilePath
 
 from radarsim.config.common_keys import COMMON_KEYS, CommonKeys, Studies
+from radarsim.config.complete_config import Content, folder_of, rename_configs, sweep_with_data_paths, with_data_paths
 from radarsim.config.document import Document
 from radarsim.config.error_list import ABSENT, ErrorList, Origin
 from radarsim.config.error_text import KeyPath, one_line
 from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern, swept_value_text
-from radarsim.config.find_files import available_stems, config_file, did_you_mean, is_stem, normalised_name
-from radarsim.config.inline_files import ReadDocument, inline_scenarios, resolve_data_files
+from radarsim.config.find_files import (
+    RESERVED,
+    available_stems,
+    config_file,
+    did_you_mean,
+    is_reserved,
+    is_stem,
+    normalised_name,
+)
+from radarsim.config.inline_files import (
+    ConfigFiles,
+    ReadDocument,
+    data_files,
+    inline_scenarios,
+    named_scenarios,
+    resolve_data_files,
+)
 from radarsim.config.place_settings import (
     NoSuchKey,
     Setting,
@@ -42,8 +58,27 @@ class Draft:
     stem: str
     study: str
     swept_values: tuple[tuple[str, object], ...]
-    realisations: int | None
+    realisations: int | Mapping[str, int] | None
     seed: int | None
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """A config expanded: its common keys, its drafts, and its content written out in full."""
+
+    common: CommonKeys
+    drafts: list[Draft]
+    content: Content
+
+    def renamed(self, stem: str) -> "Expansion":
+        """The expansion of a config that changes what it includes, and is included itself: named after that config."""
+        has_several = len({draft.stem for draft in self.drafts}) > 1
+
+        def new_name(name: str) -> str:
+            return f"{stem}:{name}" if has_several else stem
+
+        drafts = [replace(draft, stem=new_name(draft.stem)) for draft in self.drafts]
+        return replace(self, drafts=drafts, content=rename_configs(self.content, new_name))
 
 
 OverlaidKeys = tuple[Document, ...]  # keys laid over an included config, those of the nearest config first
@@ -54,10 +89,12 @@ def changes_included(document: Document) -> bool:
     return "include" in document.data and not set(COMMON_KEYS).issuperset(document.data)
 
 
-def _rename_drafts(drafts: list[Draft], stem: str) -> list[Draft]:
-    """Rename the drafts of a config that changes what it includes, and is included itself, after that config."""
-    has_several = len({draft.stem for draft in drafts}) > 1
-    return [replace(draft, stem=f"{stem}:{draft.stem}" if has_several else stem) for draft in drafts]
+def config_name(document: Document) -> str:
+    """The name of a config: as it says, else that of its file."""
+    name = document.data.get("name")
+    if isinstance(name, str):
+        return normalised_name(name)
+    return normalised_name(document.file.stem) if document.file else "config"
 
 
 def no_such_config(name: str, studies: Studies, list_names: bool = False) -> str:
@@ -89,11 +126,12 @@ class Expander:
     ):
         cached: ReadDocument = cache(read)
         self.path = path
-        self.files_read, self.faults, self.studies = cached, faults, studies
+        self.files, self.faults, self.studies = ConfigFiles(cached), faults, studies
         settings = list(settings)
         self.common = [s for s in settings if s.key.split(".")[0] in COMMON_KEYS]
         self.settings = [s for s in settings if s.key.split(".")[0] not in COMMON_KEYS]
-        self.open_configs: dict[tuple[FilePath, ...], list[Draft]] = {}
+        self.open_configs: dict[tuple[FilePath, ...], Expansion] = {}
+        self.named_scenarios: dict[str, list[Content]] = {}  # by stem, those that cases name after all is in its place
 
     def experiment(self, document: Document) -> Experiment | None:
         """The experiment that a config describes; None if errors were added."""
@@ -106,43 +144,76 @@ class Expander:
                 overlays = (document.with_data((), {}).graft(("study",), setting.value, setting.origin),)
             else:
                 document = document.graft((top_key, *inner_key), setting.value, setting.origin)
-        common, drafts = self._expand(document, (), overlays)
+        self.files = replace(self.files, scenarios=_defined_scenarios(document))
+        expansion = self._expand(document, (), overlays)
+        common, drafts = expansion.common, expansion.drafts
         cases = [case for draft in drafts if (case := self._checked_case(draft))]
+        stem = config_name(document)
+        self._check_name(stem, document)
         self._refuse_equal_names(cases, document)
         self._refuse_mixture(drafts, document)
         self._check_figure_names(common, drafts, document)
         self._check_figures(common, cases, document)
         if self.faults:
             return None
-        stem = normalised_name(document.file.stem) if document.file else "config"
+        counts = common.realisations
         return Experiment(
             stem=stem,
             study=cases[0].study,
             path=str(document.file) if document.file else None,
             cases=tuple(cases),
-            realisations=common.realisations or max(case.realisations for case in cases),
+            realisations=counts if isinstance(counts, int) else max(case.realisations for case in cases),
             seed=cases[0].seed if common.seed is None else common.seed,
             figures=common.cases_of_figures(),
             changes_included=changes_included(document),
+            like=common.like or "",
+            content=self._complete_content(expansion.content, document),
         )
 
-    def _expand(
-        self, document: Document, chain: tuple[FilePath, ...], overlays: OverlaidKeys
-    ) -> tuple[CommonKeys, list[Draft]]:
-        """The common keys of a config, and its drafts under the overlays, of which the nearest comes first."""
+    def _check_name(self, stem: str, document: Document) -> None:
+        """Add an error for a name that no folder of results can have."""
+        if "name" in document.data and (not is_stem(stem) or is_reserved(stem)):
+            message = "must be of letters, digits and _ + = - . and not begin with a dot"
+            self.faults.add(document.origin(("name",)), ("name",), RESERVED if is_reserved(stem) else message, stem)
+
+    def _complete_content(self, content: Content, document: Document) -> Content | None:
+        """The content of the config with the scenarios that its sweeps name; None where a name means several."""
+        if any(scenario != scenarios[0] for scenarios in self.named_scenarios.values() for scenario in scenarios):
+            return None
+        scenarios = {stem: scenarios[0] for stem, scenarios in self.named_scenarios.items()}
+        further = {"figures": document.data.get("figures"), "scenarios": scenarios}
+        return content | {key: value for key, value in further.items() if value}
+
+    def _expand(self, document: Document, chain: tuple[FilePath, ...], overlays: OverlaidKeys) -> Expansion:
+        """A config expanded under the overlays, of which the nearest comes first."""
         owner = foreign_owner(document.file, self.path) if document.file and names_code(document.data) else None
         if owner is not None:
             message = f"names code and belongs to another user ({owner}): to run it, give its path in place of a name"
             self.faults.add(Origin(str(document.file)), (), message)
-            return CommonKeys(), []
+            return Expansion(CommonKeys(), [], {})
         common = self._common_keys(document.with_keys(COMMON_KEYS))
         if "include" in document.data:
-            study_drafts = self._included_drafts(document, common, chain, overlays)
+            study_drafts, content = self._included_drafts(document, common, chain, overlays)
         else:
-            study_drafts = self._own_draft(document, common, overlays)
+            study_drafts, content = self._own_draft(document, common, overlays)
         drafts = self._sweep_drafts(document, common, study_drafts, overlays)
         values = {key: getattr(common, key) for key in ("realisations", "seed") if getattr(common, key) is not None}
-        return common, [replace(draft, **values) for draft in drafts]
+        keys = [key for key in ("sweep", "realisations", "seed") if key in document.data]
+        content |= {key: document.data[key] for key in keys}
+        if common.sweep:
+            content["sweep"] = sweep_with_data_paths(document, self._data_files(drafts, document))
+        return Expansion(common, [replace(draft, **values) for draft in drafts], content)
+
+    def _data_files(self, drafts: list[Draft], document: Document) -> dict[tuple[str, str], FilePath]:
+        """The data files of drafts by folder and name as written, if a sweep may name some."""
+        values = [value for swept in document.data["sweep"].values() for value in swept]
+        if not any(isinstance(value, str | dict) for value in values):
+            return {}
+        return {
+            (folder_of(draft.document.origin(path)), str(draft.document.get(path))): file
+            for draft in drafts
+            for path, file in data_files(draft.document, self.studies.keys(draft.study))
+        }
 
     def _common_keys(self, document: Document) -> CommonKeys:
         """The common keys; without those that have errors, so that the rest of the config is checked as well."""
@@ -158,26 +229,27 @@ class Expander:
             return common.model_copy(update={"realisations": 1})  # its fault is noted; it must not be called missing
         return common
 
-    def _own_draft(self, document: Document, common: CommonKeys, overlays: OverlaidKeys) -> list[Draft]:
-        """The one draft of a config with a study of its own."""
+    def _own_draft(self, document: Document, common: CommonKeys, overlays: OverlaidKeys) -> tuple[list[Draft], Content]:
+        """The one draft of a config with a study of its own, and its content."""
         if common.study is None or not self.studies.is_study(common.study):
             if "study" not in document.data:
                 message = f"required key is missing: one of {', '.join(self.studies.study_names())}"
                 self.faults.add(document.origin(()), ("study",), message)
             elif common.study is not None:
                 self._add_unknown_study(document, common.study)
-            return []
+            return [], {}
         study_keys, study = document.without_keys(COMMON_KEYS), common.study
         for overlay in overlays:
             study_keys, study = self._carry_to_study(study_keys, study, overlay)
             study_keys = overlay_keys(
-                study_keys, self.studies.keys(study), overlay.without_keys(COMMON_KEYS), self.files_read, self.faults
+                study_keys, self.studies.keys(study), overlay.without_keys(COMMON_KEYS), self.files, self.faults
             )
         for setting in self.settings:
             study_keys = self._with_setting(study_keys, study, setting)
-        study_keys = inline_scenarios(study_keys, self.studies.keys(study), self.files_read, self.faults)
-        stem = normalised_name(document.file.stem) if document.file else "config"
-        return [Draft(study_keys, stem, study, (), common.realisations, common.seed)]
+        study_keys = inline_scenarios(study_keys, self.studies.keys(study), self.files, self.faults)
+        stem = config_name(document)
+        content = {"name": stem, "study": study, **with_data_paths(study_keys, self.studies.keys(study)).data}
+        return [Draft(study_keys, stem, study, (), common.realisations, common.seed)], content
 
     def _add_unknown_study(self, document: Document, name: str) -> None:
         """Add the error that no study has this name."""
@@ -209,19 +281,39 @@ class Expander:
 
     def _included_drafts(
         self, document: Document, common: CommonKeys, chain: tuple[FilePath, ...], overlays: OverlaidKeys
-    ) -> list[Draft]:
-        """The drafts of all included configs, with the keys beside `include` laid over each."""
+    ) -> tuple[list[Draft], Content]:
+        """The drafts of all included configs, with the keys beside `include` laid over each, and their content."""
         if changes_included(document) or common.study is not None:
             overlays = (document.without_keys(set(COMMON_KEYS) - {"study"}), *overlays)
         chain = (*chain, document.file.resolve()) if document.file else chain
         drafts: list[Draft] = []
+        contents: list[Content] = []
         for i, name in enumerate(common.include or ()):
             origin = document.origin(("include", i))
-            drafts += self._include_config(name, origin, ("include", i), document.file, chain, overlays)
+            if isinstance(name, dict):
+                expansion = self._include_mapping(document, i, chain, overlays)
+            else:
+                expansion = self._include_config(name, origin, ("include", i), document.file, chain, overlays)
+            drafts += expansion.drafts if expansion else []
+            contents += [expansion.content] if expansion else []
             if len(drafts) > MAX_CASES:
                 self.faults.add(origin, ("include",), f"more than {MAX_CASES} cases")
-                return []
-        return drafts
+                return [], {}
+        return drafts, {"include": contents}
+
+    def _include_mapping(
+        self, document: Document, i: int, chain: tuple[FilePath, ...], overlays: OverlaidKeys
+    ) -> Expansion | None:
+        """A config that stands itself under `include`, expanded; None if an error was added."""
+        path: KeyPath = ("include", i)
+        included = document.below(path)
+        if "include" not in included.data and "name" not in included.data:
+            self.faults.add(document.origin(path), path, "needs a name, of which its cases are called")
+            return None
+        if len(chain) > MAX_INCLUDE_DEPTH:
+            self.faults.add(document.origin(path), path, f"includes nested more than {MAX_INCLUDE_DEPTH} deep")
+            return None
+        return self._expand(included, (*chain, FilePath()), overlays)
 
     def _include_config(
         self,
@@ -231,8 +323,8 @@ class Expander:
         including_file: FilePath | None,
         chain: tuple[FilePath, ...],
         overlays: OverlaidKeys,
-    ) -> list[Draft]:
-        """The drafts of one included config."""
+    ) -> Expansion | None:
+        """An included config, expanded; None if an error was added."""
         file = config_file(name, including_file) if is_stem(name) else None
         if not is_stem(name):
             self.faults.add(origin, path, "must be the stem of a config, without folder or suffix", name)
@@ -244,12 +336,12 @@ class Expander:
             self.faults.add(origin, path, f"includes nested more than {MAX_INCLUDE_DEPTH} deep", name)
         elif (cache_key := (file.resolve(), *(FilePath(overlay.source) for overlay in overlays))) in self.open_configs:
             return self.open_configs[cache_key]
-        elif included := self.files_read(file, self.faults):
-            _, drafts = self._expand(included, chain, overlays)
+        elif included := self.files.read(file, self.faults):
+            expansion = self._expand(included, chain, overlays)
             if changes_included(included):
-                drafts = _rename_drafts(drafts, normalised_name(file.stem))
-            return self.open_configs.setdefault(cache_key, drafts)
-        return []
+                expansion = expansion.renamed(config_name(included))
+            return self.open_configs.setdefault(cache_key, expansion)
+        return None
 
     def _sweep_drafts(
         self, document: Document, common: CommonKeys, drafts: list[Draft], overlays: OverlaidKeys
@@ -338,7 +430,7 @@ class Expander:
     def _with_setting(self, document: Document, study: str, setting: Setting) -> Document:
         """A document with a setting; adds an error if its key has no place."""
         try:
-            return place_setting(document, self.studies.keys(study), setting, self.files_read, self.faults)
+            return place_setting(document, self.studies.keys(study), setting, self.files, self.faults)
         except NoSuchKey as error:
             self.faults.add(setting.origin, (), str(error))
             return document
@@ -346,16 +438,19 @@ class Expander:
     def _checked_case(self, draft: Draft) -> Case | None:
         """The checked case of a draft; None if errors were added."""
         model = self.studies.keys(draft.study)
-        document = inline_scenarios(draft.document, model, self.files_read, self.faults)
+        document = inline_scenarios(draft.document, model, self.files, self.faults)
+        self._note_scenarios(named_scenarios(draft.document, model), document, model)
         document = resolve_data_files(document, model, self.faults)
         document, outside = separate_code_filters(document, model, self.studies.filter_from_code, self.faults)
         document, against = self._split_baselines(document, model)
         spec = validate(model, document, self.faults, also=COMMON_KEYS)
         if draft.realisations is None:
             self.faults.add(document.origin(()), ("realisations",), "required key is missing")
-        if spec is None or draft.realisations is None:
-            return None
         name = " ".join([draft.stem, *(f"{key}={swept_value_text(value)}" for key, value in draft.swept_values)])
+        counts = draft.realisations
+        count = counts.get(name) if isinstance(counts, Mapping) else counts
+        if spec is None or count is None:
+            return None
         seed = 1 if draft.seed is None else draft.seed
         return Case(
             name,
@@ -363,11 +458,17 @@ class Expander:
             draft.study,
             spec,
             draft.swept_values,
-            draft.realisations,
+            count,
             seed,
             further_baselines=against,
             user_filters=outside,
         )
+
+    def _note_scenarios(self, stems: Mapping[str, str], document: Document, model: type[StudyKeys]) -> None:
+        """Keep the scenarios that a case still names, by key and stem, as they stand in its inlined document."""
+        scenarios = with_data_paths(document, model).data if stems else {}
+        for key, stem in stems.items():
+            self.named_scenarios.setdefault(stem, []).append(scenarios[key])
 
     def _split_baselines(self, document: Document, model: type[StudyKeys]) -> tuple[Document, tuple[str, ...]]:
         """The document with the first of several baselines, and the others, each checked as the only one."""
@@ -429,6 +530,13 @@ class Expander:
                     path = ("figures", figure, i)
                     hint = did_you_mean(pattern, [case.name for case in cases])
                     self.faults.add(document.origin(path), path, f"no case has this name{hint}", pattern)
+
+
+def _defined_scenarios(document: Document) -> dict[str, Document]:
+    """The scenarios that a config itself defines, by stem."""
+    scenarios = document.data.get("scenarios")
+    stems = scenarios if isinstance(scenarios, dict) else {}
+    return {stem: document.below(("scenarios", stem)) for stem in stems}
 
 
 def _is_below(path: KeyPath, places: Iterable[KeyPath]) -> bool:

@@ -1,13 +1,13 @@
 """A checked config: an experiment of cases."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any
 
 from radarsim.config.error_text import one_line, short_number
-from radarsim.config.identity import all_keys
+from radarsim.config.identity import all_keys, portable_filter, recorded_keys
 
 
 @dataclass(frozen=True)
@@ -60,23 +60,27 @@ class Case:
     @property
     def keys(self) -> dict[str, Any]:
         """The keys as plain data, including names, and all baselines if there are several."""
-        keys, members = all_keys(self.spec), self.spec.bare_keys
+        return self._keys_with_filters(all_keys(self.spec), lambda keys: keys)
+
+    def _keys_with_filters(self, keys: dict[str, Any], write_filter: Callable[[Any], Any]) -> dict[str, Any]:
+        """The keys of the study with those of user filters, and all baselines if there are several."""
+        members = self.spec.bare_keys
         user_baselines = (user_filter.name for user_filter in self.user_filters if user_filter.baseline)
         if further_baselines := [*self.further_baselines, *user_baselines]:
             keys["baseline"] = [*filter(None, [keys.get("baseline")]), *further_baselines]
         if code_filters := [user_filter.written for user_filter in self.user_filters if user_filter.written]:
-            keys[members] = [*keys[members], *code_filters]
+            keys[members] = [*keys[members], *map(write_filter, code_filters)]
         return keys
 
     def resolved(self) -> dict[str, Any]:
-        """The case as plain JSON-able data, names included."""
+        """The case as plain JSON-able data, names included, without paths of this machine."""
         common = {
             "case": self.name,
             "swept": dict(self.swept_values),
             "realisations": self.realisations,
             "seed": self.seed,
         }
-        return common | self.keys
+        return common | self._keys_with_filters(recorded_keys(self.spec), portable_filter)
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,9 @@ class Experiment:
     """The experiment of a config.
 
     figures: for each figure to draw, the names or patterns of its cases. changes_included: whether keys of the study
-    stand beside `include`, so that a case differs from the config of its stem."""
+    stand beside `include`, so that a case differs from the config of its stem. like: the shipped config of which it is
+    a version, as it says itself. content: the config written out in full, see `radarsim.config.complete_config`; None
+    where no text describes it."""
 
     stem: str
     study: str
@@ -94,6 +100,8 @@ class Experiment:
     seed: int
     figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     changes_included: bool = False
+    like: str = ""
+    content: Mapping[str, Any] | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return (

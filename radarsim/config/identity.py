@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,46 @@ def world_keys(spec: BaseModel) -> dict[str, Any]:
 def all_keys(spec: BaseModel) -> dict[str, Any]:
     """All keys with a value, including names: they can be read back as the same config."""
     return _plain_data(spec, ())
+
+
+def recorded_keys(spec: BaseModel) -> dict[str, Any]:
+    """All keys with a value, data files by their names alone: the same on every machine."""
+    keys: dict[str, Any] = _without_folders(spec, all_keys(spec))
+    return keys
+
+
+def _without_folders(value: object, data: Any) -> Any:
+    """The plain data of a value without the folders of its data files."""
+    if isinstance(value, BaseModel):
+        files = {
+            name
+            for name, info in type(value).model_fields.items()
+            if any(isinstance(mark, DataFile) for mark in info.metadata)
+        }
+        return {
+            key: Path(item).name if key in files else _without_folders(getattr(value, key), item)
+            for key, item in data.items()
+        }
+    if isinstance(value, tuple | list):
+        return [_without_folders(item, inner) for item, inner in zip(value, data, strict=True)]
+    return data
+
+
+def portable_filter(keys: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a user filter without folders of this machine: its file, and all that its keys name by an absolute
+    path, by name alone."""
+    values = {key: _name_of_absolute(value) for key, value in keys.items()}
+    return values | {"python": portable_code(str(keys["python"]))}
+
+
+def portable_code(place: str) -> str:
+    """Where code is, FILE.py:NAME or MODULE:NAME, without the folder of the file."""
+    where, _, name = place.rpartition(":")
+    return f"{os.path.basename(where)}:{name}" if where.endswith(".py") else place
+
+
+def _name_of_absolute(value: object) -> object:
+    return os.path.basename(value) if isinstance(value, str) and os.path.isabs(value) else value
 
 
 def _plain_data(value: object, excluded_marks: tuple[type, ...]) -> Any:

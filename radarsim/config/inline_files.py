@@ -1,6 +1,7 @@
 """Put the content of scenario files, and the paths of data files, in the place of their names."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path as FilePath
 
@@ -16,17 +17,32 @@ from radarsim.config.validate import model_at, models_in
 ReadDocument = Callable[[FilePath, ErrorList], Document | None]
 
 
+@dataclass(frozen=True)
+class ConfigFiles:
+    """The files of an experiment. read: see `Expander`; scenarios: those that its config itself defines, by stem."""
+
+    read: ReadDocument
+    scenarios: Mapping[str, Document] = field(default_factory=dict)
+
+
+def named_scenarios(document: Document, model: type[StudyKeys]) -> dict[str, str]:
+    """The keys at which a document has the stem of a scenario, with the stems."""
+    keys = [
+        name for name, info in model.model_fields.items() if any(isinstance(mark, Scenario) for mark in info.metadata)
+    ]
+    return {key: document.data[key] for key in keys if isinstance(document.data.get(key), str)}
+
+
 def inline_scenarios(
-    document: Document, model: type[StudyKeys], read: ReadDocument, faults: ErrorList, only_key: str | None = None
+    document: Document, model: type[StudyKeys], files: ConfigFiles, faults: ErrorList, only_key: str | None = None
 ) -> Document:
-    """Replace the stems of scenarios by the content of their files."""
-    for field, info in model.model_fields.items():
-        stem = document.data.get(field)
-        is_wanted = only_key in (None, field) and any(isinstance(mark, Scenario) for mark in info.metadata)
-        if not is_wanted or not isinstance(stem, str):
+    """Replace the stems of scenarios by what the config defines under them, or by the content of their files."""
+    for key, stem in named_scenarios(document, model).items():
+        origin, path = document.origin((key,)), (key,)
+        if only_key not in (None, key) or faults.is_unusable(origin, path):
             continue
-        origin, path = document.origin((field,)), (field,)
-        if faults.is_unusable(origin, path):
+        if stem in files.scenarios:
+            document = document.graft_document(path, files.scenarios[stem])
             continue
         file = scenario_file(stem, document.file) if is_stem(stem) else None
         if not is_stem(stem):
@@ -35,7 +51,7 @@ def inline_scenarios(
             known_stems = available_stems("scenarios")
             hint = did_you_mean(stem, known_stems) or f"; there are: {', '.join(known_stems)}"
             faults.mark_unusable(origin, path, f"no such scenario{hint}", stem)
-        elif scenario := read(file, faults):
+        elif scenario := files.read(file, faults):
             document = document.graft_document(path, scenario)
         else:
             faults.mark_unusable(origin, path, "the scenario cannot be read", stem)
@@ -44,18 +60,24 @@ def inline_scenarios(
 
 def resolve_data_files(document: Document, model: type[StudyKeys], faults: ErrorList) -> Document:
     """Replace the name of each data file, which is relative to the folder of its YAML file, by a readable path."""
-    for path, value in list(_text_values(document.data, ())) if _has_data_files(model) else ():
-        holder = model_at(model, document.data, path[:-1])
-        info = holder.model_fields.get(str(path[-1])) if holder else None
-        if info is None or not any(isinstance(mark, DataFile) for mark in info.metadata):
-            continue
-        origin = document.origin(path)
-        file = (FilePath(origin.source).parent if origin.line else FilePath()) / value
+    for path, file in data_files(document, model):
         if file.is_file():
             document = document.with_data(path, str(file))
         else:
-            faults.mark_unusable(origin, path, f"no such file: {quoted_value(str(file))}")
+            faults.mark_unusable(document.origin(path), path, f"no such file: {quoted_value(str(file))}")
     return document
+
+
+def data_files(document: Document, model: type[StudyKeys]) -> list[tuple[KeyPath, FilePath]]:
+    """Where a document names data files, and their paths, whether they exist or not."""
+    files = []
+    for path, value in _text_values(document.data, ()) if _has_data_files(model) else ():
+        holder = model_at(model, document.data, path[:-1])
+        info = holder.model_fields.get(str(path[-1])) if holder else None
+        if info is not None and any(isinstance(mark, DataFile) for mark in info.metadata):
+            origin = document.origin(path)
+            files.append((path, (FilePath(origin.source).parent if origin.line else FilePath()) / value))
+    return files
 
 
 @cache

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from radarsim.config.common_keys import Studies
+from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList, Origin
 from radarsim.config.expand_cases import Expander, changes_included, no_such_config
@@ -19,8 +20,8 @@ from radarsim.config.yaml_io import read_document
 def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Overrides, studies: Studies) -> Experiment:
     """The experiment that a config describes, fully checked.
 
-    source is a path, the stem of a config (here, in ./configs, or shipped), or a mapping like the YAML; for overrides
-    see `texts`. Raises ConfigError, one line for each fault."""
+    source is a path, also of a result's folder, the stem of a config (here, in ./configs, or shipped), or a mapping
+    like the YAML; for overrides see `override_texts`. Raises ConfigError, one line for each fault."""
     faults = ErrorList()
     settings = [setting for text in override_texts(overrides) if (setting := parse_setting(text, faults))]
     document: Document | None = None
@@ -32,7 +33,8 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Override
         faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
     experiment = None
     if document is not None:
-        is_path = not isinstance(source, Mapping) and document.file == Path(os.fsdecode(source))
+        given = Path() if isinstance(source, Mapping) else Path(os.fsdecode(source))
+        is_path = not isinstance(source, Mapping) and document.file in (given, given / CONFIG_FILE)
         path = document.file if is_path else None
         experiment = Expander(read_document, settings, faults, studies, path).experiment(document)
     if document is not None and changes_included(document):
@@ -40,6 +42,11 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Override
     faults.raise_if_any()
     assert experiment is not None  # without one there is a fault
     return experiment
+
+
+def _is_result(name: str) -> bool:
+    """Whether a name is that of a folder of results."""
+    return Path(name, CONFIG_FILE).is_file()
 
 
 def _from_mapping(source: Mapping[str, Any], faults: ErrorList) -> Document:
@@ -54,10 +61,15 @@ def _find_config(source: str | bytes | os.PathLike[str], studies: Studies, fault
     config_path = config_file(name) if is_stem(name) else None
     is_path = os.path.isfile(name) and (bool(Path(name).suffix) or config_path is None)
     file = None if is_path else config_path
-    if file is None and is_stem(name) and not is_path and not Path(name).suffix:
+    if file is None and is_stem(name) and not is_path and not Path(name).suffix and not _is_result(name):
         faults.add(Origin(name), (), no_such_config(name, studies, list_names=True))
         return None
     file = file or Path(name)
+    if file.is_dir():
+        file = file / CONFIG_FILE
+        if not file.is_file():
+            faults.add(Origin(name), (), f"is a directory without a {CONFIG_FILE}: no result that can be run again")
+            return None
     document = read_document(file, faults)
     if document and not is_stem(file.stem):  # it names the folder of results
         faults.add(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from radarsim.config.document import Document
 from radarsim.config.error_list import ABSENT, ErrorList, Origin
 from radarsim.config.error_text import KeyPath
-from radarsim.config.inline_files import ReadDocument, inline_scenarios
+from radarsim.config.inline_files import ConfigFiles, inline_scenarios
 from radarsim.config.model import in_degrees, in_radians
 from radarsim.config.study_keys import StudyKeys
 from radarsim.config.user_filter_keys import is_code
@@ -27,12 +27,12 @@ class NoSuchKey(ValueError):
 
 
 def place_setting(
-    document: Document, model: type[StudyKeys], setting: Setting, read: ReadDocument, faults: ErrorList
+    document: Document, model: type[StudyKeys], setting: Setting, files: ConfigFiles, faults: ErrorList
 ) -> Document:
     """Put a setting's value at each place of its key. Raises NoSuchKey."""
     top_key = setting.key.split(".")[0]
     if "." in setting.key and isinstance(document.data.get(top_key), str):
-        document = inline_scenarios(document, model, read, faults, only_key=top_key)
+        document = inline_scenarios(document, model, files, faults, only_key=top_key)
         if isinstance(document.data.get(top_key), str):
             return document  # no scenario, as noted, or a key without scenarios, as the check will report
     for path in key_paths(document, model, setting.key):
@@ -117,17 +117,17 @@ def with_twins(paths: Iterable[KeyPath], model: type[StudyKeys]) -> Iterator[Key
 
 
 def overlay_keys(
-    document: Document, model: type[StudyKeys], overlay: Document, read: ReadDocument, faults: ErrorList
+    document: Document, model: type[StudyKeys], overlay: Document, files: ConfigFiles, faults: ErrorList
 ) -> Document:
     """The document of an included config with the keys beside `include` laid over it.
 
     Mappings are merged key by key, scenarios by their content. All else is replaced: lists, values, the stem of a
     scenario, and a mapping of another kind."""
     scenario_keys = [key for key, value in overlay.data.items() if isinstance(value, str)]
-    overlay = inline_scenarios(overlay, model, read, faults)
+    overlay = inline_scenarios(overlay, model, files, faults)
     for key, value in overlay.data.items():
         if isinstance(value, dict) and key not in scenario_keys:
-            document = inline_scenarios(document, model, read, faults, only_key=key)
+            document = inline_scenarios(document, model, files, faults, only_key=key)
             document = _merge_mapping(document, model, overlay, (key,))
         else:
             document = _replace_value(document, model, overlay, (key,))

@@ -6,7 +6,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
-from radarsim.config.yaml_io import as_yaml
 from radarsim.extensions import ReportSection, extension_figures, extension_tables, extensions
 from radarsim.language.translate import tr
 from radarsim.report import provenance
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 
 MAX_VISIBLE_FIGURES, MAX_VISIBLE_PANELS = 2, 4  # that are not folded
-MAX_YAML_CASES = 12
 RUN_FACTS = ("threads", "seconds", "kernel_seconds", "realisations_computed", "realisations_from_store")
 
 
@@ -43,11 +41,12 @@ def report_page(
     agreement: "pd.DataFrame | None" = None,
     cost: "pd.DataFrame | None" = None,
     drawn_from: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    config_text: str = "",
 ) -> str:
     """The page of an experiment: question, answer, settings, figures, the sections of extensions, tables, provenance.
 
     figures are drawn ones (none with --no-figures); record is run.json's; inputs, agreement and cost (against
-    accuracy) are tables, or None. drawn_from: of the study, see `Study`."""
+    accuracy) are tables, or None. drawn_from: of the study, see `Study`. config_text: config.yaml, if there is one."""
     # The sections of extensions show their own figures in other ways.
     figures = [drawing for drawing in figures if drawing.figure.name not in extension_figures()]
     written = {name for name, table in tables.items() if f"{name}.csv" in record["outputs"] and len(table)}
@@ -66,7 +65,7 @@ def report_page(
         settings=[translated_table(title, table) for title, table in settings_tables(experiment.cases).items()],
         agreement=None if agreement is None else translated_table(tr("exact against Monte-Carlo"), agreement),
         cost=None if cost is None else translated_table(tr("cost against accuracy"), cost),
-        yaml=config_yaml(record["resolved"]),
+        yaml=config_text,
         record=record,
         extent=provenance.extent(record),
         sections=sections,
@@ -176,14 +175,6 @@ def track_page(
         command=command,
         version=provenance.versions()["radarsim"],
     )
-
-
-def config_yaml(resolved: Mapping[str, Any]) -> str:
-    """The resolved experiment as YAML; of very many cases the first."""
-    cases = resolved["cases"]
-    text = as_yaml({**resolved, "cases": cases[:MAX_YAML_CASES]})
-    omitted = len(cases) - MAX_YAML_CASES
-    return text + (f"# {omitted} further cases stand in run.json\n" if omitted > 0 else "")
 
 
 def repeat_command(experiment: Experiment, record: Mapping[str, Any]) -> str:

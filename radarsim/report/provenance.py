@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import platform
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import CaseResult
 
 
+RECORD_FILES = ("run.json", "report.html")  # of a result, beside tables, figures and config
 MAX_SHOWN_SEEDS = 5  # named in a line
 PACKAGES = ("radarsim", "numpy", "numba", "llvmlite", "scipy", "pandas", "matplotlib", "pydantic", "pyyaml")
 
@@ -39,6 +41,7 @@ def record(
     path; machine: its description. Realisations requested and done are sums over the cases, which may differ in both.
     """
     facts = dict(run)
+    facts["warnings"] = [without_folders(line) for line in facts.get("warnings", ())]
     stop = facts.pop("stop", "done")
     done = {result.name: result.count for result in results}
     return {
@@ -103,10 +106,24 @@ def holds_results_of(folder: Path, experiment: Experiment) -> bool:
 
 
 def path_of(experiment: Experiment) -> str:
-    """The file of a config, as printable text."""
+    """The file of a config as printable text, without folders of this machine."""
     if experiment.path is None:
         return "a mapping in Python"
-    return os.fsencode(os.path.abspath(experiment.path)).decode("utf-8", "backslashreplace")
+    path = experiment.path if is_portable(experiment.path) else os.path.basename(experiment.path)
+    return os.fsencode(path).decode("utf-8", "backslashreplace")
+
+
+def is_portable(path: str) -> bool:
+    """Whether a path leads from one folder into folders within it."""
+    return not os.path.isabs(path) and ".." not in Path(path).parts
+
+
+ABSOLUTE_PATH = re.compile(r"(?<![\w.~/:-])(?:/[^\s/,;:'\"`()]+)+/([^\s/,;:'\"`()]+)")
+
+
+def without_folders(text: str) -> str:
+    """A text with the names alone of the files that it names by absolute paths."""
+    return ABSOLUTE_PATH.sub(r"\1", text)
 
 
 def _comparable(resolved: Any) -> object:

@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeGuard
 
 from radarsim.config.experiment import Case
+from radarsim.config.marks import DataFile
 from radarsim.config.model import Model
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import plural, tr
@@ -68,6 +70,8 @@ def describe(model: Model, prefix: str = "") -> Iterator[tuple[str, str, str]]:
     """Key, value and meaning of every field that a checked model holds, in the order of its schema."""
     for name, field in type(model).model_fields.items():
         value = getattr(model, name)
+        if isinstance(value, str) and any(isinstance(mark, DataFile) for mark in field.metadata):
+            value = Path(value).name
         meaning = tr(" ".join((field.description or "").split()))
         if isinstance(value, Model):
             yield from describe(value, f"{prefix}{name}.")

@@ -8,7 +8,7 @@ Its second half is a hash of what computes: the sources of radarsim and of the s
 those of the user's filters. Any edit begins anew, also of a comment; an undone edit finds its own blocks again."""
 
 from radarsim.config.experiment import Case
-from radarsim.config.identity import digest, identity_keys, world_keys
+from radarsim.config.identity import digest, identity_keys, portable_code, world_keys
 from radarsim.engine.blocks import REQUEST_DIGITS
 from radarsim.studies.registry import study
 from radarsim.studies.sources import sources_digest
@@ -37,7 +37,11 @@ def request_digest(case: Case) -> str:
         request["against"] = [names.index(name) for name in case.further_baselines]
     if case.user_filters:
         request["user_filters"] = [
-            {key: value for key, value in (user_filter.written or {}).items() if key != "name"}
+            {
+                key: portable_code(value) if key == "python" else value
+                for key, value in (user_filter.written or {}).items()
+                if key != "name"
+            }
             for user_filter in case.user_filters
         ]
     return digest(request)

@@ -61,22 +61,25 @@ _latest: dict[tuple[str, str, str], "LoadedCode"] = {}  # by folder, name, and h
 def filter_from_code(
     keys: UserFilterKeys, place: str, baseline: bool, folder: Path, first_plots: Callable[[Case, int], Plots]
 ) -> "CodeFilter":
-    """The filter that a config in a folder names at a place. ConfigError where there is none, or none may run."""
+    """The filter that a config in a folder names at a place. ConfigError where there is none, or none may run.
+
+    Code that a result names by its hash is looked for beside its config, then in the working directory."""
     if os.environ.get(user_code_errors.NO_CODE_VARIABLE):
         raise ConfigError(f"is code of yours, and --no-code runs none, got {keys.python!r}")
     where, _, object_name = keys.python.rpartition(":")
     if not where or not object_name.isidentifier():
         raise ConfigError(f"must be FILE.py:NAME or MODULE:NAME, got {keys.python!r}")
-    if where.endswith(".py"):
-        file = Path(os.path.abspath(folder / where))
-        home, module, missing = str(file.parent), file.stem, f"no such file: {file}"
-    else:
-        home, module = home_folder(where, os.path.abspath(folder)), where
-        missing = f"no such module, neither beside the config nor installed: {where}"
+    home, module = _place_of_code(folder, where)
+    if keys.source is not None and file_of(home, module) is None:
+        folder = Path()
+        home, module = _place_of_code(folder, where)
     if file_of(home, module) is None:
-        raise ConfigError(missing)
+        raise ConfigError(_missing_code(Path(home, where) if where.endswith(".py") else None, keys))
     arguments, files_of_keys = with_paths(folder, dict(keys.model_extra or {}))
     module_sources = sources(home, module)
+    if keys.source is not None and not module_sources.digest.startswith(keys.source):
+        found = module_sources.digest[: len(keys.source)]
+        raise ConfigError(f"{file_of(home, module)} is other code than that of the result: {found}, not {keys.source}")
     return CodeFilter(
         name=keys.name,
         keys=keys,
@@ -91,6 +94,26 @@ def filter_from_code(
         first_plots=first_plots,
         baseline=baseline,
     )
+
+
+def _place_of_code(folder: Path, where: str) -> tuple[str, str]:
+    """The folder from which the code that a config in a folder names is imported, and the module."""
+    if where.endswith(".py"):
+        file = Path(os.path.abspath(folder / where))
+        return str(file.parent), file.stem
+    return home_folder(where, os.path.abspath(folder)), where
+
+
+def _missing_code(file: Path | None, keys: UserFilterKeys) -> str:
+    """The message that there is no such file, or no such module."""
+    if keys.source is not None:
+        return (
+            f"neither beside this file nor in the working directory: {keys.python}; a result does not contain the code "
+            "of its filters: put it there, as the result's author has it"
+        )
+    if file is not None:
+        return f"no such file: {file}"
+    return f"no such module, neither beside the config nor installed: {keys.python.rpartition(':')[0]}"
 
 
 def _span(plots: Plots) -> str:
@@ -158,7 +181,7 @@ class CodeFilter(UserFilter):
 
     @property
     def written(self) -> dict[str, Any]:  # type: ignore[override]
-        return dict(self.keys.model_dump(exclude_defaults=True))
+        return dict(self.keys.model_dump(exclude_defaults=True, exclude={"source"}))
 
     @property
     def file(self) -> str:
