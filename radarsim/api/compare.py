@@ -3,7 +3,7 @@
 import os
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from radarsim.api.display import Displayable
 from radarsim.api.repeat_command import RESULTS, command
 from radarsim.api.result import Result
 from radarsim.api.result_content import captions, config_names
-from radarsim.api.stored_cases import stored_case
+from radarsim.api.stored_cases import cases_of_result
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.identity import digest, identity_keys, world_keys
 from radarsim.errors import ConfigError
@@ -48,6 +48,11 @@ class ComparedRun:
     record: dict[str, Any]
     experiment: Experiment | None = None
     tables: "Mapping[str, pd.DataFrame] | None" = None
+
+    @cached_property
+    def cases(self) -> dict[str, Case]:
+        """The cases as recorded, by name, as far as they read as configs."""
+        return dict(cases_of_result(self.record, self.folder))
 
 
 @dataclass(frozen=True, repr=False)
@@ -281,7 +286,7 @@ def _measured_quantities(study: str) -> tuple[Quantity, ...]:
 
 def _noise_identity(run: ComparedRun, name: str) -> str | None:
     """A hash of what a case's measurements depend on: study, seed, world; None if the record no longer reads."""
-    case = stored_case(run.record, name)
+    case = run.cases.get(name)
     return None if case is None else digest([case.study, case.seed, world_keys(case.spec)])
 
 
@@ -305,7 +310,7 @@ def _stale_tables(run: ComparedRun) -> list[str]:
     """A warning where a config no longer matches its stored result."""
     if run.experiment is None:
         return []
-    stored_cases = {name: stored_case(run.record, name) for name in run.record["cases"]}
+    stored_cases = {name: run.cases.get(name) for name in run.record["cases"]}
     config_cases = {case.name: case for case in run.experiment.cases}
     is_current = stored_cases.keys() == config_cases.keys() and all(
         stored is not None and identity_keys(stored.spec) == identity_keys(config_cases[name].spec)
@@ -363,6 +368,5 @@ def _page(
 
 def _cases(run: ComparedRun) -> list[Case]:
     """The cases of a result as recorded, if still valid."""
-    named_cases = ((name, stored_case(run.record, name)) for name in run.record["cases"])
     label = run.label if len(run.record["cases"]) == 1 else ""
-    return [replace(case, name=label or name) for name, case in named_cases if case is not None]
+    return [replace(case, name=label or name) for name, case in run.cases.items()]

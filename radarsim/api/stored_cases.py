@@ -1,18 +1,35 @@
 """The cases of earlier results as today's program reads them, from their run.json."""
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from radarsim.api import stored_tables
 from radarsim.api.configs import load
-from radarsim.api.stored_tables import read_record
-from radarsim.config.experiment import Case
+from radarsim.config.complete_config import CONFIG_FILE
+from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import RadarsimError
 
 LABEL_KEYS = ("case", "swept")  # of a resolved case: no keys of a config
 
 
-def stored_case(record: Mapping, name: str) -> Case | None:
-    """A case as run.json resolved it; None where it no longer reads as a config."""
+def stored_experiment(record: Mapping, folder: Path) -> Experiment | None:
+    """The experiment of a result as its config.yaml has it; None where there is none, or not that of the record."""
+    try:
+        text = stored_tables.read_content(folder / CONFIG_FILE)
+        if text is None or hashlib.sha256(text).hexdigest() != record["outputs"].get(CONFIG_FILE):
+            return None
+        return load(folder / CONFIG_FILE)
+    except (RadarsimError, LookupError, TypeError):
+        return None
+
+
+def stored_case(record: Mapping, name: str, experiment: Experiment | None = None) -> Case | None:
+    """A case of a result as its config has it, if that is known, else as run.json resolved it; None where it no longer
+    reads as a config."""
+    for case in experiment.cases if experiment is not None else ():
+        if case.name == name:
+            return case
     try:
         for resolved in record["resolved"]["cases"]:
             if resolved["case"] == name:
@@ -23,9 +40,16 @@ def stored_case(record: Mapping, name: str) -> Case | None:
     return None
 
 
+def cases_of_result(record: Mapping, folder: Path) -> list[tuple[str, Case]]:
+    """The cases of a result with their names, as far as they read as configs."""
+    experiment = stored_experiment(record, folder)
+    cases = [(name, stored_case(record, name, experiment)) for name in record["cases"]]
+    return [(name, case) for name, case in cases if case is not None]
+
+
 def stored_cases(out: Path) -> list[tuple[str, Case]]:
     """The cases of all results in a directory with their names there, as far as they read as configs. Raises StoreError
     for a damaged run.json."""
-    records = [read_record(path.parent) for path in sorted(out.glob("*/run.json"))]
-    cases = [(name, stored_case(record, name)) for record in records if record for name in record["cases"]]
-    return [(name, case) for name, case in cases if case is not None]
+    folders = [path.parent for path in sorted(out.glob("*/run.json"))]
+    records = [(folder, stored_tables.read_record(folder)) for folder in folders]
+    return [pair for folder, record in records if record for pair in cases_of_result(record, folder)]

@@ -11,13 +11,14 @@ from radarsim.config.study_keys import Member, StudyKeys
 
 LARGEST_REALISATIONS = 10**12
 LARGEST_SEED = 2**64 - 1
+CaseName = Annotated[str, Strict(), StringConstraints(min_length=1)]
 Realisations = Annotated[int, WholeNumber(1, LARGEST_REALISATIONS)]
 
 
 class CommonKeys(Model):
     """Keys that every config may have, whatever its study."""
 
-    name: Name | None = key("name", "name of the experiment and of its results; default: that of the file", None)
+    name: CaseName | None = key("name", "name of the experiment and of its results; default: that of the file", None)
     like: Stem | None = key("like", "shipped config of which this is a version; results say so", None)
     study: Stem | None = key("study", "the study; it determines the other keys", None)
     include: Annotated[tuple[Stem | dict[str, Anything], ...], Field(min_length=1)] | None = key(
@@ -29,7 +30,7 @@ class CommonKeys(Model):
     sweep: Annotated[dict[str, Annotated[tuple[Anything, ...], Field(min_length=1)]], Field(min_length=1)] | None = key(
         "swept keys", "a case for each combination of values: key or dotted path, and its list of values", None
     )
-    realisations: Realisations | dict[Name, Realisations] | None = key(
+    realisations: Realisations | Annotated[dict[CaseName, Realisations], Field(min_length=1)] | None = key(
         "realisations", "how often the experiment is repeated; or for each case, by its name", None
     )
     seed: Annotated[int, WholeNumber(0, LARGEST_SEED)] | None = key("seed", "seed of the noise; default 1", None)

@@ -3,25 +3,18 @@
 import itertools
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path as FilePath
 
 from radarsim.config.common_keys import COMMON_KEYS, CommonKeys, Studies
-from radarsim.config.complete_config import Content, folder_of, rename_configs, sweep_with_data_paths, with_data_paths
+from radarsim.config.complete_config import Content, folder_of, sweep_with_data_paths, with_data_paths
 from radarsim.config.document import Document
+from radarsim.config.drafts import Draft, Expansion, OverlaidKeys, changes_included, config_name
 from radarsim.config.error_list import ABSENT, ErrorList, Origin
 from radarsim.config.error_text import KeyPath, one_line
-from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern, swept_value_text
-from radarsim.config.find_files import (
-    RESERVED,
-    available_stems,
-    config_file,
-    did_you_mean,
-    is_reserved,
-    is_stem,
-    normalised_name,
-)
+from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern
+from radarsim.config.find_files import RESERVED, available_stems, config_file, did_you_mean, is_reserved, is_stem
 from radarsim.config.inline_files import (
     ConfigFiles,
     ReadDocument,
@@ -48,53 +41,6 @@ from radarsim.private_files import foreign_owner
 MAPPING_KEYS = ("sweep", "figures")  # common keys that are mappings: the text after their dot is a single key
 MAX_CASES = 10_000
 MAX_INCLUDE_DEPTH = 5
-
-
-@dataclass(frozen=True)
-class Draft:
-    """A case under construction: its document with the keys applied so far."""
-
-    document: Document
-    stem: str
-    study: str
-    swept_values: tuple[tuple[str, object], ...]
-    realisations: int | Mapping[str, int] | None
-    seed: int | None
-
-
-@dataclass(frozen=True)
-class Expansion:
-    """A config expanded: its common keys, its drafts, and its content written out in full."""
-
-    common: CommonKeys
-    drafts: list[Draft]
-    content: Content
-
-    def renamed(self, stem: str) -> "Expansion":
-        """The expansion of a config that changes what it includes, and is included itself: named after that config."""
-        has_several = len({draft.stem for draft in self.drafts}) > 1
-
-        def new_name(name: str) -> str:
-            return f"{stem}:{name}" if has_several else stem
-
-        drafts = [replace(draft, stem=new_name(draft.stem)) for draft in self.drafts]
-        return replace(self, drafts=drafts, content=rename_configs(self.content, new_name))
-
-
-OverlaidKeys = tuple[Document, ...]  # keys laid over an included config, those of the nearest config first
-
-
-def changes_included(document: Document) -> bool:
-    """Whether a config changes what it includes: keys of a study stand beside `include`."""
-    return "include" in document.data and not set(COMMON_KEYS).issuperset(document.data)
-
-
-def config_name(document: Document) -> str:
-    """The name of a config: as it says, else that of its file."""
-    name = document.data.get("name")
-    if isinstance(name, str):
-        return normalised_name(name)
-    return normalised_name(document.file.stem) if document.file else "config"
 
 
 def no_such_config(name: str, studies: Studies, list_names: bool = False) -> str:
@@ -151,6 +97,7 @@ class Expander:
         stem = config_name(document)
         self._check_name(stem, document)
         self._refuse_equal_names(cases, document)
+        self._refuse_unknown_counts(common, drafts, document)
         self._refuse_mixture(drafts, document)
         self._check_figure_names(common, drafts, document)
         self._check_figures(common, cases, document)
@@ -446,8 +393,7 @@ class Expander:
         spec = validate(model, document, self.faults, also=COMMON_KEYS)
         if draft.realisations is None:
             self.faults.add(document.origin(()), ("realisations",), "required key is missing")
-        name = " ".join([draft.stem, *(f"{key}={swept_value_text(value)}" for key, value in draft.swept_values)])
-        counts = draft.realisations
+        counts, name = draft.realisations, draft.name
         count = counts.get(name) if isinstance(counts, Mapping) else counts
         if spec is None or count is None:
             return None
@@ -498,6 +444,15 @@ class Expander:
             if case.name in names:
                 self.faults.add(document.origin(key), key, f"makes the case {one_line(case.name)!r} twice")
             names.add(case.name)
+
+    def _refuse_unknown_counts(self, common: CommonKeys, drafts: list[Draft], document: Document) -> None:
+        """Add an error for each number of realisations of a case that does not exist."""
+        names = [draft.name for draft in drafts]
+        for name in common.realisations if isinstance(common.realisations, dict) else ():
+            if name not in names:
+                path = ("realisations", name)
+                message = f"no case has this name{did_you_mean(name, names)}"
+                self.faults.add(document.key_origin(path), path, message)
 
     def _refuse_mixture(self, drafts: list[Draft], document: Document) -> None:
         """Add an error if the cases belong to several studies."""

@@ -8,8 +8,9 @@ from typing import Any
 from radarsim.config.common_keys import Studies
 from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.document import Document
+from radarsim.config.drafts import changes_included
 from radarsim.config.error_list import ErrorList, Origin
-from radarsim.config.expand_cases import Expander, changes_included, no_such_config
+from radarsim.config.expand_cases import Expander, no_such_config
 from radarsim.config.experiment import Experiment
 from radarsim.config.find_files import RESERVED, config_file, is_reserved, is_stem
 from radarsim.config.overrides import Overrides, override_texts, parse_setting
@@ -46,7 +47,7 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Override
 
 def _is_result(name: str) -> bool:
     """Whether a name is that of a folder of results."""
-    return Path(name, CONFIG_FILE).is_file()
+    return os.path.isfile(os.path.join(name, CONFIG_FILE))
 
 
 def _from_mapping(source: Mapping[str, Any], faults: ErrorList) -> Document:
@@ -65,10 +66,10 @@ def _find_config(source: str | bytes | os.PathLike[str], studies: Studies, fault
         faults.add(Origin(name), (), no_such_config(name, studies, list_names=True))
         return None
     file = file or Path(name)
-    if file.is_dir():
+    if os.path.isdir(file):
         file = file / CONFIG_FILE
         if not file.is_file():
-            faults.add(Origin(name), (), f"is a directory without a {CONFIG_FILE}: no result that can be run again")
+            faults.add(Origin(str(file.parent)), (), f"is a directory without {CONFIG_FILE}, so no result")
             return None
     document = read_document(file, faults)
     if document and not is_stem(file.stem):  # it names the folder of results

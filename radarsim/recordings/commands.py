@@ -212,7 +212,7 @@ def track(
     """
     import contextlib
 
-    from radarsim.api import load_experiments, run_facts
+    from radarsim.api import load_experiments, result_config, run_facts
     from radarsim.cli import console, progress
     from radarsim.recordings import csv_rows, print_results
     from radarsim.recordings import track as recordings_track
@@ -246,7 +246,7 @@ def track(
     if output:
         console.print_field("track", output)
     if folder:
-        page.write_page(followed, loaded, plots, judged, advised, folder)
+        page.write_page(followed, loaded, plots, judged, advised, folder, result_config.config_text(loaded))
         click.echo(output_labels.labelled_line("report", str(Path(folder) / page.PAGE_NAME)), err=output is None)
     console.print_warnings(run_facts.cache_troubles())
 

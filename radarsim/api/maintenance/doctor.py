@@ -14,7 +14,7 @@ import numpy as np
 
 from radarsim.api.case_work import CaseWork
 from radarsim.api.maintenance.self_test import tolerance
-from radarsim.api.stored_cases import stored_case
+from radarsim.api.stored_cases import stored_case, stored_experiment
 from radarsim.config.experiment import Case
 from radarsim.engine.blocks import Node, Partial, simulate_piece
 from radarsim.engine.machine import available_cores, instruction_set, machine_facts, platform_name
@@ -83,10 +83,11 @@ def inspect_result(folder: str | os.PathLike[str], recompute: int = 0) -> Inspec
     record = _checked_record(inspection)
     if _digest(record["resolved"]) != record["resolved_sha256"]:
         inspection.faults.append(f"{inspection.folder / 'run.json'}: damaged: the config in it is not the one that ran")
+    experiment = stored_experiment(record, inspection.folder)
     not_recomputable = []
     for name, stored_identity in record["identities"].items():
         store = blocks / stored_identity
-        case = stored_case(record, name)
+        case = stored_case(record, name, experiment)
         runs_code = case is not None and any(user_filter.written for user_filter in case.user_filters)
         if recompute and runs_code:
             _refuse_foreign_record(inspection.folder / "run.json")

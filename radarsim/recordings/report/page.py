@@ -28,11 +28,11 @@ def write_page(
     judged: Sequence[InnovationTest],
     advised: Advice | None,
     folder: str | os.PathLike,
+    config_text: str = "",
 ) -> list[str]:
-    """Write the page and `figures/` into a folder, and return the names of the figures.
+    """Write the page and `figures/` into a folder, and return the names of the figures. config_text: the whole config.
 
     Raises StoreError, or, with nothing written, ConfigError where a file would overwrite the plots or the config."""
-    from radarsim.api.result_config import config_text
     from radarsim.report import atomic_files
     from radarsim.report import page as report_page
     from radarsim.report.drawing.canvas import draw
@@ -50,7 +50,7 @@ def write_page(
             tr(TESTS_TITLE): test_table(judged),
             tr("Tracks"): _track_table(followed),
         },
-        config_text(experiment),
+        config_text,
         f"radarsim track {_config_argument(experiment)} {source_name}",
     )
     contents = {PAGE_NAME: page.encode()}
