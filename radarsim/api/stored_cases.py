@@ -9,6 +9,7 @@ from radarsim.api.configs import load
 from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import RadarsimError
+from radarsim.report import provenance
 
 LABEL_KEYS = ("case", "swept")  # of a resolved case: no keys of a config
 
@@ -19,7 +20,8 @@ def stored_experiment(record: Mapping, folder: Path) -> Experiment | None:
         text = stored_tables.read_content(folder / CONFIG_FILE)
         if text is None or hashlib.sha256(text).hexdigest() != record["outputs"].get(CONFIG_FILE):
             return None
-        return load(folder / CONFIG_FILE)
+        experiment = load(folder / CONFIG_FILE)
+        return experiment if provenance.is_same_config(record["resolved"], experiment.resolved) else None
     except (RadarsimError, LookupError, TypeError):
         return None
 

@@ -102,7 +102,12 @@ def replacement_warnings(folder: Path, experiment: Experiment) -> list[str]:
 
 def holds_results_of(folder: Path, experiment: Experiment) -> bool:
     """Whether a folder holds the results of an experiment, with any seed and number of realisations."""
-    return _comparable(earlier_record(folder).get("resolved")) == _comparable(experiment.resolved)
+    return is_same_config(earlier_record(folder).get("resolved"), experiment.resolved)
+
+
+def is_same_config(resolved: object, other_resolved: object) -> bool:
+    """Whether two resolved configs have the same cases, with any seed and number of realisations."""
+    return _comparable(resolved) == _comparable(other_resolved)
 
 
 def path_of(experiment: Experiment) -> str:
