@@ -318,7 +318,7 @@ def _stale_tables(run: ComparedRun) -> list[str]:
     )
     if is_current:
         return []
-    rerun_command = command(run.experiment, (), run.folder.parent)
+    rerun_command = f"{command(run.experiment, (), run.folder.parent)} --replace"
     return [f"{run.folder}: of an earlier state of {run.label}; `{rerun_command}` brings it up to date"]
 
 

@@ -4,7 +4,7 @@ import hashlib
 import os
 import shlex
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -14,6 +14,7 @@ from radarsim.api import arguments, configs, load_experiments, repeat_command, r
 from radarsim.api.configs import Config, Overrides
 from radarsim.api.estimate_files import read_estimates
 from radarsim.api.filter_checks import check_user_filter
+from radarsim.api.replacement import check_counts, check_replacement
 from radarsim.config.case_choice import case_choice
 from radarsim.config.common_keys import UserFilterKeys
 from radarsim.config.document import Document
@@ -46,6 +47,7 @@ def judge(
     out: str | os.PathLike[str] | None = None,
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
+    replace: bool = False,
     progress: Callable[[int, int, int], None] | None = None,
 ) -> "Result":
     """Judge a filter of your own on the plots of a run; returns a result like that of `run`, its filter beside the
@@ -86,7 +88,7 @@ def judge(
     if experiment.cases[0].user_filters[-1].in_order:
         threads = 0
     run_arguments: dict[str, Any] = {"precision": precision, "of": of, "progress": progress, "threads": threads}
-    return run_judged_experiment(experiment, warnings, out, figures, width_mm, **run_arguments)
+    return run_judged_experiment(experiment, warnings, out, figures, width_mm, replace=replace, **run_arguments)
 
 
 def run_judged_experiment(
@@ -96,9 +98,13 @@ def run_judged_experiment(
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
     command: str = "none: the filter was given in Python",
+    replace: bool = False,
     **run_arguments: Any,
 ) -> "Result":
     """The result of an experiment with a judged filter and the warnings of its checks, written if `out` is given."""
+    if out is not None and not replace:
+        check_replacement(experiment, out, [member.name for member in experiment.cases[0].user_filters])
+        check_counts(experiment, {case.name: case.realisations for case in experiment.cases}, out)
     try:
         result = run.run(experiment, **run_arguments)
     except (DisagreementError, MeasureError) as error:  # raised again below
@@ -111,7 +117,7 @@ def run_judged_experiment(
     if out is None:
         result.check()
     else:
-        result.write(out, figures, width_mm)
+        result.write(out, figures, width_mm, replace=replace)
     return result
 
 
@@ -143,9 +149,9 @@ def add_user_filter(
     if available is not None and (n or 0) > available:
         raise ConfigError(f"{name}: there are estimates of {available} realisations, fewer than {n}")
     counts: dict[str, Any] = {"realisations": n or available} if n or available else {}
-    cases = tuple(replace(case, user_filters=(*case.user_filters, member), **counts) for case in cases)
+    cases = tuple(replaced(case, user_filters=(*case.user_filters, member), **counts) for case in cases)
     stem = f"{experiment.stem}_{'_'.join(name.split())}"
-    judged_experiment = replace(experiment, stem=stem, cases=cases, **counts)
+    judged_experiment = replaced(experiment, stem=stem, cases=cases, **counts)
     return judged_experiment, [
         *tuning_warnings,
         *(line for case in judged_experiment.cases for line in check_user_filter(case, member)),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.api import arguments, configs
 from radarsim.api.display import Displayable, ShortTuple
+from radarsim.api.replacement import check_counts, check_replacement
 from radarsim.api.result_content import case_figures, case_tables, make_answer, question_text, with_first_baseline
 from radarsim.api.write_result import WrittenFiles, write_files
 from radarsim.config.experiment import Experiment
@@ -161,20 +162,27 @@ class Result(Displayable):
         return case_figures(self.cases, self._tables, self.experiment)
 
     def write(
-        self, out: str | os.PathLike[str], figures: bool | str | Sequence[str] = True, width_mm: float | None = None
+        self,
+        out: str | os.PathLike[str],
+        figures: bool | str | Sequence[str] = True,
+        width_mm: float | None = None,
+        replace: bool = False,
     ) -> "WrittenFiles":
         """Write tables, figures, run.json and report.html into out/<stem>/, and update out/index.html.
 
         figures may name the formats of their files: svg, png, pdf; width_mm overrides their width. Returns the files
-        written. Raises DisagreementError, after writing, if there are `faults`."""
+        written. Raises ConfigError where tables of other settings, another seed or more realisations would be lost,
+        unless `replace`; DisagreementError, after writing, if there are `faults`."""
         from radarsim.report import index_page
 
         arguments.check_arguments(out=out, figures=figures, width_mm=width_mm)
+        if not replace:
+            check_replacement(self.experiment, out, list(self.facts.get("judged", ())))
+            check_counts(self.experiment, {case.name: case.count for case in self.cases}, out)
         folder = Path(out) / self.experiment.stem
         for extension in extensions():
             self._tables.update(extension.updated_tables(self._tables, self.experiment.study, Path(out)))
         formats = arguments.figure_formats(figures)
-        self.facts["warnings"] = [*self.facts["warnings"], *provenance.replacement_warnings(folder, self.experiment)]
         facts = self.facts | {"finished": datetime.now(UTC).isoformat("T", "seconds")}
         facts["warnings"] = [*self.faults, *facts["warnings"]]
         write = partial(write_files, draw=bool(formats), formats=formats, width_mm=width_mm)

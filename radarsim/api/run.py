@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from radarsim.api.precision_target import check_precision
 from radarsim.api.progress import Progress
 from radarsim.api.repeat_command import repeat_command
 from radarsim.api.run_errors import parse_span
+from radarsim.api.replacement import check_replacement, larger_counts, stored_counts, with_counts
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, simulate
 from radarsim.api.stored_runs import config_filter_warnings, make_result
@@ -52,6 +53,7 @@ def run(
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
     runs: str | None = None,
+    replace: bool = False,
     progress: Progress | None = None,
     stop: Signals | None = None,
 ) -> "Result":
@@ -67,9 +69,11 @@ def run(
     end at the first of these numbers at which every claim of the config is decided. time_limit is in seconds, including
     tables and figures, or a condition that is already running. `result.unmet` names the targets that were not reached.
     workers: number of processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already
-    open. width_mm: width of the figures, instead of their own. runs: scans, `2:60` or `all`, for the table `runs` of
-    each run's root-mean-square error over them (`Result.add_runs_table`). progress is called with the realisations that
-    are done, are to be done, and were stored, where cases are weighed by their time.
+    open. width_mm: width of the figures, instead of their own. replace: whether tables of other settings or another
+    seed, or of more realisations, may be replaced in the folder of the result; otherwise ConfigError is raised before
+    anything is computed, and of more realisations the stored ones are shown. runs: scans, `2:60` or `all`, for the table
+    `runs` of each run's root-mean-square error over them (`Result.add_runs_table`). progress is called with the
+    realisations that are done, are to be done, and were stored, where cases are weighed by their time.
 
     Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
     TargetUnmet if the time did not suffice for a single block, and Interrupted on a signal; finished blocks are then
@@ -97,13 +101,20 @@ def run(
     if rule is not None:
         rule.check(experiment)
     limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
+    at_least: Mapping[str, int] = {}
+    requested = experiment
+    if out is not None and not replace:
+        check_replacement(experiment, out)
+        at_least = stored_counts(experiment, out)
+        if precision is None and not decide:
+            experiment = with_counts(experiment, larger_counts(experiment, out))
     started, writing_s = time.perf_counter(), None
     filter_warnings = config_filter_warnings(experiment)
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.remaining_s >= MIN_MEASURED_LIMIT_S:
         limit = limit.with_reserve(writing_s := writing_seconds(experiment, figures, width_mm))
     with open_executor(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else available_cores() if threads is None else int(threads)
-        options = RunOptions(out, threads, stopping.AnyStop(stop, limit), pool)
+        options = RunOptions(out, threads, stopping.AnyStop(stop, limit), pool, at_least)
         if rule is not None:
             simulated = rule.simulate(experiment, options, progress)
         else:
@@ -120,7 +131,7 @@ def run(
         undecided = rule.unmet(experiment, simulated)
         facts |= {"unmet": [*facts["unmet"], *undecided], "stop": "; ".join((*facts["unmet"], *undecided)) or "done"}
     reached_precision = None if simulated.stopped or precision is None else (precision, of)
-    repeat = repeat_command(experiment, simulated.done, overrides, reached_precision)
+    repeat = repeat_command(requested, simulated.done, overrides, reached_precision)
     result = make_result(experiment, simulated, facts, repeat)
     run_warnings = (line for case in experiment.cases for member in case.user_filters for line in member.warnings())
     result.facts["warnings"] += dict.fromkeys((*filter_warnings, *run_warnings))
@@ -130,7 +141,7 @@ def run(
     if out is None:
         result.check()
     else:
-        result.write(out, figures, width_mm)
+        result.write(out, figures, width_mm, replace=replace)
     return result
 
 

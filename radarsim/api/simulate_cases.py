@@ -2,7 +2,7 @@
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -13,11 +13,12 @@ from radarsim.api.case_work import CaseWork
 from radarsim.api.precision_target import PrecisionTarget, heavy_tailed_table, quantity_table, unknown_quantity
 from radarsim.api.progress import Progress, WeightedProgress
 from radarsim.config.experiment import Case, Experiment
-from radarsim.engine.collect import collect, compute_share
+from radarsim.engine.collect import collect, compute_share, read_stored
 from radarsim.engine.dispatch import CollectedSums, ShareResult
 from radarsim.engine.executors import Executor
 from radarsim.engine.results import CaseResult
 from radarsim.engine.stopping import Stop
+from radarsim.engine.store.inventory import take_inventory
 from radarsim.errors import ConfigError
 from radarsim.report.quantities import SIGMA
 from radarsim.studies import registry
@@ -82,12 +83,14 @@ class Shares:
 class RunOptions:
     """How an experiment is computed: no option changes a number.
 
-    out is the results directory, None for none; executor replaces the threads; stop is called between tasks."""
+    out is the results directory, None for none; executor replaces the threads; stop is called between tasks. at_least:
+    the realisations of cases, by name, of which all that are stored are used even if fewer are needed."""
 
     out: str | os.PathLike[str] | None = None
     threads: int | None = None
     stop: Stop | None = None
     executor: Executor | None = None
+    at_least: Mapping[str, int] = field(default_factory=dict)
 
 
 def simulate(
@@ -119,7 +122,7 @@ def simulate(
                     target = PrecisionTarget(
                         precision, quantity, quantity_table(case, quantity), heavy_tailed_table(work, quantity)
                     )
-                collected_by_key[key] = _collect_case(case, work, target, collector)
+                collected_by_key[key] = _collect_case(case, work, target, collector, _stored_count(work, case, options))
             collected, cell = collected_by_key[key]
             if collected.count:
                 simulation.cases.append((case, work, collected))
@@ -127,8 +130,26 @@ def simulate(
                 simulation.cells[case.name] = replace(cell, case=case.name)
             if collected.stopped:
                 simulation.stopped = collected.stopped
+                simulation.cases += _stored_rest(experiment, len(simulation.cases), options)
                 break
     return simulation
+
+
+def _stored_count(work: CaseWork, case: Case, options: RunOptions) -> int:
+    """How many realisations of a case there must be at least: those of `at_least`, if they are stored."""
+    count = options.at_least.get(case.name, 0)
+    return count if count and options.out is not None and not take_inventory(work, count, options.out).missing else 0
+
+
+def _stored_rest(experiment: Experiment, first: int, options: RunOptions) -> list[tuple[Case, CaseWork, CollectedSums]]:
+    """Of the cases from this one on, which a stopped run did not reach, what is stored and must not be lost."""
+    rest = []
+    for case in experiment.cases[first:]:
+        work = CaseWork(case)
+        if options.out is not None and (count := _stored_count(work, case, options)):
+            collected = read_stored(work, count, options.out)
+            rest += [] if collected is None else [(case, work, collected)]
+    return rest
 
 
 def works_by_identity(experiment: Experiment) -> list[tuple[tuple[str, int], CaseWork]]:
@@ -148,11 +169,19 @@ def _collector(
 
 
 def _collect_case(
-    case: Case, work: CaseWork, target: PrecisionTarget | None, collector: Callable[[int], CollectedSums]
+    case: Case,
+    work: CaseWork,
+    target: PrecisionTarget | None,
+    collector: Callable[[int], CollectedSums],
+    at_least: int = 0,
 ) -> "tuple[CollectedSums, WidestInterval | None]":
-    """The sums of a case, and the cell of its widest interval where a precision is set."""
+    """The sums of a case, and the cell of its widest interval where a precision is set. at_least: realisations that are
+    stored, and used in any case."""
     if target is None:
-        return collector(case.realisations), None
+        collected = collector(case.realisations)
+        return (
+            replace(collector(at_least), stopped=collected.stopped) if collected.count < at_least else collected
+        ), None
     from radarsim.report.precision import (
         FIRST_LOOK,
         MIN_REALISATIONS_WITHOUT_TAILS,
@@ -163,7 +192,8 @@ def _collect_case(
 
     looks: list[CollectedSums] = []
     best, cell = None, None
-    for n in look_counts(case.realisations, MIN_REALISATIONS_WITHOUT_TAILS if target.curves else FIRST_LOOK):
+    looks_at = look_counts(case.realisations, MIN_REALISATIONS_WITHOUT_TAILS if target.curves else FIRST_LOOK)
+    for n in dict.fromkeys(max(n, at_least) for n in looks_at):
         looks.append(collector(n))
         # A run that is stopped before a look may hold fewer realisations without a gap than at the previous look.
         if best is None or looks[-1].count > best.count:

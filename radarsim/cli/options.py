@@ -211,6 +211,9 @@ width_option = click.option(
     help="Width of the figures, mm; text keeps its size. Default: each figure's own width.",
 )
 
+replace_option = click.option(
+    "--replace", is_flag=True, help="Replace tables of other settings, another seed or more realisations."
+)
 figures_option = click.option("--no-figures", is_flag=True, help="Draw no figures; tables and report only.")
 
 

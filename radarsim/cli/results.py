@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from radarsim.cli import command_group, options
-from radarsim.cli.run import compute_each, refuse_quantity_without_precision
+from radarsim.cli.run import check_replacements, compute_each, refuse_quantity_without_precision
 
 if TYPE_CHECKING:
     from radarsim.api.result import Result
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 @options.quantity_option
 @options.threads_option
 @options.out_option
+@options.replace_option
 @options.drawing_options
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 @options.json_option
@@ -51,6 +52,7 @@ def judge(
     of: str,
     threads: int | None,
     out: str,
+    replace: bool,
     drawing: options.Drawing,
     quiet: bool,
     as_json: bool,
@@ -100,7 +102,7 @@ def judge(
             loaded, estimates, name, load_experiments.combine_overrides(overrides, realisations, seed), option_words
         )
         compute_arguments: dict[str, Any] = {"precision": precision, "of": of, "threads": threads, "stop": stop}
-        compute_arguments |= {"command": repeat_command, **drawing.arguments}
+        compute_arguments |= {"replace": replace, "command": repeat_command, **drawing.arguments}
         compute = partial(api_judge.run_judged_experiment, warnings=warnings, out=out, **compute_arguments)
         compute_each([experiment], compute, out, quiet, as_json)
 
@@ -111,6 +113,7 @@ def judge(
 @options.seed_option
 @options.set_option
 @options.out_option
+@options.replace_option
 @options.drawing_options
 @options.json_option
 def report(
@@ -119,6 +122,7 @@ def report(
     seed: int | None,
     overrides: tuple[str, ...],
     out: str,
+    replace: bool,
     drawing: options.Drawing,
     as_json: bool,
 ) -> None:
@@ -131,16 +135,21 @@ def report(
       radarsim report rls2
       radarsim report rls2 --json --no-figures
     """
-    from radarsim.api import load_experiments, stored_runs
+    from radarsim.api import load_experiments, replacement, stored_runs
 
     overrides = load_experiments.combine_overrides(overrides, realisations, seed)
 
     def write_stored_result(experiment: "Experiment", progress: object) -> "Result":
-        result = stored_runs.stored_result(experiment, out=out, overrides=overrides)
-        result.write(out, **drawing.arguments)
+        counts = {} if replace or realisations is None else replacement.larger_counts(experiment, out)
+        shown = replacement.with_counts(experiment, counts)
+        result = stored_runs.stored_result(shown, out=out, overrides=overrides)
+        result.write(out, replace=replace, **drawing.arguments)
         return result
 
-    compute_each(load_experiments.load_all(configs, overrides), write_stored_result, out, False, as_json)
+    loaded = load_experiments.load_all(configs, overrides)
+    if not replace:
+        check_replacements(loaded, out, as_json, ends_early=realisations is None)
+    compute_each(loaded, write_stored_result, out, False, as_json)
 
 
 @command_group.main.command()

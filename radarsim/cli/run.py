@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from radarsim.cli import command_group, options
-from radarsim.errors import ClusterError, DisagreementError, MeasureError, TargetUnmet
+from radarsim.errors import ClusterError, ConfigError, DisagreementError, MeasureError, TargetUnmet
 from radarsim.extensions import stop_rule
 from radarsim.language.translate import tr
 
@@ -35,6 +35,7 @@ STOP_RULE = stop_rule()
 @click.option("--workers", type=click.IntRange(1, 1024), metavar="N", help="Worker processes on this machine (Dask).")
 @click.option("--scheduler", metavar="ADDR", help="Address of a Dask scheduler whose workers compute: tcp://host:8786.")
 @options.out_option
+@options.replace_option
 @options.drawing_options
 @click.option("--runs", metavar="K1:K2|all", help="Also write runs.csv: each run's rms error over scans K1 to K2.")
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
@@ -53,6 +54,7 @@ def run(
     workers: int | None,
     scheduler: str | None,
     out: str,
+    replace: bool,
     drawing: options.Drawing,
     runs: str | None,
     quiet: bool,
@@ -63,6 +65,8 @@ def run(
     CONFIG is a YAML file, or the name of a shipped experiment (`radarsim list`). Finished blocks are kept under
     DIR/.blocks: a stopped run and a larger N continue from them, an edited config or filter starts afresh. If a time
     limit ends the run, or the precision is not reached, tables of the finished part are written and the exit code is 3.
+    A smaller N shows what is stored; tables of other settings or another seed need --replace. CONFIG may also be the
+    folder of a result, which is computed again from its own config.
 
     \b
     Examples
@@ -96,6 +100,8 @@ def run(
 
         overrides = load_experiments.combine_overrides(overrides, realisations, seed)
         loaded = _load_experiments(configs, overrides, None if precision is None else (precision, of), decide)
+        if not (shard or replace):
+            check_replacements(loaded, out, quiet, ends_early=precision is not None or decide)
         _print_user_code(loaded, quiet)
         if scheduler and not quiet and (line := executor.scheduler_warning(scheduler)):
             click.echo(f"note: {line}", err=True)
@@ -104,10 +110,31 @@ def run(
             compute_arguments |= {"time_limit": limit, "stop": stop}
             compute: Callable[..., Result | Shares]
             run_and_draw = partial(api_run.run, runs=runs, **drawing.arguments)
-            compute = partial(run_and_draw, overrides=overrides, precision=precision, of=of, decide=decide)
+            targets: dict[str, Any] = {"precision": precision, "of": of, "decide": decide}
+            compute = partial(run_and_draw, overrides=overrides, replace=replace, **targets)
             if shard:
                 compute = partial(api_run.run_share, share=shard)
             compute_each(loaded, partial(compute, **compute_arguments), out, quiet, as_json, gaps=not (shard or quiet))
+
+
+def check_replacements(loaded: "list[Experiment]", out: str, quiet: bool, ends_early: bool = False) -> None:
+    """Check before any runs that none replaces tables of something else, and say where stored realisations are shown
+    in place of fewer. ends_early: whether a run may end before its number of realisations. Raises ConfigError."""
+    from radarsim.api import replacement
+    from radarsim.cli import console
+
+    faults: list[str] = []
+    for experiment in loaded:
+        try:
+            replacement.check_replacement(experiment, out)
+            larger = {} if ends_early else replacement.larger_counts(experiment, out)
+        except ConfigError as error:
+            faults += error.lines
+            continue
+        if larger and not quiet:
+            console.print_error_line(tr("note: {words}", words=replacement.larger_counts_note(experiment, larger, out)))
+    if faults:
+        raise ConfigError(*faults)
 
 
 def refuse_quantity_without_precision(quantity: str, precision: float | None) -> None:

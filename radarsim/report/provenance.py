@@ -91,15 +91,6 @@ def outputs(folder: Path, name: str = "run.json") -> list[str]:
     return [path for path in earlier_outputs if isinstance(path, str)] if isinstance(earlier_outputs, dict) else []
 
 
-def replacement_warnings(folder: Path, experiment: Experiment) -> list[str]:
-    """A warning where a folder holds the results of another config of the same name."""
-    record = earlier_record(folder)
-    earlier_path, config_path = record.get("config_path"), path_of(experiment)
-    if not isinstance(earlier_path, str) or earlier_path == config_path or holds_results_of(folder, experiment):
-        return []
-    return [f"{folder}: held the results of another config of this name, {earlier_path}; they are replaced"]
-
-
 def holds_results_of(folder: Path, experiment: Experiment) -> bool:
     """Whether a folder holds the results of an experiment, with any seed and number of realisations."""
     return is_same_config(earlier_record(folder).get("resolved"), experiment.resolved)

@@ -491,5 +491,7 @@ def _ambiguity_sentences(results: Sequence[Result]) -> list[Sentence]:
     )
     if not all(can_fold(result.spec) for result in results):
         return [Sentence(assumption)]
-    advice = tr("With folded velocities: the same command with {setting}.", setting=f"--set {FOLDED_STUDY}")
+    advice = tr(
+        "With folded velocities: the same command with {setting}.", setting=f"--set {FOLDED_STUDY} --out folded"
+    )
     return [Sentence(assumption), Sentence(advice)]
