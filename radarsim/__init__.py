@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from radarsim.api.judge import judge
     from radarsim.api.result import Result
     from radarsim.api.run import run
-    from radarsim.api.stored_runs import stored_result as load
+    from radarsim.api.stored_result import load
     from radarsim.errors import ConfigError, RadarsimError
     from radarsim.papers.judge_interpretations import interpretations
     from radarsim.papers.list_claims import claims
@@ -67,7 +67,7 @@ _HOMES = {
     "compare": "api.compare:compare",
     "interpretations": "papers.judge_interpretations:interpretations",
     "judge": "api.judge:judge",
-    "load": "api.stored_runs:stored_result",
+    "load": "api.stored_result:load",
     "run": "api.run:run",
     "sensitivity": "api.design.sensitivity:sensitivity",
     "solve": "api.design.solve:solve",

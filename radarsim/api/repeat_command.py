@@ -28,7 +28,8 @@ def repeat_command(
         return f"radarsim run {CONFIG_FILE}"  # of the result, which stands beside it
     requested_counts = {case.name: case.realisations for case in experiment.cases}
     counts = {done_counts.get(name, 0) for name in requested_counts}
-    if all(done_counts.get(name) == count for name, count in requested_counts.items()):
+    is_done = all(done_counts.get(name) == count for name, count in requested_counts.items())
+    if is_done and not (len(counts) == 1 and _asks_for_others(overrides, max(counts))):
         return command(experiment, overrides, RESULTS)
     if len(counts) == 1:
         other_overrides = [text for text in overrides if text.partition("=")[0].strip() != "realisations"]
@@ -36,6 +37,12 @@ def repeat_command(
     if precision is not None:
         return command(experiment, overrides, RESULTS, precision)
     return "none: the run was stopped, its cases at different numbers of realisations, which are listed below"
+
+
+def _asks_for_others(overrides: Sequence[str], count: int) -> bool:
+    """Whether overrides ask for another number of realisations than this."""
+    values = [value for key, _, value in (text.partition("=") for text in overrides) if key.strip() == "realisations"]
+    return any(float(value) != count for value in values[-1:])
 
 
 def command(

@@ -7,9 +7,10 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.api import arguments, configs
+from radarsim.api import arguments, configs, dataset
 from radarsim.api.display import Displayable, ShortTuple
 from radarsim.api.replacement import check_counts, check_replacement
+from radarsim.api.result_config import config_text
 from radarsim.api.result_content import case_figures, case_tables, make_answer, question_text, with_first_baseline
 from radarsim.api.write_result import WrittenFiles, write_files
 from radarsim.config.experiment import Experiment
@@ -18,12 +19,14 @@ from radarsim.errors import DisagreementError, MeasureError
 from radarsim.extensions import extension_tables, extensions
 from radarsim.language.translate import plural, tr
 from radarsim.report import exact_check, provenance
+from radarsim.report.column_units import column_units
 from radarsim.report.row_notes import with_note_texts
 from radarsim.studies.registry import quantities, study
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
+    import xarray
 
     from radarsim.api.result_content import Answer
     from radarsim.report.drawing.model import Figure
@@ -97,7 +100,7 @@ class Result(Displayable):
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
         ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
-        return {name: with_note_texts(table) for name, table in self._tables.items()}
+        return {name: self._described(with_note_texts(table)) for name, table in self._tables.items()}
 
     @cached_property
     def _tables(self) -> dict:
@@ -114,12 +117,48 @@ class Result(Displayable):
         >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
         True
         """
-        return with_note_texts(self._tables["curves"])
+        return self._described(with_note_texts(self._tables["curves"]))
 
     @property
     def gains(self) -> "pd.DataFrame":
         """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
-        return with_note_texts(self._tables["gains"])
+        return self._described(with_note_texts(self._tables["gains"]))
+
+    @property
+    def config(self) -> str:
+        """The text of config.yaml: the whole experiment, which `run` takes; empty where no text describes it."""
+        return self._config
+
+    @cached_property
+    def _config(self) -> str:
+        return config_text(self.experiment, self.cases)
+
+    def _described(self, table: "pd.DataFrame") -> "pd.DataFrame":
+        """The table with the units of its columns, the seed and the config in its `attrs`."""
+        table.attrs.update(units=column_units(table.columns), seed=self.experiment.seed, config=self.config)
+        return table
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Curves and gains as a dataset of xarray, which must be installed.
+
+        Its dimensions are case, filter, component and scan k, of gains also baseline; it has times, units, seed and
+        config.
+
+        >>> import radarsim
+        >>> dataset = radarsim.run("rls2", realisations=2000).to_xarray()
+        >>> dict(dataset["sigma"].sizes)
+        {'case': 1, 'filter': 2, 'component': 3, 'k': 15}
+        """
+        return dataset.to_xarray(self._labelled_arrays())
+
+    def write_netcdf(self, path: str | os.PathLike[str]) -> None:
+        """Write what `to_xarray` has to a netCDF file, which needs no further package. Raises StoreError."""
+        dataset.write_netcdf(path, self._labelled_arrays())
+
+    def _labelled_arrays(self) -> "dataset.LabelledArrays":
+        attributes = {"title": self._label, "study": self.experiment.study, "config": self.config}
+        attributes |= {"seed": str(self.experiment.seed), "source": f"radarsim {provenance.versions()['radarsim']}"}
+        return dataset.labelled_arrays(self.curves, self.gains, attributes)
 
     @property
     def last_scan(self) -> "pd.DataFrame":

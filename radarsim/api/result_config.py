@@ -25,6 +25,6 @@ def config_files(
     return {} if written is None else {CONFIG_FILE: written.text.encode(), **written.files}
 
 
-def config_text(experiment: Experiment) -> str:
+def config_text(experiment: Experiment, results: Sequence[CaseResult] | None = None) -> str:
     """The text of config.yaml; empty where no text describes the experiment."""
-    return config_files(experiment).get(CONFIG_FILE, b"").decode()
+    return config_files(experiment, results).get(CONFIG_FILE, b"").decode()

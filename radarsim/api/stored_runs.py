@@ -56,6 +56,9 @@ def store_gap_sentence(experiment: Experiment, out: str | os.PathLike[str]) -> s
 def missing_realisations(stock: Inventory) -> str:
     """Which realisations a store lacks, and which shares these look like."""
     runs = shorten_names([tr("{first:,} to {last:,}", first=first, last=last) for first, last in stock.missing], 3)
+    if stock.part != (1, 1):
+        values = {"number": stock.part[0], "of": stock.part[1], "missing": stock.missing_blocks, "blocks": stock.blocks}
+        return tr("share {number} of {of}: {missing} of {blocks} pieces missing, {runs}", runs=runs, **values)
     if stock.shares is None:
         return tr("realisations {runs}", runs=runs)
     numbers, share_count = stock.shares

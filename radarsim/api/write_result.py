@@ -97,6 +97,8 @@ def write_files(
     draw_end = time.perf_counter()
     kept_config = config_files(experiment, results, taken=(*contents, *provenance.RECORD_FILES))
     contents |= kept_config
+    if data_files := [name for name in kept_config if name != CONFIG_FILE]:
+        run = {**run, "data_files": data_files}
     tables_by_name = {name: with_note_texts(table) for name, table in tables_by_name.items()}
     run = {
         **run,

@@ -190,7 +190,8 @@ def print_cost(experiment: "Experiment", outlook: "CostEstimate") -> None:
     ]
     for name, stock in started_cases[:MAX_STARTED_CASES]:
         values = {"stored": stock.stored, "asked": stock.requested, "missing": missing_realisations(stock)}
-        print_field(name, tr("{stored:,} of {asked:,} stored; missing: {missing}", **values))
+        whole = tr("{stored:,} of {asked:,} stored; missing: {missing}", **values)
+        print_field(name, whole if stock.part == (1, 1) else tr("{stored:,} of {asked:,} stored; {missing}", **values))
     if len(started_cases) > MAX_STARTED_CASES:
         print_line(tr("and {cases} more stored in part", cases=case_count_text(len(started_cases) - MAX_STARTED_CASES)))
     if outlook.precision is not None:

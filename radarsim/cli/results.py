@@ -153,6 +153,28 @@ def report(
 
 
 @command_group.main.command()
+@click.argument("result", metavar="RESULT", shell_complete=options.complete_config)
+@click.option("--netcdf", required=True, metavar="FILE", help="Write σ, bias, spread and gains to a netCDF file.")
+@options.out_option
+def export(result: str, netcdf: str, out: str) -> None:
+    """Export a stored result for other programs.
+
+    RESULT is the folder of a result, or the name of one in DIR. The arrays lie over case, filter, component and scan,
+    with times, units, seed and the whole config. Nothing is computed.
+
+    \b
+    Example
+      radarsim export results/rls2 --netcdf rls2.nc
+    """
+    from radarsim.api import result_folder, stored_result
+    from radarsim.cli import console
+
+    stored = result_folder.result_of(result, out)
+    stored_result.read_result(stored).write_netcdf(netcdf)
+    console.print_field("netcdf", netcdf)
+
+
+@command_group.main.command()
 @click.argument("sources", nargs=-1, required=True, metavar="A B…", shell_complete=options.complete_config)
 @options.out_option
 @options.drawing_options

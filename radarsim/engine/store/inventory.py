@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from radarsim.engine.blocks import Node, Partial, Total, Work, gaps, maximal_nodes, share_bound, share_of
 from radarsim.engine.store.store import Store
 
+MAX_MISSING_SHARES = 4  # more that are not copied are a single one that was interrupted
 CHANCE_LIMIT = 0.2  # probability at which missing blocks that end where shares do may do so by chance
 
 
@@ -16,13 +17,17 @@ class Inventory:
 
     missing: runs (first, last) of missing realisations. loose: whether there are blocks beyond a gap, or blocks that no
     run reported, as from shares or a killed run; shares then says which shares of how many are missing, as far as the
-    ends show."""
+    ends show. part: the share that was asked for, (2, 3) the second of three; (1, 1) the whole. blocks, missing_blocks:
+    how many it has, and lacks."""
 
     requested: int
     stored: int
     missing: tuple[tuple[int, int], ...]
     shares: tuple[tuple[int, ...], int] | None
     has_loose_blocks: bool
+    part: tuple[int, int] = (1, 1)
+    blocks: int = 0
+    missing_blocks: int = 0
 
 
 def take_inventory(
@@ -43,7 +48,11 @@ def take_inventory(
     stored = requested - sum(last + 1 - begin for begin, last in missing)
     beyond_gap = bool(runs) and any(node.first >= runs[0][1] for node in nodes)
     loose = beyond_gap or (stored > 0 and not any(isinstance(piece, Total) for piece in pieces))
-    return Inventory(requested, stored, missing, missing_shares(runs, blocks) if loose else None, loose)
+    shares = missing_shares(runs, blocks) if loose and part == (1, 1) else None
+    part_blocks = stop - first + (partial > 0)
+    return Inventory(
+        requested, stored, missing, shares, loose, part, part_blocks, sum(end - begin for begin, end in runs)
+    )
 
 
 def missing_shares(missing: Collection[tuple[int, int]], blocks: int) -> tuple[tuple[int, ...], int] | None:
@@ -58,5 +67,6 @@ def missing_shares(missing: Collection[tuple[int, int]], blocks: int) -> tuple[t
         chance += ((shares - 1) / blocks) ** len(ends)
         numbers = {share_bound(blocks, number, shares): number for number in range(shares + 1)}
         if chance <= CHANCE_LIMIT and all(end in numbers for run in missing for end in run):
-            return tuple(n for first, stop in missing for n in range(numbers[first] + 1, numbers[stop] + 1)), shares
+            lacking = tuple(n for first, stop in missing for n in range(numbers[first] + 1, numbers[stop] + 1))
+            return (lacking, shares) if len(lacking) <= MAX_MISSING_SHARES else None
     return None

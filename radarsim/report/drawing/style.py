@@ -61,7 +61,8 @@ STYLE: dict[Any, Any] = {  # Matplotlib names every key that it knows as a type 
     "lines.markeredgewidth": 0.7,
     "axes.formatter.useoffset": False,
     "svg.fonttype": "none",  # text that a journal can set and a reader can search
-    "pdf.fonttype": 42,
+    "pdf.fonttype": 42,  # fonts that a publisher can use
+    "ps.fonttype": 42,
 }
 
 
