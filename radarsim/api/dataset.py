@@ -132,3 +132,5 @@ def _create_variable(
     variable[:] = values
     for attribute, text in attributes.items():
         setattr(variable, attribute, text.encode())
+    if {"case", "component", "k"}.issubset(dimensions):
+        variable.coordinates = b"t_s unit"
