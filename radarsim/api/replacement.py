@@ -39,7 +39,7 @@ def check_counts(experiment: Experiment, done: Mapping[str, int], out: Path_) ->
     """Raise ConfigError if a case of these counts has fewer realisations than the tables that the folder holds."""
     record = _record(experiment, out)
     if record is not None and any(done.get(name, 0) < count for name, count in _counts(record).items()):
-        raise _refusal(record, experiment, out, tr("and this result has fewer"))
+        raise _refusal(record, experiment, out, tr("and this result would have fewer"))
 
 
 def larger_counts(experiment: Experiment, out: Path_) -> dict[str, int]:

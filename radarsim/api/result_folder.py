@@ -51,7 +51,7 @@ class ResultFolder:
 
     def table(self, name: str) -> "pd.DataFrame | None":
         """A table; None where the result has none of this name. Raises StoreError where it was altered."""
-        return stored_tables.read_table(self.folder, name, self.record["outputs"])
+        return stored_tables.read_table(self.folder, name, self.record["outputs"], whole_numbers=True)
 
 
 def find_result(path: str | os.PathLike[str]) -> ResultFolder | None:

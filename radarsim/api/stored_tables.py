@@ -68,7 +68,9 @@ def read_record(folder: Path) -> dict[str, Any] | None:
     raise StoreError(f"{path}: is no record of a run; {HOW_TO_REMAKE}")
 
 
-def read_table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFrame | None":
+def read_table(
+    folder: Path, name: str, outputs: "dict[str, str]", whole_numbers: bool = False
+) -> "pd.DataFrame | None":
     """A table of a folder whose run.json records these outputs; None where the run wrote none of this name. Raises
     StoreError where it cannot be read or differs from the record."""
     path = folder / f"{name}.csv"
@@ -81,6 +83,6 @@ def read_table(folder: Path, name: str, outputs: "dict[str, str]") -> "pd.DataFr
     if hashlib.sha256(text).hexdigest() != outputs[path.name]:
         raise StoreError(f"{path}: altered since it was written; {HOW_TO_REMAKE}")
     try:
-        return csv_text.from_csv(text)
+        return csv_text.from_csv(text, whole_numbers)
     except ValueError as error:
         raise StoreError(f"{path}: is no table; {HOW_TO_REMAKE}") from error

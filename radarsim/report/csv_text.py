@@ -36,12 +36,26 @@ def to_csv(table: "pd.DataFrame") -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def from_csv(content: bytes) -> "pd.DataFrame":
-    """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written. Raises ValueError where a
-    row has another length."""
+def from_csv(content: bytes, whole_numbers: bool = False) -> "pd.DataFrame":
+    """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written, whole ones as whole
+    numbers if asked for. Raises ValueError where a row has another length."""
     names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
     columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    return frame({name: _read(name, column) for name, column in zip(names, columns, strict=True)})
+    read = {name: (_read(name, column), column) for name, column in zip(names, columns, strict=True)}
+    if not whole_numbers:
+        return frame({name: values for name, (values, _) in read.items()})
+    return frame({name: _as_whole(values, column) for name, (values, column) in read.items()})
+
+
+def _as_whole(values: Sequence[str] | np.ndarray, column: Sequence[str]) -> Sequence[str] | np.ndarray:
+    """The values of a column as whole numbers, if they were written so: `to_csv` writes no other number without a
+    point."""
+    is_number = isinstance(values, np.ndarray) and len(values) > 0
+    return np.array(list(map(int, column))) if is_number and all(map(_is_whole, column)) else values
+
+
+def _is_whole(text: str) -> bool:
+    return text.removeprefix("-").isdigit()
 
 
 def read_rows(rows: Sequence[Mapping[Any, Any]], names: Iterable[str]) -> "pd.DataFrame":

@@ -16,7 +16,7 @@ from radarsim.report import page_sentences, page_tables, provenance
 from radarsim.studies.registry import study
 
 TABLES = {"curves.csv", "gains.csv", "steady.csv", "consistency.csv", "radar.csv"}
-TABLES |= {"claims.csv"}
+TABLES |= {"claims.csv", "config.yaml"}
 FIGURES = {f"figures/{k}_{c}.svg" for k in ("sigma", "gain") for c in ("r", "Vr", "ar")}
 FIGURES |= {"figures/consistency.svg", "figures/captions.md"}
 RUN = {"stop": "done", "threads": 2, "seconds": 1.5, "warnings": ["watch out"], "identities": {"rls2": "ab"}}

@@ -37,18 +37,13 @@ def test_two_configs_of_one_name_are_refused_together(tmp_path, second):
     assert len(load_experiments.load_all([one, one])) == 2
 
 
-def test_a_folder_of_another_configs_results_is_told(tmp_path):
+def test_a_config_of_the_same_name_does_not_replace_the_results_of_another(tmp_path):
     one = config(tmp_path / "a")
     other = config(tmp_path / "b", text=TEXT.replace("sigma_range_m: 250", "sigma_range_m: 260"))
-    first = radarsim.run(one, realisations=2000, out=tmp_path / "o", figures=False)
-    assert not first.warnings
-    again = radarsim.run(one, realisations=4000, overrides=["scans=12"], out=tmp_path / "o", figures=False)
-    assert not again.warnings
-    second = radarsim.run(other, realisations=2000, out=tmp_path / "o", figures=False)
-    assert second.warnings == [
-        f"{tmp_path / 'o' / 'mine'}: held the results of another config of this name, {one}; they are replaced"
-    ]
-    assert record(tmp_path / "o" / "mine")["warnings"] == second.warnings
+    radarsim.run(one, realisations=2000, out=tmp_path / "o", figures=False)
+    with pytest.raises(ConfigError, match="of other settings: radar.sigma_range_m 250, not 260"):
+        radarsim.run(other, realisations=2000, out=tmp_path / "o", figures=False)
+    assert not radarsim.run(other, realisations=2000, out=tmp_path / "o", figures=False, replace=True).warnings
 
 
 def test_a_moved_config_of_the_same_content_is_no_other(tmp_path):

@@ -50,7 +50,8 @@ def test_a_precision_ends_at_the_first_look_that_reaches_it(tmp_path):
     command("run", "rls2", "-n", 8_000, *PLAIN, "--out", tmp_path / "plain")
     assert csv_bytes(tmp_path / "plain" / "rls2") == csv_bytes(tmp_path / "rls2")
     command("run", "rls2", "-n", "1e5", *PLAIN, "--out", tmp_path / "more")  # what is stored changes nothing
-    command("run", "rls2", "-n", "1e6", "--precision", 2, "--threads", 3, *PLAIN, "--out", tmp_path / "more")
+    further = ("--threads", 3, "--replace")
+    command("run", "rls2", "-n", "1e6", "--precision", 2, *further, *PLAIN, "--out", tmp_path / "more")
     assert record(tmp_path / "more" / "rls2")["realisations_done"] == 8_000
 
 

@@ -311,10 +311,10 @@ def test_a_file_that_it_first_reads_in_a_later_batch_ends_the_run_with_the_cure(
     assert "name it by a text in" in said
     before = identity()
     reading_filter(step=late, identity="1 of late.txt")
-    run("out")
+    run("out", "--replace")
     assert identity() != before
     reading_filter(step=late, nets=["late.txt"])
-    run("out")
+    run("out", "--replace")
     assert "identity" not in record(place / "out/mine")["resolved"]["cases"][0]["filters"][2]
     Path("late.txt").write_text("2")
     run("out")

@@ -1,0 +1,123 @@
+"""Nothing shrinks in silence: which results take the place of others, and what is said."""
+
+import re
+import shlex
+import shutil
+
+import pytest
+
+import radarsim
+from radarsim.errors import ConfigError
+from tests.program import command, csv_bytes
+
+QUIET = ("--no-figures", "-q")
+
+
+@pytest.fixture
+def out(tmp_path):
+    """A results directory with a run of 4000 realisations."""
+    command("run", "rls2", "-n", 4000, "--out", tmp_path / "out", *QUIET)
+    return tmp_path / "out"
+
+
+@pytest.mark.parametrize(
+    ("options", "difference"),
+    [
+        (("--seed", 3), "of seed 2017, not 3"),
+        (("--set", "radar.sigma_range_m=100"), "of other settings: radar.sigma_range_m 250, not 100"),
+        (("--set", "filters.0.manoeuvre_variance=1"), "of other settings: filters.0.manoeuvre_variance 0.001, not 1"),
+        (("--set", "sweep.scans=[10,12]"), "of other settings: other cases, such as rls2 scans=10"),
+        (
+            ("--set", "study=ambiguous_doppler", "--set", "radar.repetition_rate_hz=1000"),
+            "of study range_doppler, not ambiguous_doppler",
+        ),
+    ],
+)
+def test_other_results_need_replace(options, difference, out):
+    before = csv_bytes(out / "rls2")
+    fault = command("run", "rls2", *options, "--out", out, *QUIET, code=2).stderr
+    assert f"{out / 'rls2'} holds tables of 4,000 realisations {difference}" in fault
+    assert csv_bytes(out / "rls2") == before
+    back = re.search("`(.*)` brings them back", fault)[1]
+    command("run", "rls2", *options, "-n", 2000, "--replace", "--out", out, *QUIET)
+    assert csv_bytes(out / "rls2") != before
+    command(*shlex.split(back)[1:], *QUIET)
+    assert csv_bytes(out / "rls2") == before
+
+
+def test_where_no_command_brings_them_back_a_copy_is_advised(tmp_path):
+    config = radarsim_config(tmp_path, 250)
+    command("run", config, "-n", 2000, "--out", tmp_path / "out", *QUIET)
+    radarsim_config(tmp_path, 260)
+    fault = command("run", config, "-n", 2000, "--out", tmp_path / "out", *QUIET, code=2).stderr
+    folder = tmp_path / "out" / "mine"
+    assert f"`cp -r {folder} {folder}-before` keeps them" in fault
+
+
+def radarsim_config(folder, sigma_range_m):
+    text = f"include: [rls2]\nradar: {{sigma_range_m: {sigma_range_m}}}\n"
+    (folder / "mine.yaml").write_text(text)
+    return folder / "mine.yaml"
+
+
+@pytest.mark.parametrize(
+    "options", [("-n", 2000), ("-n", 32_000, "--precision", 50), ("-n", 10**7, "--time-limit", 0.001)]
+)
+def test_fewer_realisations_show_those_that_are_stored(options, out):
+    before = csv_bytes(out / "rls2")
+    command("run", "rls2", *options, "--out", out, *QUIET, code=3 if "--time-limit" in options else 0)
+    after = csv_bytes(out / "rls2")
+    assert radarsim.load(out / "rls2").cases[0].count >= 4000
+    assert after == before
+
+
+def test_a_note_says_that_more_are_shown(out):
+    note = command("run", "rls2", "-n", 2000, "--out", out, "--no-figures").stderr
+    assert f"note: rls2: 4,000 realisations are stored in {out} and shown in place of 2,000" in note
+    assert "note" not in command("run", "rls2", "-n", 4000, "--out", out, "--no-figures").stderr
+    assert "4,000 realisations" in command("report", "rls2", "-n", 2000, "--out", out, "--no-figures").stderr
+    command("run", "rls2", "-n", 2000, "--replace", "--out", out, *QUIET)
+    assert radarsim.load(out / "rls2").cases[0].count == 2000
+
+
+def test_without_blocks_fewer_realisations_need_replace(out):
+    before = csv_bytes(out / "rls2")
+    shutil.rmtree(out / ".blocks")
+    assert "whose blocks are not stored" in command("run", "rls2", "-n", 2000, "--out", out, *QUIET, code=2).stderr
+    assert csv_bytes(out / "rls2") == before
+
+
+def test_more_realisations_of_the_same_extend(out):
+    command("run", "rls2", "-n", 6000, "--out", out, *QUIET)
+    assert radarsim.load(out / "rls2").cases[0].count == 6000
+
+
+def test_all_configs_are_refused_before_any_runs(out):
+    command("run", "rls3", "rls2", "--seed", 5, "-n", 2000, "--out", out, *QUIET, code=2)
+    assert not (out / "rls3").exists()
+
+
+def test_python_asks_too(out):
+    with pytest.raises(ConfigError, match=r"replace=True to replace them"):
+        radarsim.run("rls2", seed=3, out=out, figures=False)
+    result = radarsim.run("rls2", seed=3, realisations=2000)
+    with pytest.raises(ConfigError, match="of seed 2017, not 3"):
+        result.write(out, figures=False)
+    result.write(out, figures=False, replace=True)
+    assert radarsim.load(out / "rls2").experiment.seed == 3
+
+
+def test_a_judged_filter_replaces_no_judgement_of_more(out):
+    def judge(count, **options):
+        radarsim.judge("rls2", lambda plots: plots["range_m"], realisations=count, out=out, figures=False, **options)
+
+    judge(600)
+    judge(700)
+    with pytest.raises(ConfigError, match=r"rls2_mine holds tables of 700 realisations .* would have fewer"):
+        judge(500)
+    judge(500, replace=True)
+
+
+def test_the_advised_study_goes_to_another_directory(out):
+    answer = radarsim.load(out / "rls2").answer
+    assert any("--set study=ambiguous_doppler --out folded" in line for line in answer) or len(answer) < 4

@@ -1,0 +1,111 @@
+"""`radarsim.load` of a folder, from blocks or from tables alone, and what a result gives to other programs."""
+
+import shutil
+
+import numpy as np
+import pytest
+from scipy.io import netcdf_file
+
+import radarsim
+from radarsim.errors import ConfigError, StoreError
+from tests.program import command
+
+xarray = pytest.importorskip("xarray")
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    out = tmp_path_factory.mktemp("results")
+    return radarsim.run("rls2", overrides=["radar.sigma_range_m=200"], realisations=2000, out=out, figures=False)
+
+
+@pytest.fixture(params=["blocks", "tables"])
+def folder(ran, request, tmp_path):
+    """The folder of a result, with its blocks beside it or without."""
+    if request.param == "blocks":
+        return ran.written.folder
+    shutil.copytree(ran.written.folder, tmp_path / "moved")
+    return tmp_path / "moved"
+
+
+def test_a_folder_suffices(ran, folder):
+    loaded = radarsim.load(folder)
+    assert {name: len(table) for name, table in loaded.tables.items() if len(table)} == {
+        name: len(table) for name, table in ran.tables.items() if len(table)
+    }
+    assert loaded.curves.equals(ran.curves)
+    assert loaded.gains.equals(ran.gains)
+    assert loaded.last_scan.equals(ran.last_scan)
+    assert (loaded.answer, loaded.question, loaded.config) == (ran.answer, ran.question, ran.config)
+    assert [(case.name, case.count) for case in loaded.cases] == [("rls2", 2000)]
+    assert repr(loaded) == repr(ran)
+    assert "<table" in loaded._repr_html_()
+
+
+def test_a_name_needs_no_overrides(ran):
+    loaded = radarsim.load("rls2", out=ran.written.folder.parent)
+    assert loaded.curves.equals(ran.curves)
+    assert loaded.figure("sigma_r")
+
+
+def test_without_blocks_figures_and_writing_say_what_they_need(ran, tmp_path):
+    shutil.copytree(ran.written.folder, tmp_path / "moved")
+    loaded = radarsim.load(tmp_path / "moved")
+    assert loaded.figures == ()
+    with pytest.raises(ConfigError, match="figures need the stored blocks"):
+        loaded.figure("sigma_r")
+    with pytest.raises(ConfigError, match="copy the folder"):
+        loaded.write(tmp_path)
+
+
+def test_an_altered_table_is_refused(ran, tmp_path):
+    shutil.copytree(ran.written.folder, tmp_path / "moved")
+    with open(tmp_path / "moved" / "gains.csv", "a") as file:
+        file.write("\n")
+    with pytest.raises(StoreError, match="altered since it was written"):
+        radarsim.load(tmp_path / "moved").gains  # noqa: B018
+
+
+def test_tables_say_their_units_seed_and_config(folder):
+    attributes = radarsim.load(folder).gains.attrs
+    percentages = ("gain_percent", "gain_lo", "gain_hi", "exact_percent")
+    assert attributes["units"] == {"t_s": "s", **dict.fromkeys(percentages, "%")}
+    assert attributes["seed"] == 2017
+    assert "sigma_range_m: 200" in attributes["config"]
+
+
+def test_a_dataset_has_the_numbers_of_the_tables(ran, folder):
+    dataset = radarsim.load(folder).to_xarray()
+    for row in ran.curves.sample(20, random_state=1).to_dict("records"):
+        cell = dataset.sel({name: row[name] for name in ("case", "filter", "component", "k")})
+        assert float(cell["sigma"]) == row["sigma"]
+        assert (float(cell["t_s"]), str(cell["unit"].values)) == (row["t_s"], row["unit"])
+    assert dataset["gain_percent"].attrs == {"units": "%"}
+    assert dataset.attrs["seed"] == "2017"
+    assert dataset["gain_percent"].count() == len(ran.gains)
+
+
+def test_the_netcdf_file_is_the_dataset(ran, folder, tmp_path):
+    command("export", folder, "--netcdf", tmp_path / "a.nc")
+    with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as read:
+        xarray.testing.assert_identical(read.load().drop_attrs(), ran.to_xarray().drop_attrs())
+        assert read.attrs["config"] == ran.config
+    with netcdf_file(tmp_path / "a.nc", mmap=False) as file:
+        assert np.array_equal(file.variables["t_s"][0], 10.0 * np.arange(15))
+        assert b"".join(file.variables["unit"][1]).rstrip(b"\0") == b"m/s"
+
+
+def test_export_of_nothing_says_where_it_looked(tmp_path):
+    fault = command("export", "rls2", "--out", tmp_path, "--netcdf", tmp_path / "a.nc", code=2).stderr
+    assert "no result: there is no run.json in rls2" in fault
+    assert not (tmp_path / "a.nc").exists()
+
+
+@pytest.mark.parametrize("kind", ["pdf", "eps"])
+def test_a_saved_figure_embeds_true_type_fonts(ran, kind, tmp_path):
+    path = tmp_path / f"a.{kind}"
+    ran.figure("sigma_r").savefig(path)
+    data = path.read_bytes()
+    assert (b"/FontType 42" if kind == "eps" else b"/CIDFontType2") in data
+    assert b"/Type3" not in data
+    assert b"/FontType 3" not in data
