@@ -265,7 +265,7 @@ def test_check_says_what_is_stored_what_is_missing_and_how_long_it_takes(shares,
     (case,) = document["cases"]
     assert case["stock"] == {
         **{"asked": 100_000, "stored": 67_232, "missing": [[32_768, 65_535]]},
-        **{"shares": [[2], 3], "loose": True},
+        **{"shares": [[2], 3], "loose": True, "part": [1, 1], "blocks": 25, "missing_blocks": 8},
     }
     whole = json.loads(command("check", "rls2", "-n", "1e5", "--json").stdout)[0]["cases"][0]
     assert whole["stock"] is None
@@ -280,6 +280,16 @@ def test_check_says_what_is_stored_what_is_missing_and_how_long_it_takes(shares,
     assert part["realisations"] == 32_768
     assert_rounded(part["seconds"], 0.32768 * whole["seconds"], operations=3)
     assert "share    1 of 3\ntotal    1 case, 32,768 realisations, under a second on " in command(*empty).stdout
+
+
+def test_a_share_that_was_interrupted_is_named_as_it_was_asked_for(shares, tmp_path):
+    united(shares, tmp_path, 1, 3)
+    for number in (9, 10, 11):  # the first three of the eight blocks of the second share
+        command("run", "rls2", "-n", "1e5", "--shard", f"{number}/25", "--out", tmp_path, "-q")
+    ask = ("check", "rls2", "-n", "1e5", "--out", tmp_path)
+    assert "share" not in command(*ask).stdout
+    asked = "12,288 of 32,768 stored; share 2 of 3: 5 of 8 pieces missing, realisations 45,056 to 65,535\n"
+    assert asked in command(*ask, "--shard", "2/3").stdout
 
 
 @pytest.mark.slow

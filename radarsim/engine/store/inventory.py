@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from radarsim.engine.blocks import Node, Partial, Total, Work, gaps, maximal_nodes, share_bound, share_of
 from radarsim.engine.store.store import Store
@@ -25,9 +25,9 @@ class Inventory:
     missing: tuple[tuple[int, int], ...]
     shares: tuple[tuple[int, ...], int] | None
     has_loose_blocks: bool
-    part: tuple[int, int] = (1, 1)
-    blocks: int = 0
-    missing_blocks: int = 0
+    part: tuple[int, int] = field(default=(1, 1), compare=False)
+    blocks: int = field(default=0, compare=False)
+    missing_blocks: int = field(default=0, compare=False)
 
 
 def take_inventory(
