@@ -41,7 +41,7 @@ def test_a_config_of_the_same_name_does_not_replace_the_results_of_another(tmp_p
     one = config(tmp_path / "a")
     other = config(tmp_path / "b", text=TEXT.replace("sigma_range_m: 250", "sigma_range_m: 260"))
     radarsim.run(one, realisations=2000, out=tmp_path / "o", figures=False)
-    with pytest.raises(ConfigError, match="of other settings: radar.sigma_range_m 250, not 260"):
+    with pytest.raises(ConfigError, match=r"of other settings: radar\.sigma_range_m 250, not 260"):
         radarsim.run(other, realisations=2000, out=tmp_path / "o", figures=False)
     assert not radarsim.run(other, realisations=2000, out=tmp_path / "o", figures=False, replace=True).warnings
 
