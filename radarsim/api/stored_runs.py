@@ -57,10 +57,9 @@ def missing_realisations(stock: Inventory) -> str:
     """Which realisations a store lacks, and which shares these look like."""
     runs = shorten_names([tr("{first:,} to {last:,}", first=first, last=last) for first, last in stock.missing], 3)
     if stock.part != (1, 1):
-        values = {"number": stock.part[0], "of": stock.part[1], "missing": stock.missing_blocks, "blocks": stock.blocks}
-        return tr(
-            "share {number} of {of}: {missing} of {blocks} pieces missing, realisations {runs}", runs=runs, **values
-        )
+        number, of = stock.part
+        counts = {"number": number, "of": of, "missing": stock.missing_blocks, "blocks": stock.blocks, "runs": runs}
+        return tr("share {number} of {of}: {missing} of {blocks} pieces missing, realisations {runs}", **counts)
     if stock.shares is None:
         return tr("realisations {runs}", runs=runs)
     numbers, share_count = stock.shares

@@ -8,7 +8,9 @@ written directly. Directories and disks are refused."""
 import csv
 import errno
 import io
+import json
 import os
+import shutil
 import stat
 import threading
 import time
@@ -30,10 +32,12 @@ except ImportError:  # not a POSIX system: nothing is locked
     fcntl = None
 
 WAIT_S, LOOK_S = 60.0, 0.02
+PENDING, ORDER = ".pending", ".order.json"  # folder of files that are being moved into place; which, in their order
 
 
 def read(path: str | os.PathLike) -> bytes:
     """The content of a regular file. OSError, without waiting, for a pipe, a device or a directory in its place."""
+    _finish_replacement(Path(path).parent)
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))  # or a pipe would wait for a writer
     with open(descriptor, "rb") as file:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -44,36 +48,62 @@ def read(path: str | os.PathLike) -> bytes:
 def replace_all(
     folder: Path, contents: Mapping[str, bytes], stale: Callable[[Path], Iterable[str]] = lambda folder: ()
 ) -> None:
-    """Write contents (relative path: bytes) below folder: all under temporary names first, then renamed in their order.
+    """Write contents (relative path: bytes) below folder: all into a temporary folder first, then moved into place.
 
-    So a full disk leaves the outputs of an earlier run unchanged. Renaming is done under a lock, so that of two writers
-    of one folder only the last one's files remain. Paths returned by `stale` below the folder, and not among the
-    contents, are removed. Raises StoreError."""
+    So a full disk leaves the outputs of an earlier run unchanged, and a process that ends at any moment leaves either
+    these or all of the new ones: moves that it had begun are finished by whoever next reads or writes the folder.
+    Moving is done under a lock, so that of two writers of one folder only the last one's files remain. Paths returned
+    by `stale` below the folder, and not among the contents, are removed. Raises StoreError."""
     folder = Path(folder)
     _refuse_twins(folder, contents)
-    written: dict[Path, Path] = {}
+    staging = temporary_path(folder / PENDING.strip("."))
     try:
         try:
+            make_readable_folder(folder)
             for name, data in contents.items():
-                temporary = written[folder / name] = temporary_path(folder / name)
-                make_readable_folder(temporary.parent)
-                with create_readable_file(temporary) as file:
+                make_readable_folder((folder / name).parent)
+                make_readable_folder((staging / name).parent)
+                with create_readable_file(staging / name) as file:
                     file.write(data)
             with folder_lock(folder):
-                removed_names = set(stale(folder)) - set(contents)
-                for path, temporary in written.items():
-                    _refuse_special(path)
-                    rename(temporary, path)
-                for name in removed_names:
-                    if not Path(name).is_absolute() and ".." not in Path(name).parts:
-                        (folder / name).unlink(missing_ok=True)
+                _finish_replacement(folder)
+                for name in contents:
+                    _refuse_special(folder / name)
+                removed = sorted(set(stale(folder)) - set(contents))
+                with create_readable_file(staging / ORDER) as file:
+                    file.write(json.dumps({"moved": list(contents), "removed": removed}).encode())
+                os.rename(staging, folder / PENDING)
+                _finish_replacement(folder)
         finally:
-            for temporary in written.values():
-                temporary.unlink(missing_ok=True)
+            shutil.rmtree(staging, ignore_errors=True)
     except OSError as error:
-        destinations = {str(temporary): path for path, temporary in written.items()}  # of the temporary files
-        file_name = destinations.get(str(error.filename), error.filename or folder)
+        file_name = str(error.filename or folder).replace(f"{staging.name}{os.sep}", "")
         raise StoreError(f"{file_name}: cannot be written: {error.strerror or error}") from error
+
+
+def _finish_replacement(folder: Path) -> None:
+    """Move the files of a replacement that was begun into their places, if there is one."""
+    pending = folder / PENDING
+    if not pending.is_dir():
+        return
+    with folder_lock(folder):
+        try:
+            order = json.loads((pending / ORDER).read_bytes())
+        except FileNotFoundError:  # all is moved already
+            shutil.rmtree(pending, ignore_errors=True)
+            return
+        for name in filter(_is_inside, order["moved"]):
+            if (pending / name).is_file():
+                rename(pending / name, folder / name)
+        for name in filter(_is_inside, order["removed"]):
+            (folder / name).unlink(missing_ok=True)
+        (pending / ORDER).unlink()
+        shutil.rmtree(pending)
+
+
+def _is_inside(name: str) -> bool:
+    """Whether a path from a folder leads nowhere outside it."""
+    return not Path(name).is_absolute() and ".." not in Path(name).parts
 
 
 def create(path: Path, data: bytes) -> None:

@@ -3,6 +3,8 @@
 import re
 import shlex
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -121,3 +123,56 @@ def test_a_judged_filter_replaces_no_judgement_of_more(out):
 def test_the_advised_study_goes_to_another_directory(out):
     answer = radarsim.load(out / "rls2").answer
     assert any("--set study=ambiguous_doppler --out folded" in line for line in answer) or len(answer) < 4
+
+
+KILLED = """
+import os, sys
+from pathlib import Path
+from radarsim.report import atomic_files
+
+NAMES = ("a.csv", "b/c.svg", "run.json")
+STATES = {"old": [*NAMES, "stale.csv"], "new": [*NAMES, "d/e.svg"]}
+REAL = {name: getattr(os, name) for name in ("rename", "replace", "unlink", "mkdir", "rmdir", "open")}
+
+def put(folder, state, stale=()):
+    contents = {name: state.encode() for name in STATES[state]}
+    atomic_files.replace_all(folder, contents, stale=lambda folder: stale)
+
+def killed_before_call(n):
+    calls = iter(range(n))
+    def killing(function):
+        def call(*arguments, **options):
+            if next(calls, None) is None:
+                os._exit(9)
+            return function(*arguments, **options)
+        return call
+    for name, function in REAL.items():
+        setattr(os, name, killing(function))
+
+for n in range(200):
+    folder = Path(sys.argv[1], str(n))
+    put(folder, "old")
+    if not (child := os.fork()):
+        killed_before_call(n)
+        put(folder, "new", ["stale.csv"])
+        os._exit(0)
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    states = {atomic_files.read(folder / name).decode() for name in NAMES}
+    (state,) = states
+    assert (folder / "stale.csv").exists() == (state == "old") != (folder / "d/e.svg").exists(), (n, state)
+    put(folder, "new", ["stale.csv"])
+    assert {path.name for path in folder.iterdir() if not path.name.endswith(".tmp")} == {"a.csv", "b", "d", "run.json"}
+    print(state)
+    if status == 0:
+        break
+"""
+
+
+def test_a_kill_at_any_moment_leaves_all_of_the_old_or_all_of_the_new(tmp_path):
+    script = [sys.executable, "-c", KILLED, tmp_path]
+    ended = subprocess.run(script, capture_output=True, text=True, timeout=60)
+    assert not ended.stderr
+    states = ended.stdout.split()
+    assert len(states) > 20
+    assert states == sorted(states, reverse=True)
+    assert set(states) == {"old", "new"}
