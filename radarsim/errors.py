@@ -48,6 +48,12 @@ class TargetUnmet(RadarsimError):
     exit_code = 3
 
 
+class NotChecked(RadarsimError):
+    """What was to be checked could not be; nothing else was found wrong."""
+
+    exit_code = 3
+
+
 class ClusterError(TargetUnmet):
     """The cluster was lost during the run: what was done is stored, the rest is not done."""
 

@@ -64,6 +64,7 @@ class Extension:
     command_sections: Mapping[str, Sequence[str]] = {}  # titles and names of these commands in `radarsim --help`
     figure_names: Sequence[str] = ()  # figures that it adds to results of any study
     table_names: Sequence[str] = ()  # tables that it adds, which its section of the report shows
+    columns_from_elsewhere: Mapping[str, Sequence[str]] = {}  # of its tables: not of the result's own sums
     stop_rule: StopRule | None = None
 
     def study_label(self, study: Any) -> str:

@@ -2,13 +2,14 @@
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
-from radarsim.api import stored_tables
+from radarsim.api import configs, stored_tables
 from radarsim.api.configs import load
 from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Case, Experiment
-from radarsim.errors import RadarsimError
+from radarsim.errors import ConfigError, RadarsimError
 from radarsim.report import provenance
 
 LABEL_KEYS = ("case", "swept")  # of a resolved case: no keys of a config
@@ -24,6 +25,35 @@ def stored_experiment(record: Mapping, folder: Path) -> Experiment | None:
         return experiment if provenance.is_same_config(record["resolved"], experiment.resolved) else None
     except (RadarsimError, LookupError, TypeError):
         return None
+
+
+def recomputable_experiment(record: Mapping, folder: Path) -> Experiment:
+    """The experiment of a result with the realisations of each case that its tables hold. Where an earlier version
+    wrote no config.yaml, its cases are as run.json resolved them. Raises ConfigError where it cannot be read."""
+    if CONFIG_FILE in record["outputs"]:
+        experiment = stored_experiment(record, folder)
+        if experiment is None:
+            load(folder / CONFIG_FILE)  # which says why
+            raise ConfigError(f"{folder / CONFIG_FILE}: is not the config of this result")
+    else:
+        cases = [_recorded_case(folder, record, resolved) for resolved in record["resolved"]["cases"]]
+        file = configs.shipped_file(record["config"])
+        path = str(file) if file else None
+        experiment = Experiment(record["config"], record["study"], path, tuple(cases), 0, record["seed"])
+    done = {name: case["done"] for name, case in record["cases"].items()}
+    if unknown := sorted({*done} - {case.name for case in experiment.cases}):
+        raise ConfigError(f"{folder}: its config has no case {unknown[0]}")
+    counted = [replace(case, realisations=done.get(case.name, 0)) for case in experiment.cases]
+    return replace(experiment, cases=tuple(counted))
+
+
+def _recorded_case(folder: Path, record: Mapping, resolved: Mapping) -> Case:
+    """A case of a result without a config."""
+    case = stored_case(record, resolved["case"])
+    if case is None:
+        raise ConfigError(f"{folder}: {resolved['case']}: this version does not read its config")
+    swept = tuple(resolved["swept"].items())
+    return replace(case, name=resolved["case"], stem=record["config"], swept_values=swept)
 
 
 def stored_case(record: Mapping, name: str, experiment: Experiment | None = None) -> Case | None:

@@ -4,7 +4,7 @@ import click
 
 from radarsim.cli.command_group import main
 from radarsim.cli.options import Count, json_option, out_option, seed_option, set_option
-from radarsim.errors import StoreError
+from radarsim.errors import NotChecked, StoreError
 
 
 @main.command(name="list")
@@ -79,15 +79,18 @@ def compile_(configs: tuple[str, ...], as_json: bool) -> None:
 
 @main.command()
 @click.argument("result", required=False, metavar="[RESULT]")
-@click.option("--recompute", type=Count(), default=0, metavar="N", help="Recompute N stored pieces of each case.")
+@click.option(
+    "--recompute", type=Count(), default=0, metavar="N", help="Recompute N pieces of each case; compare tables."
+)
 @json_option
 def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     """Test this machine, or check that a stored RESULT is intact.
 
     RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block against its
-    checksum, every total against its blocks; --recompute recomputes the N smallest pieces of each case. If there is
-    damage, each file is named and the exit code is 4: `radarsim run` computes what is missing, `radarsim report`
-    rewrites tables.
+    checksum, every total against its blocks. --recompute recomputes the N smallest pieces of each case, or a case
+    without blocks from the config, and compares the tables. If there is damage, each file is named and the exit code is
+    4: `radarsim run` computes what is missing, `radarsim report` rewrites tables. What could not be checked is said
+    last: exit code 3.
 
     \b
     Examples
@@ -99,8 +102,9 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     from radarsim.api import json_output, run_facts
     from radarsim.api.maintenance import doctor as maintenance_doctor
     from radarsim.api.maintenance import self_test
-    from radarsim.cli import console, print_results
+    from radarsim.cli import console, print_results, progress
 
+    not_checked: list[str] = []
     if result is None:
         facts = maintenance_doctor.machine()
         if not as_json:
@@ -113,7 +117,9 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
         console.print_warnings(run_facts.cache_troubles())
         faults = [f"self-test: {verdict.study}: {verdict.words}" for verdict in verdicts if not verdict.good]
     else:
-        inspection = maintenance_doctor.inspect_result(result, recompute)
+        with progress.Progress("doctor", quiet=as_json) as bar:
+            inspection = maintenance_doctor.inspect_result(result, recompute, bar.update)
+        not_checked = inspection.not_checked
         if as_json:
             click.echo(json_output.text(json_output.fields(inspection)))
         else:
@@ -121,6 +127,8 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
         faults = inspection.faults
     if faults:
         raise StoreError(*faults)
+    if not_checked:
+        raise NotChecked(f"tables agree with their record; {'; '.join(not_checked)}")
 
 
 @main.command()

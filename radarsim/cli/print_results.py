@@ -264,17 +264,33 @@ def print_inspection(inspection: "Inspection") -> None:
     print_line(
         tr("{folder}: {outputs} and {pieces} checked", folder=str(inspection.folder), outputs=outputs, pieces=pieces)
     )
-    if inspection.recomputed:
-        pieces = plural("{count} piece", "{count} pieces", len(inspection.recomputed))
-        count = plural("{count:,} realisation", "{count:,} realisations", inspection.realisations)
-        print_line(tr("computed again: {pieces}, {realisations}", pieces=pieces, realisations=count))
+    print_recomputed(inspection)
     for note in inspection.notes:
         print_line(tr("note: {words}", words=note))
-    print_line(
-        tr("all intact")
-        if not inspection.faults
-        else plural("{count} fault found", "{count} faults found", len(inspection.faults))
-    )
+    if inspection.faults:
+        print_line(plural("{count} fault found", "{count} faults found", len(inspection.faults)))
+    elif not inspection.not_checked:
+        print_line(tr("all intact"))
+
+
+def print_recomputed(inspection: "Inspection") -> None:
+    """How much of a result was computed again, and which tables were compared."""
+    if not inspection.realisations:
+        return
+    parts = [plural("{count} piece", "{count} pieces", len(inspection.recomputed))] * bool(inspection.recomputed)
+    if inspection.from_config:
+        parts.append(tr("{cases} from the config", cases=shorten_names(inspection.from_config, 3)))
+    values = {"done": inspection.realisations, "total": inspection.total, "pieces": join_names(parts)}
+    values["percent"] = significant_share(inspection.realisations, inspection.total)
+    print_line(tr("computed again: {pieces}: {done:,} of {total:,} realisations ({percent} %)", **values))
+    if inspection.tables and not inspection.faults:
+        count = plural("{count} table", "{count} tables", len(inspection.tables))
+        print_line(tr("compared: {tables} made from the sums, equal to those stored", tables=count))
+
+
+def significant_share(part: int, whole: int) -> str:
+    """A share in per cent, rounded down, so that only the whole is 100."""
+    return numeral(f"{math.floor(1000 * part / whole) / 10:g}") if whole else "0"
 
 
 def print_removed_blocks(cleaned: "RemovedBlocks", dry_run: bool) -> None:

@@ -48,6 +48,7 @@ class PapersExtension(Extension):
     command_sections: Mapping[str, Sequence[str]] = {"The papers": ("claims", "interpretations")}
     figure_names = (CLAIMS,)
     table_names = (CLAIMS,)
+    columns_from_elsewhere: Mapping[str, Sequence[str]] = {CLAIMS: ("overall", "class", "as_shipped")}
     stop_rule = UntilDecided()
 
     def study_label(self, study: Any) -> str:

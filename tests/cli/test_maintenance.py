@@ -1,5 +1,6 @@
 """`radarsim doctor` and `radarsim clean`: every damage named, nothing but blocks removed."""
 
+import hashlib
 import json
 import math
 import os
@@ -185,7 +186,47 @@ def test_blocks_that_another_user_may_have_written_are_named_by_doctor_and_repor
 def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
     monkeypatch.setattr(case_work.CaseWork, "identity", "ab12")
     command("doctor", out / "rls2")
-    assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=2).stderr
+    assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=3).stderr
+
+
+NO_BLOCKS = "tables agree with their record; nothing could be recomputed: no blocks are stored"
+
+
+def test_a_copied_folder_says_last_that_nothing_could_be_recomputed(out, tmp_path):
+    copy = shutil.copytree(out / "rls2", tmp_path / "copy" / "rls2")
+    told = command("doctor", copy, code=3)
+    assert told.stderr == f"{NO_BLOCKS}\n"
+    assert "intact" not in told.stdout
+    found = command("doctor", copy, "--json", code=3)
+    assert json.loads(found.stdout)["not_checked"] == ["nothing could be recomputed: no blocks are stored"]
+    (copy / "curves.csv").write_text("other")
+    assert "altered since it was written" in command("doctor", copy, code=4).stderr
+
+
+def test_a_copied_folder_is_recomputed_from_its_config(out, tmp_path):
+    copy = shutil.copytree(out / "rls2", tmp_path / "copy" / "rls2")
+    before = contents(tmp_path)
+    told = command("doctor", copy, "--recompute", 1).stdout
+    assert "computed again: rls2 from the config: 50,001 of 50,001 realisations (100 %)" in told
+    assert told.endswith("all intact\n")
+    assert contents(tmp_path) == before
+
+
+def test_a_forged_table_with_a_right_digest_is_found_by_recomputing(out, tmp_path):
+    """By the sums of the blocks, and without blocks by those of the config."""
+    path = out / "rls2" / "curves.csv"
+    lines = path.read_text().splitlines()
+    place = lines[0].split(",").index("sigma")
+    cells = lines[9].split(",")
+    cells[place] = repr(float(cells[place]) * 1.001)
+    path.write_text("\n".join([*lines[:9], ",".join(cells), *lines[10:], ""]))
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    rewritten(out / "rls2" / "run.json", lambda record: record["outputs"].update({"curves.csv": digest}))
+    command("doctor", out / "rls2")
+    copy = shutil.copytree(out / "rls2", tmp_path / "copy" / "rls2")
+    for folder in (out / "rls2", copy):
+        told = command("doctor", folder, "--recompute", 1, code=4).stderr
+        assert f"{folder / 'curves.csv'}: is not the table of these sums: differs by 1.0e-03 of σ" in told
 
 
 def altered(tables, column, change):
@@ -255,7 +296,7 @@ def test_clean_drops_blocks_and_nothing_else(out):
     assert block_files(out) == []
     left = {str(path.relative_to(out / ".blocks")) for path in (out / ".blocks").rglob("*")}
     assert left == {"notes.txt", "ab12", "ab12/mine.txt"}
-    assert "no blocks of rls2 are stored" in command("doctor", out / "rls2").stdout  # and stands on its own
+    assert "no blocks are stored" in command("doctor", out / "rls2", code=3).stderr  # and stands on its own
     assert "dropped 0 files" in command("clean", "--out", out).stdout
 
 

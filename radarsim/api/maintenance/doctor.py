@@ -6,28 +6,24 @@ import os
 import re
 import shutil
 import time
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from radarsim.api.case_work import CaseWork
-from radarsim.api.maintenance.self_test import tolerance
-from radarsim.api.stored_cases import stored_case, stored_experiment
-from radarsim.config.experiment import Case
-from radarsim.engine.blocks import Node, Partial, simulate_piece
-from radarsim.engine.machine import available_cores, instruction_set, machine_facts, platform_name
+from radarsim.api.maintenance.inspection import Inspection
+from radarsim.api.maintenance.recompute import Progress, recompute
+from radarsim.api.stored_cases import recomputable_experiment, stored_case, stored_experiment
+from radarsim.config.experiment import Case, Experiment
+from radarsim.engine.machine import available_cores, instruction_set, machine_facts
 from radarsim.engine.store.audit import Audit, audit_blocks
-from radarsim.engine.store.block_file import block_path, is_directory
+from radarsim.engine.store.block_file import is_directory
 from radarsim.engine.store.store import is_other_source, other_sources
-from radarsim.engine.sums import Sums
 from radarsim.errors import ConfigError, StoreError
 from radarsim.private_files import foreign_owner
 from radarsim.report import atomic_files, provenance
 
 MAX_ATTEMPTS, ATTEMPT_INTERVAL_S = 4, 0.25
-TOLERANCE_FACTOR = 10  # for a power p ≤ 4 of an error, and heavy tails in it
 
 
 def machine() -> dict[str, str]:
@@ -59,56 +55,63 @@ def cluster() -> str:
         return "Dask is not installed; `pip install 'radarsim[cluster]'` adds --workers and --scheduler"
 
 
-@dataclass
-class Inspection:
-    """Findings about a result: how much was checked, faults that each name a file, and notes."""
+def inspect_result(folder: str | os.PathLike[str], max_pieces: int = 0, progress: Progress | None = None) -> Inspection:
+    """Check a folder of results against its run.json, and all stored blocks of its cases; compute some of it again.
 
-    folder: Path
-    outputs: int = 0
-    pieces: int = 0
-    realisations: int = 0
-    recomputed: list[str] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-
-def inspect_result(folder: str | os.PathLike[str], recompute: int = 0) -> Inspection:
-    """Check a folder of results against its run.json, and all stored blocks of its cases; recompute some of them.
-
-    recompute is the number of stored pieces to recompute for each case, the smallest first. Blocks that other sources
-    made are noted. Raises ConfigError where the folder holds no results, and where blocks cannot be recomputed because
-    the sources have changed."""
+    max_pieces is the number of stored pieces to compute again for each case, the smallest first; if above 0, cases
+    without blocks are computed from the config, and the tables are made from the sums and compared. progress(done,
+    total) counts the realisations. What could not be checked is in `not_checked`; blocks that other sources made are
+    noted. Raises ConfigError where the folder holds no results, or code of another user would have to run."""
     inspection = Inspection(Path(folder))
-    blocks = _blocks_folder(inspection.folder)
-    record = _checked_record(inspection)
+    blocks = blocks_folder(inspection.folder)
+    record = checked_record(inspection)
     if _digest(record["resolved"]) != record["resolved_sha256"]:
         inspection.faults.append(f"{inspection.folder / 'run.json'}: damaged: the config in it is not the one that ran")
-    experiment = stored_experiment(record, inspection.folder)
-    not_recomputable = []
+    inspection.total = sum(case["done"] for case in record["cases"].values())
+    experiment = _experiment(inspection, record) if max_pieces else None
+    known = experiment or stored_experiment(record, inspection.folder)
+    audits = {}
     for name, stored_identity in record["identities"].items():
-        store = blocks / stored_identity
-        case = stored_case(record, name, experiment)
-        runs_code = case is not None and any(user_filter.written for user_filter in case.user_filters)
-        if recompute and runs_code:
-            _refuse_foreign_record(inspection.folder / "run.json")
-        inspection.notes += _notes_on_sources(store, name, case if recompute or not runs_code else None)
-        if not is_directory(store):
-            inspection.notes.append(
-                f"{store}: no blocks of {name} are stored, so the tables cannot be checked against them"
-            )
-            continue
-        audit = audit_blocks(store, int(record["cases"][name]["done"]))
-        inspection.pieces += len(audit.pieces)
-        inspection.faults += audit.faults
-        inspection.notes += audit.notes
-        if recompute and not _recompute_blocks(inspection, audit, case, recompute):
-            not_recomputable.append(name)
-    if not_recomputable and not inspection.faults:
-        raise ConfigError(
-            f"{inspection.folder}: {', '.join(not_recomputable)}: cannot be computed again, the sources that compute "
-            "have changed since; all that is stored is intact"
-        )
+        case = stored_case(record, name, known)
+        if experiment is None and case is not None and any(member.written for member in case.user_filters):
+            case = None  # of which code would run
+        audit = _audit_case(inspection, record, name, blocks / stored_identity, case)
+        if audit is not None:
+            audits[name] = audit
+    if experiment is not None:
+        recompute(inspection, record, experiment, audits, max_pieces, blocks.parent, progress)
+    elif not max_pieces and (absent := [name for name in record["identities"] if name not in audits]):
+        others = f" and {len(absent) - 1} other cases" if len(absent) > 1 else ""
+        cases = "" if len(absent) == len(record["identities"]) else f" of {absent[0]}{others}"
+        inspection.not_checked.append(f"nothing{cases} could be recomputed: no blocks are stored")
     return inspection
+
+
+def _experiment(inspection: Inspection, record: Mapping[str, Any]) -> Experiment | None:
+    """The experiment of a result; None where it cannot be read, which is then said. Raises ConfigError for one that
+    runs code which another user names."""
+    try:
+        experiment = recomputable_experiment(record, inspection.folder)
+    except ConfigError as error:
+        inspection.not_checked.append(f"nothing could be recomputed: {error.lines[0]}")
+        return None
+    if any(user_filter.written for case in experiment.cases for user_filter in case.user_filters):
+        _refuse_foreign_record(inspection.folder / "run.json")
+    return experiment
+
+
+def _audit_case(
+    inspection: Inspection, record: Mapping[str, Any], name: str, store: Path, case: Case | None
+) -> Audit | None:
+    """The audit of a case's stored blocks; None where there are none."""
+    inspection.notes += _notes_on_sources(store, name, case)
+    if not is_directory(store):
+        return None
+    audit = audit_blocks(store, int(record["cases"][name]["done"]))
+    inspection.pieces += len(audit.pieces)
+    inspection.faults += audit.faults
+    inspection.notes += audit.notes
+    return audit
 
 
 def _notes_on_sources(store: Path, name: str, case: Case | None) -> list[str]:
@@ -132,7 +135,7 @@ def _refuse_foreign_record(record: Path) -> None:
         raise ConfigError(f"{record}: names code and belongs to another user ({owner}), so nothing is computed again")
 
 
-def _blocks_folder(folder: Path) -> Path:
+def blocks_folder(folder: Path) -> Path:
     """Where the blocks of a result's folder lie: beside the folder, or beside its target where it is `.` or a link."""
     parents = [Path(os.path.abspath(folder)).parent, folder.resolve().parent]
     return next(
@@ -140,7 +143,7 @@ def _blocks_folder(folder: Path) -> Path:
     )
 
 
-def _checked_record(inspection: Inspection) -> dict[str, Any]:
+def checked_record(inspection: Inspection) -> dict[str, Any]:
     """The record, with its outputs checked; tried several times, since another run may be writing."""
     for attempt in range(MAX_ATTEMPTS):
         time.sleep(ATTEMPT_INTERVAL_S if attempt else 0)
@@ -153,7 +156,7 @@ def _checked_record(inspection: Inspection) -> dict[str, Any]:
 
 def _read_record(folder: Path) -> dict[str, Any]:
     """The run.json of a folder, checked to be the record of a run."""
-    path, blocks = folder / "run.json", _blocks_folder(folder)
+    path, blocks = folder / "run.json", blocks_folder(folder)
     hint = f"; `radarsim check CONFIG --out {blocks.parent}` says what is stored there" if is_directory(blocks) else ""
     try:
         record: dict[str, Any] = json.loads(atomic_files.read(path))
@@ -165,6 +168,8 @@ def _read_record(folder: Path) -> dict[str, Any]:
             if not isinstance(record["cases"][name]["done"], int) or not re.fullmatch("[0-9a-f]{2,128}", recorded):
                 raise ValueError(f"identity or realisations of {name} are invalid")
     except (FileNotFoundError, NotADirectoryError) as error:
+        if folder.suffix.lower() == ".zip":
+            hint = f"; `radarsim check {folder}` verifies an archive"
         raise ConfigError(f"{folder}: no run.json in it, so it is no folder of results{hint}") from error
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
@@ -200,50 +205,3 @@ def _check_outputs(inspection: Inspection, outputs: dict[str, str]) -> None:
             inspection.outputs += 1
             if hashlib.sha256(data).hexdigest() != digest:
                 inspection.faults.append(f"{path}: altered since it was written")
-
-
-def _recompute_blocks(inspection: Inspection, audit: Audit, case: Case | None, max_pieces: int) -> bool:
-    """Recompute some pieces and compare them; False if these blocks are not of this program's sources."""
-    if case is None or CaseWork(case).identity != audit.path.name:
-        return False
-    work, this_platform = CaseWork(case), platform_name()
-    other_platforms: set[str] = set()
-    sum_pieces = (piece for piece in audit.pieces if isinstance(piece, Node | Partial))
-    for piece in sorted(sum_pieces, key=lambda piece: piece.realisations(work.block)[1])[:max_pieces]:
-        header, values = audit.pieces[piece]
-        path = block_path(audit.path, piece)
-        inspection.realisations += header["count"]
-        inspection.recomputed.append(str(path))
-        if header["block"] != work.block or values.size != work.size:
-            inspection.faults.append(f"{path}: has other blocks than this program makes")
-            continue
-        other_platforms |= {*header["platforms"]} - {this_platform}
-        if not sums_agree(work, simulate_piece(work, piece), values, {*header["platforms"], this_platform}):
-            inspection.faults.append(f"{path}: computed again, the sums differ")
-    if other_platforms:
-        allowed = f"{tolerance(case.study).sampled:.0e} of sigma"
-        inspection.notes.append(
-            f"{audit.path}: made on {'; '.join(sorted(other_platforms))}: compared to within {allowed}"
-        )
-    return True
-
-
-def sums_agree(work: CaseWork, computed: Sums, stored: np.ndarray, platforms: set[str]) -> bool:
-    """Whether sums agree with the stored ones: to the last bit on one platform, else as far as conditioning allows.
-
-    An estimate may differ by the study's `Tolerance` in σ, so a sum of n errors to the power p by about n p σᵖ times
-    that; other sums by that part of the largest in their array. σ is the largest of a filter and component over scans:
-    with few realisations that of a single scan may be tiny by chance."""
-    if len(platforms) < 2:
-        return computed.values.tobytes() == stored.tobytes()
-    allowed = TOLERANCE_FACTOR * tolerance(work.case.study).sampled
-    for name, computed_sums in work.plan.layout.unpack(computed.values).items():
-        stored_sums = work.plan.layout.unpack(stored)[name]
-        scale = np.abs(computed_sums).max(initial=0.0)
-        if name == "error":
-            sigma = np.sqrt(computed_sums[..., 1].max(axis=1, keepdims=True) / computed.count)
-            powers = np.stack([sigma, sigma**2, sigma**3, sigma**4], axis=-1) * computed.count
-            scale = np.maximum(powers, np.abs(computed_sums) * [0, 1, 1, 1])  # the sum of e itself may have either sign
-        if not (np.abs(computed_sums - stored_sums) <= allowed * scale).all():
-            return False
-    return True
