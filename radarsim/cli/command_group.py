@@ -13,7 +13,7 @@ from radarsim.extensions import extensions
 from radarsim.language import current
 
 SECTIONS = {  # of commands in `radarsim --help`; extensions add theirs
-    "A question": ("list", "check", "run", "report", "compare", "export"),
+    "A question": ("list", "check", "run", "report", "compare", "pack", "export"),
     "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
     "Your own data": ("judge",),
     "Upkeep": ("doctor",),

@@ -1,13 +1,13 @@
 """The commands run and check."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from radarsim.cli import command_group, options
+from radarsim.cli import command_group, hand_over, options
 from radarsim.errors import ClusterError, ConfigError, DisagreementError, MeasureError, TargetUnmet
 from radarsim.extensions import stop_rule
 from radarsim.language.translate import tr
@@ -39,6 +39,7 @@ STOP_RULE = stop_rule()
 @options.drawing_options
 @click.option("--runs", metavar="K1:K2|all", help="Also write runs.csv: each run's rms error over scans K1 to K2.")
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
+@hand_over.trust_code_option
 @options.json_option
 def run(
     configs: tuple[str, ...],
@@ -58,6 +59,7 @@ def run(
     drawing: options.Drawing,
     runs: str | None,
     quiet: bool,
+    trust_code: bool,
     as_json: bool,
 ) -> None:
     """Run experiments, or continue stopped ones.
@@ -66,7 +68,8 @@ def run(
     DIR/.blocks: a stopped run and a larger N continue from them, an edited config or filter starts afresh. If a time
     limit ends the run, or the precision is not reached, tables of the finished part are written and the exit code is 3.
     A smaller N shows what is stored; tables of other settings or another seed need --replace. CONFIG may also be the
-    folder of a result, which is computed again from its own config.
+    folder of a result, or a study.zip of `radarsim pack`: these are computed again from their own config, and the
+    tables compared with those in study.zip.
 
     \b
     Examples
@@ -81,6 +84,7 @@ def run(
       radarsim run rls2 -n 1e8 --shard 2/3              on the second of three machines
       radarsim run rls2 -n 1e8 --workers 8              or --scheduler tcp://host:8786
       radarsim run rls2 --runs 3:15                     with each run's rms error over scans 3 to 15
+      radarsim run study.zip                            what somebody handed over, in results/
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
     _refuse_incompatible(shard, precision, workers or scheduler, threads)
@@ -94,15 +98,18 @@ def run(
     from radarsim.engine import stopping
 
     limit = stopping.TimeLimit(time_limit) if time_limit else None
-    with stopping.Signals() as stop:
+    with stopping.Signals() as stop, hand_over.loadable(configs, trust_code) as sources:
         from radarsim.api import executor, load_experiments
         from radarsim.api import run as api_run
 
         overrides = load_experiments.combine_overrides(overrides, realisations, seed)
-        loaded = _load_experiments(configs, overrides, None if precision is None else (precision, of), decide)
+        names = [name for name, _ in sources]
+        loaded = _load_experiments(names, overrides, None if precision is None else (precision, of), decide)
+        loaded = hand_over.named_by_results(loaded, sources, out)
         if not (shard or replace):
             check_replacements(loaded, out, quiet, ends_early=precision is not None or decide)
-        _print_user_code(loaded, quiet)
+        if not trust_code:
+            _print_user_code(loaded, quiet)
         if scheduler and not quiet and (line := executor.scheduler_warning(scheduler)):
             click.echo(f"note: {line}", err=True)
         with executor.open_executor(workers, scheduler) as pool:
@@ -115,6 +122,8 @@ def run(
             if shard:
                 compute = partial(api_run.run_share, share=shard)
             compute_each(loaded, partial(compute, **compute_arguments), out, quiet, as_json, gaps=not (shard or quiet))
+        if not (overrides or shard or precision or decide):
+            hand_over.compare_with_archives(loaded, sources, out, quiet or as_json)
 
 
 def check_replacements(loaded: "list[Experiment]", out: str, quiet: bool, ends_early: bool = False) -> None:
@@ -152,7 +161,7 @@ def _refuse_incompatible(shard: object, precision: object, cluster: object, thre
 
 
 def _load_experiments(
-    configs: tuple[str, ...], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
+    configs: Sequence[str], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
 ) -> "list[Experiment]":
     """The experiments, all checked, with the quantities that their claims and a precision need."""
     from radarsim.api import load_experiments, precision_target
@@ -246,22 +255,31 @@ def compute_each(
 @click.option(
     "--out", type=options.Directory(), metavar="DIR", help="Also report what is stored there and what is missing."
 )
+@click.option(
+    "--recompute", "pieces", type=options.Count(), metavar="K", help="Of a study.zip: pieces of each case; default: 2."
+)
+@hand_over.trust_code_option
 @options.json_option
 def check(
     configs: tuple[str, ...],
     realisations: int | None,
     seed: int | None,
     overrides: tuple[str, ...],
+    pieces: int | None,
+    trust_code: bool,
     as_json: bool,
     **arguments: Any,
 ) -> None:
-    """Validate configs and estimate the time of a run.
+    """Validate configs and estimate the time; verify a study.zip.
 
     Also prints cases, filters, realisations and memory. A few realisations are timed, unless all take less than a
     second. With --out the time covers what the results directory lacks, with --shard one share.
 
     With --precision, it also estimates the number of realisations and the time: from exact values where the filters are
     linear, otherwise from a pilot run of a second or two.
+
+    Of a study.zip that `radarsim pack` wrote it checks every hash, computes K stored pieces of each case again, makes
+    the tables from the sums, and says how much that was. What could not be checked is said last, with exit code 3.
 
     \b
     Examples
@@ -270,7 +288,14 @@ def check(
       radarsim check discriminator_rare -n 1e6 --precision 10 --of lost
       radarsim check multimodel -n 1e8 --shard 1/3        how long the first of three machines takes
       radarsim check multimodel -n 1e8 --out results      what is stored there, and what is missing
+      radarsim check study.zip --recompute 5              of `radarsim pack`: its hashes, 5 pieces of each case, tables
     """
+    if hand_over.are_archives(configs):
+        hand_over.refuse_options(configs, {"-n": realisations, "--seed": seed, "--set": overrides, **arguments})
+        hand_over.check_archives(configs, pieces, trust_code, as_json)
+        return
+    if pieces is not None or trust_code:
+        raise click.UsageError("--recompute and --trust-code apply to a study.zip")
     _refuse_incompatible(arguments["share"], arguments["precision"], None, None)
     refuse_quantity_without_precision(arguments["of"], arguments["precision"])
     from radarsim.api import cost, json_output, load_experiments

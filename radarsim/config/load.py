@@ -71,6 +71,9 @@ def _find_config(source: str | bytes | os.PathLike[str], studies: Studies, fault
         if not file.is_file():
             faults.add(Origin(str(file.parent)), (), f"is a directory without {CONFIG_FILE}, so no result")
             return None
+    if file.suffix.lower() == ".zip":
+        faults.add(Origin(name), (), "is an archive: `radarsim check` verifies it, and `radarsim run` takes it")
+        return None
     document = read_document(file, faults)
     if document and not is_stem(file.stem):  # it names the folder of results
         faults.add(

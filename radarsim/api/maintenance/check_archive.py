@@ -1,0 +1,192 @@
+"""`radarsim check study.zip`: verify results that somebody handed over, without leaving anything behind."""
+
+import os
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from radarsim.api.archive import BLOCKS_FOLDER, Archive
+from radarsim.api.maintenance.compare_tables import differs
+from radarsim.api.maintenance.doctor import inspect_result
+from radarsim.api.maintenance.inspection import Inspection
+from radarsim.api.maintenance.pack import README, RECORD, RESULTS
+from radarsim.api.maintenance.packed_code import code_names
+from radarsim.api.stored_tables import read_content, read_record
+from radarsim.config.experiment import Experiment
+from radarsim.config.find_files import is_stem
+from radarsim.engine.store.block_file import piece_named
+from radarsim.errors import ConfigError, RadarsimError
+from radarsim.extensions import extensions
+
+RECOMPUTED_PIECES = 2  # of each case
+NO_CODE = "RADARSIM_NO_CODE"
+
+
+@dataclass(frozen=True)
+class CheckedArchive:
+    """An archive whose files are those of its manifest, and the findings about each of its results, by name."""
+
+    path: Path
+    sha256: str
+    files: int
+    results: Mapping[str, Inspection]
+
+
+def check_archive(
+    path: str | os.PathLike[str],
+    max_pieces: int = RECOMPUTED_PIECES,
+    trust_code: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> CheckedArchive:
+    """Check an archive of results: its files, the stored blocks, max_pieces of them of each case computed again, and
+    the tables made from the sums. What is read from it is gone afterwards.
+
+    Code of user filters in it is run only with trust_code. Raises ConfigError for what is no archive of results,
+    StoreError for a damaged one."""
+    with unpacked(path, trust_code) as (archive, folder):
+        inspections = {}
+        for name, facts in archive.facts["results"].items():
+            place = folder / RESULTS / name
+            named = code_names(read_record(place) or {})
+            refused = bool(named) and not trust_code
+            inspections[name] = inspect_result(place, 0 if refused else max_pieces, progress)
+            if refused and max_pieces:
+                inspections[name].not_checked = [_untrusted(named, facts["code"])]
+            _name_archive(inspections[name], str(folder), str(archive.path))
+        return CheckedArchive(archive.path, archive.sha256, len(archive.names), inspections)
+
+
+def differences(archive: Archive, experiment: Experiment, folder: Path) -> tuple[dict[str, bool], list[str]]:
+    """The tables of a result in an archive that are those of a folder, and whether to the byte; and a line for each
+    that is not."""
+    place = f"{RESULTS}/{experiment.stem}/"
+    free_columns: dict[str, Sequence[str]] = {}
+    for extension in extensions():
+        free_columns |= extension.columns_from_elsewhere
+    equal, different = {}, []
+    for name in archive.names:
+        table = name.removeprefix(place)
+        if table == name or not table.endswith(".csv") or "/" in table:
+            continue
+        stored, computed = archive.read(name), read_content(folder / table)
+        stem = table.removesuffix(".csv")
+        difference = (
+            "was not written"
+            if computed is None
+            else differs(experiment.study, stem, stored, computed, free_columns.get(stem, ()))
+        )
+        if difference:
+            different.append(f"{archive.path}/{name}: the table computed here {difference}")
+        else:
+            equal[table] = stored == computed or stem in free_columns
+    return equal, different
+
+
+@contextmanager
+def unpacked(path: str | os.PathLike[str], trust_code: bool) -> Iterator[tuple[Archive, Path]]:
+    """An archive of results, and a temporary folder for this user alone that holds its files.
+
+    Meanwhile no code of users runs, unless it is trusted. Nothing is written before the whole archive is checked."""
+    with Archive(path) as archive:
+        _check_names(archive)
+        with tempfile.TemporaryDirectory(prefix="radarsim-") as temporary, _code_allowed(trust_code):
+            folder = Path(os.path.realpath(temporary))
+            archive.extract(folder, archive.names)
+            try:
+                _check_outputs(archive, folder)
+                yield archive, folder
+            except RadarsimError as error:
+                if not any(str(folder) in line for line in error.lines):
+                    raise
+                raise type(error)(*(line.replace(str(folder), str(path)) for line in error.lines)) from error
+
+
+def runnable_results(archive: Archive, folder: Path, trust_code: bool) -> list[tuple[str, Path]]:
+    """The results in an unpacked archive, by name, with their folders. Raises ConfigError for those that run code which
+    nobody trusts."""
+    places = {name: folder / RESULTS / name for name in archive.facts["results"]}
+    faults = []
+    for name, place in places.items():
+        named = code_names(read_record(place) or {})
+        if named and not trust_code:
+            reason = _untrusted(named, archive.facts["results"][name]["code"])
+            faults.append(f"{archive.path}: {name}: {reason.replace('recomputed', 'run')}")
+    if faults:
+        raise ConfigError(*faults)
+    return [*places.items()]
+
+
+def _untrusted(named: Sequence[str], packed: Sequence[str]) -> str:
+    """Why nothing is computed again where code that nobody trusts would have to run."""
+    names = ", ".join(named)
+    if not packed:
+        return (
+            f"nothing could be recomputed: its filters are code that is not in the archive: {names}; put it into the "
+            "working directory, and give --trust-code"
+        )
+    return f"nothing could be recomputed: that runs code of its author: {names}; read it, then give --trust-code"
+
+
+def _check_names(archive: Archive) -> None:
+    """Raise ConfigError unless the files are those of results, of their blocks, and the text for readers."""
+    results = archive.facts.get("results")
+    if not isinstance(results, dict) or not results or not all(map(is_stem, results)) or not all(_are_facts(results)):
+        raise ConfigError(f"{archive.path}: its manifest names no results; nothing is read")
+    for name in archive.names:
+        match name.split("/"):
+            case [only] if only == README:
+                continue
+            case [top, result, _, *_] if top == RESULTS and result in results:
+                continue
+            case [top, blocks, identity, block] if (top, blocks) == (RESULTS, BLOCKS_FOLDER):
+                if re.fullmatch("[0-9a-f]{2,128}", identity) and piece_named(block) is not None:
+                    continue
+        raise ConfigError(f"{archive.path}: {name!r} belongs to no result; nothing is read")
+
+
+def _are_facts(results: Mapping[str, object]) -> Iterator[bool]:
+    """For each result whether the manifest says of it what `pack` says."""
+    for facts in results.values():
+        code = facts.get("code") if isinstance(facts, dict) else None
+        yield isinstance(code, list) and all(isinstance(name, str) for name in code)
+
+
+def _check_outputs(archive: Archive, folder: Path) -> None:
+    """Raise ConfigError where a result holds files that its record does not name."""
+    for result in archive.facts["results"]:
+        place = f"{RESULTS}/{result}/"
+        record = read_record(folder / place)
+        if record is None:
+            raise ConfigError(f"{archive.path}: {place}{RECORD} is missing")
+        code = archive.facts["results"][result].get("code", ())
+        named = {f"{place}{name}" for name in (RECORD, *record["outputs"], *code)}
+        odd = [name for name in archive.names if name.startswith(place) and name not in named]
+        if odd:
+            raise ConfigError(f"{archive.path}: {odd[0]!r} is not named by {place}{RECORD}")
+
+
+@contextmanager
+def _code_allowed(trusted: bool) -> Iterator[None]:
+    """While entered no code of users runs, here and in processes started here, unless it is trusted."""
+    before = os.environ.get(NO_CODE)
+    if not trusted:
+        os.environ[NO_CODE] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(NO_CODE, None)
+        else:
+            os.environ[NO_CODE] = before
+
+
+def _name_archive(inspection: Inspection, folder: str, archive: str) -> None:
+    """Name the archive in place of the temporary folder in all findings."""
+    inspection.folder = Path(str(inspection.folder).replace(folder, archive))
+    for field in fields(inspection):
+        texts = getattr(inspection, field.name)
+        if isinstance(texts, list):
+            setattr(inspection, field.name, [text.replace(folder, archive) for text in texts])

@@ -1,0 +1,166 @@
+"""The command pack, and what check and run do with an archive."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from radarsim.cli import command_group, options
+from radarsim.errors import NotChecked, StoreError
+from radarsim.language.translate import plural, tr
+
+if TYPE_CHECKING:
+    from radarsim.api.archive import Archive
+    from radarsim.config.experiment import Experiment
+
+trust_code_option = click.option(
+    "--trust-code", is_flag=True, help="Run the code of user filters that a study.zip brings; read it before."
+)
+
+
+@command_group.main.command()
+@click.argument("results", nargs=-1, required=True, metavar="RESULT…", type=click.Path())
+@click.option("-o", "--output", "archive", required=True, metavar="FILE.zip", help="The archive to write.")
+@click.option("--code", is_flag=True, help="Also pack the code of your own filters, which runs for it.")
+@options.json_option
+def pack(results: tuple[str, ...], archive: str, code: bool, as_json: bool) -> None:
+    """Pack results to hand over, in one file.
+
+    RESULT is a folder such as results/rls2, or a directory of such folders. The file holds config, tables, figures and
+    report, the stored blocks behind them, versions and hashes; equal results give equal bytes. Whoever gets it verifies
+    it with `radarsim check FILE.zip`, and computes it anew with `radarsim run FILE.zip`.
+
+    \b
+    Examples
+      radarsim pack results/rls2 -o study.zip
+      radarsim pack results -o study.zip                  all results in a directory
+      radarsim pack results/mine -o study.zip --code      with the code of your own filters
+    """
+    from radarsim.api import json_output
+    from radarsim.api.maintenance.pack import pack as pack_results
+    from radarsim.cli import console
+
+    packed = pack_results(results, archive, code)
+    if as_json:
+        click.echo(json_output.text(json_output.fields(packed)))
+        return
+    files = plural("{count} file", "{count} files", packed.files)
+    console.print_line(tr("{path}: {files}, {size:.1f} MB", path=str(packed.path), files=files, size=packed.size / 1e6))
+    console.print_field("results", ", ".join(packed.results))
+    console.print_field("SHA-256", packed.sha256)
+    console.print_field("verify", f"radarsim check {packed.path}")
+    for note in packed.notes:
+        console.print_line(tr("note: {words}", words=note))
+
+
+def are_archives(sources: Sequence[str]) -> bool:
+    """Whether sources are archives. Raises UsageError for archives beside configs."""
+    archives = [source for source in sources if source.lower().endswith(".zip")]
+    if archives and len(archives) < len(sources):
+        raise click.UsageError(f"{archives[0]}: an archive goes with other archives only, not with configs")
+    return bool(archives)
+
+
+def refuse_options(archives: Sequence[str], values: Mapping[str, Any]) -> None:
+    """Raise UsageError for options of configs that are given with an archive: options or names of them, with values."""
+    given = [name if name.startswith("-") else f"--{name}" for name, value in values.items() if value]
+    given = [name for name in given if (name, values.get("of")) != ("--of", "sigma")]
+    if given:
+        raise click.UsageError(f"{archives[0]}: {', '.join(given)} does not go with an archive")
+
+
+@contextmanager
+def loadable(sources: Sequence[str], trust_code: bool) -> "Iterator[list[tuple[str, Archive | None]]]":
+    """The sources of configs, with each archive unpacked: its results' folders, and the archive. Elsewhere None."""
+    from radarsim.api.maintenance import check_archive
+
+    if not are_archives(sources):
+        if trust_code:
+            raise click.UsageError("--trust-code applies to a study.zip")
+        yield [(source, None) for source in sources]
+        return
+    with ExitStack() as stack:
+        found: list[tuple[str, Archive | None]] = []
+        for source in sources:
+            archive, folder = stack.enter_context(check_archive.unpacked(source, trust_code))
+            for name, place in check_archive.runnable_results(archive, folder, trust_code):
+                found.append((str(place), archive))
+                for file in archive.facts["results"][name]["code"]:
+                    click.echo(f"note: runs code of {source}: results/{name}/{file}", err=True)
+        yield found
+
+
+def named_by_results(
+    experiments: "Sequence[Experiment]", sources: "Sequence[tuple[str, Archive | None]]", out: str
+) -> "list[Experiment]":
+    """The experiments; those of archives have the configs of the results that they will write under `out`."""
+    from radarsim.config.complete_config import CONFIG_FILE
+
+    return [
+        experiment if archive is None else replace(experiment, path=str(Path(out) / experiment.stem / CONFIG_FILE))
+        for experiment, (_, archive) in zip(experiments, sources, strict=True)
+    ]
+
+
+def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: bool, as_json: bool) -> None:
+    """Verify archives, and print what was checked. Raises StoreError for faults, else NotChecked for what was not."""
+    from radarsim.api import json_output
+    from radarsim.api.maintenance.check_archive import RECOMPUTED_PIECES, check_archive
+    from radarsim.cli import console, print_results, progress
+
+    documents: list[dict[str, Any]] = []
+    faults: list[str] = []
+    not_checked: list[str] = []
+    for archive in archives:
+        with progress.Progress(archive, quiet=as_json) as bar:
+            checked = check_archive(
+                archive, RECOMPUTED_PIECES if max_pieces is None else max_pieces, trust_code, bar.update
+            )
+        for name, inspection in checked.results.items():
+            faults += inspection.faults
+            not_checked += [f"{archive}: {name}: {line}" for line in inspection.not_checked]
+        found = {name: json_output.fields(inspection) for name, inspection in checked.results.items()}
+        documents.append({"archive": archive, "sha256": checked.sha256, "files": checked.files, "results": found})
+        if as_json:
+            continue
+        files = plural("{count} file", "{count} files", checked.files)
+        console.print_line(tr("{path}: {files}, each as listed", path=archive, files=files))
+        console.print_field("SHA-256", checked.sha256)
+        for inspection in checked.results.values():
+            print_results.print_inspection(inspection)
+    if as_json:
+        click.echo(json_output.text(documents))
+    if faults:
+        raise StoreError(*faults)
+    if not_checked:
+        raise NotChecked(*not_checked)
+
+
+def compare_with_archives(
+    experiments: "Sequence[Experiment]", sources: "Sequence[tuple[str, Archive | None]]", out: str, quiet: bool
+) -> None:
+    """Say whether the tables of results that were run are those of their archives, see `loadable`. Raises StoreError
+    for tables that differ."""
+    from radarsim.api.maintenance.check_archive import differences
+    from radarsim.cli import console
+
+    faults: list[str] = []
+    for experiment, (_, archive) in zip(experiments, sources, strict=True):
+        if archive is None:
+            continue
+        equal, different = differences(archive, experiment, Path(out) / experiment.stem)
+        faults += different
+        if different or quiet:
+            continue
+        values = {"tables": plural("{count} table", "{count} tables", len(equal)), "archive": str(archive.path)}
+        words = (
+            tr("{tables}, the same bytes as in {archive}", **values)
+            if all(equal.values())
+            else tr("{tables}, equal to those in {archive} to rounding", **values)
+        )
+        console.print_field("compared", words)
+    if faults:
+        raise StoreError(*faults)

@@ -1,0 +1,394 @@
+"""`radarsim pack`, and `check` of what it wrote: a referee learns what was verified, and nothing is left behind."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import tempfile
+import time
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from radarsim.api.archive import Archive, write_archive
+from radarsim.engine.store.block_file import decode
+from tests.engine.test_damage import reforged
+from tests.program import command, csv_bytes, record
+
+N = 6000
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A directory of two results."""
+    out = tmp_path_factory.mktemp("results")
+    command("run", "rls1", "rls2", "-n", N, "--no-figures", "--quiet", "--out", out)
+    return out
+
+
+@pytest.fixture
+def out(made, tmp_path):
+    """A copy of it, to be damaged."""
+    return shutil.copytree(made, tmp_path / "r")
+
+
+@pytest.fixture
+def study(out, tmp_path):
+    """An archive of rls2."""
+    command("pack", out / "rls2", "-o", tmp_path / "study.zip")
+    return tmp_path / "study.zip"
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """Where temporary files go; empty after the test."""
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    yield folder
+    assert list(folder.iterdir()) == []
+
+
+def repacked(path, alter):
+    """An archive whose manifest is right, as a cunning person writes it, after a change of its contents."""
+    with Archive(path) as archive:
+        contents, facts = {name: archive.read(name) for name in archive.names}, archive.facts
+    alter(contents)
+    write_archive(path, contents, facts)
+
+
+def blocks_in(contents):
+    return sorted(name for name in contents if name.endswith(".sums"))
+
+
+def test_a_referee_verifies_with_one_command_and_learns_how_much(study, temporary, tmp_path):
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path != temporary}
+    told = command("check", study).stdout
+    assert f"computed again: 2 pieces: {N:,} of {N:,} realisations (100 %)" in told
+    assert "compared: 6 tables made from the sums, equal to those stored" in told
+    assert "all intact" in told
+    with Archive(study) as archive:
+        assert archive.sha256 in told
+    (found,) = json.loads(command("check", study, "--recompute", 1, "--json").stdout)
+    assert found["results"]["rls2"]["realisations"] == N - 4096
+    assert found["results"]["rls2"]["faults"] == found["results"]["rls2"]["not_checked"] == []
+    assert before == {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path != temporary}
+
+
+def test_equal_results_give_equal_bytes(out, tmp_path):
+    command("pack", out / "rls1", out / "rls2", "-o", tmp_path / "a.zip")
+    for path in out.rglob("*"):
+        os.utime(path, (10, 10))
+    copy = shutil.copytree(out, tmp_path / "elsewhere")
+    command("pack", copy / "rls2", copy / "rls1", "-o", tmp_path / "b.zip")
+    assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+    assert command("check", tmp_path / "a.zip").stdout.count("all intact") == 2
+
+
+def test_a_pack_is_unpacked_by_hand_too(study, tmp_path):
+    zipfile.ZipFile(study).extractall(tmp_path / "in")
+    told = command("doctor", tmp_path / "in" / "results" / "rls2", "--recompute", 1).stdout
+    assert "all intact" in told
+    assert "radarsim check FILE.zip" in (tmp_path / "in" / "README.txt").read_text()
+
+
+def test_only_blocks_behind_the_result_are_packed(out, tmp_path):
+    for n in (7000, 9000, N):
+        command("run", "rls2", "-n", n, "--no-figures", "--quiet", "--out", out)
+    command("pack", out / "rls2", "-o", tmp_path / "s.zip")
+    with Archive(tmp_path / "s.zip") as archive:
+        names = [Path(name).stem for name in blocks_in(archive.names)]
+    assert [name for name in names if name.startswith("T")] == [f"T{N}"]
+    told = command("check", tmp_path / "s.zip", "--recompute", 9).stdout
+    assert f"{N:,} of {N:,} realisations (100 %)" in told
+
+
+def altered_number(content):
+    """A table with one number changed by a thousandth."""
+    lines = content.decode().splitlines()
+    place = lines[0].split(",").index("sigma")
+    cells = lines[9].split(",")
+    cells[place] = repr(float(cells[place]) * 1.001)
+    return "\n".join([*lines[:9], ",".join(cells), *lines[10:], ""]).encode()
+
+
+def forge_table(contents):
+    """Another number in a table, and a record that fits."""
+    table = contents["results/rls2/curves.csv"] = altered_number(contents["results/rls2/curves.csv"])
+    recorded = json.loads(contents["results/rls2/run.json"])
+    recorded["outputs"]["curves.csv"] = hashlib.sha256(table).hexdigest()
+    contents["results/rls2/run.json"] = json.dumps(recorded).encode()
+
+
+def forge_block(contents):
+    """Other sums in a block, and no total that betrays it."""
+    for name in blocks_in(contents):
+        path = Path(name)
+        if path.name.startswith("P"):
+            place = Path(tempfile.gettempdir()) / path.name
+            place.write_bytes(contents[name])
+            reforged(place, values=decode(contents[name])[1] * 1.000001)
+            contents[name] = place.read_bytes()
+            place.unlink()
+
+
+FORGERIES = {
+    "a table": (forge_table, "study.zip/results/rls2/curves.csv: is not the table of these sums"),
+    "a block": (forge_block, "is not the sum of the blocks beside it"),
+    "a table without its record": (
+        lambda contents: contents.update({"results/rls2/gains.csv": b"a\n"}),
+        "study.zip/results/rls2/gains.csv: altered since it was written",
+    ),
+    "a missing block": (lambda contents: contents.pop(blocks_in(contents)[0]), ".sums: missing"),
+    "a record of nothing": (
+        lambda contents: contents.update({"results/rls2/run.json": b"{}"}),
+        "study.zip/results/rls2/run.json: is no record of a run",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FORGERIES)
+def test_a_forged_result_is_found(study, temporary, kind):
+    forge, words = FORGERIES[kind]
+    repacked(study, forge)
+    told = command("check", study, code=4)
+    assert words in told.stderr
+    assert "intact" not in told.stdout
+    assert str(temporary) not in told.output
+
+
+STRANGE = {
+    "a file that no record names": "results/rls2/evil.html",
+    "a file of no result": "results/rls3/curves.csv",
+    "a file in another place": "etc/passwd",
+    "blocks of no identity": "results/.blocks/xyz/T5.sums",
+    "a file among blocks": "results/.blocks/ab12/notes.txt",
+}
+
+
+@pytest.mark.parametrize("kind", STRANGE)
+def test_an_archive_with_anything_else_is_refused(study, temporary, kind):
+    repacked(study, lambda contents: contents.update({STRANGE[kind]: b"x"}))
+    assert STRANGE[kind] in command("check", study, code=2).stderr
+
+
+def test_a_changed_byte_is_refused_before_anything_is_written(study, temporary, monkeypatch):
+    content = bytearray(study.read_bytes())
+    place = content.index(b"sigma_lo")
+    content[place] ^= 1
+    study.write_bytes(content)
+    monkeypatch.setattr(tempfile, "mkdtemp", lambda *_, **__: pytest.fail("written"))
+    assert "damaged or altered: results/rls2/curves.csv" in command("check", study, code=4).stderr
+
+
+def test_without_blocks_it_says_last_what_was_not_verified(out, tmp_path):
+    shutil.rmtree(out / ".blocks")
+    told = command("pack", out / "rls2", "-o", tmp_path / "s.zip").stdout
+    assert "no blocks of rls2 are stored: it can only be recomputed as a whole" in told
+    told = command("check", tmp_path / "s.zip", "--recompute", 0, code=3).stderr
+    assert told.splitlines()[-1].endswith("s.zip: rls2: nothing could be recomputed: no blocks are stored")
+    assert "rls2 from the config: 6,000 of 6,000" in command("check", tmp_path / "s.zip").stdout
+
+
+def test_a_damaged_result_is_not_packed(out, tmp_path):
+    (out / "rls2" / "gains.csv").write_text("other")
+    assert "gains.csv: altered" in command("pack", out / "rls2", "-o", tmp_path / "s.zip", code=4).stderr
+    identity = record(out / "rls1")["identities"]["rls1"]
+    (block, *_) = (out / ".blocks" / identity).glob("P*")
+    block.write_bytes(b"bad")
+    assert f"{block}: damaged" in command("pack", out / "rls1", "-o", tmp_path / "s.zip", code=4).stderr
+    assert not (tmp_path / "s.zip").exists()
+
+
+def test_what_cannot_be_packed_is_said(out, tmp_path):
+    before = (out / "rls2" / "run.json").read_bytes()
+    shutil.copytree(out / "rls2", out / "copy")
+    for results, archive, code, reason in (
+        (["none"], "s.zip", 2, "no run.json in it"),
+        (["rls2", "copy"], "s.zip", 2, "is called rls2, too"),
+        (["rls2"], "s.tar", 2, "must end with .zip"),
+        (["rls2"], "no/s.zip", 4, "s.zip: cannot be written: No such file or directory"),
+    ):
+        words = [out / name for name in results]
+        assert reason in command("pack", *words, "-o", tmp_path / archive, code=code).stderr
+    assert not list(tmp_path.glob("*.zip"))
+    assert (out / "rls2" / "run.json").read_bytes() == before
+
+
+def test_options_of_configs_go_with_no_archive(study):
+    for option in (["-n", 10], ["--seed", 1], ["--set", "scans=3"], ["--precision", 1], ["--of", "gain"], ["rls2"]):
+        assert "archive" in command("check", study, *option, code=2).stderr
+    assert "apply to a study.zip" in command("check", "rls2", "--recompute", 1, code=2).stderr
+    assert "no such file" in command("check", study.with_name("none.zip"), code=2).stderr
+
+
+def test_it_runs_anew_elsewhere_with_the_same_bytes(study, out, temporary, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.move(out, tmp_path / "gone")
+    told = command("run", "study.zip", "--no-figures", "--out", "again")
+    assert "compared  6 tables, the same bytes as in study.zip" in told.stdout
+    assert csv_bytes(tmp_path / "again" / "rls2") == csv_bytes(tmp_path / "gone" / "rls2")
+    assert str(temporary) not in told.output
+    written = "".join(path.read_text() for path in (tmp_path / "again" / "rls2").iterdir())
+    assert not any(place in written for place in (str(tmp_path), "/radarsim-"))
+    other = command("run", "study.zip", "--no-figures", "--out", "other", "-n", 2000).stdout
+    assert "compared" not in other
+    assert record(tmp_path / "other" / "rls2")["realisations_done"] == 2000
+
+
+def test_tables_that_come_out_otherwise_are_named(study, tmp_path, monkeypatch):
+    repacked(study, forge_table)
+    told = command("run", study, "--no-figures", "--out", tmp_path / "again", code=4).stderr
+    assert f"{study}/results/rls2/curves.csv: the table computed here differs by 1.0e-03 of σ" in told
+
+
+FILTER = """
+import pathlib
+import numpy as np
+
+GAIN = float((pathlib.Path(__file__).parent / "data" / "gain.txt").read_text())
+pathlib.Path({mark!r}).touch()
+
+
+def follow(plots):
+    z = plots["range_m"]
+    return GAIN * np.stack([z, np.zeros_like(z)], axis=2)
+"""
+CONFIG = """
+include: [rls2]
+realisations: 2000
+filters:
+  - {name: r, observes: [range], manoeuvre_variance: 1e-3}
+  - {name: mine, python: "my_filter.py:follow"}
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """A folder with a result of a user filter, which leaves a mark where it runs."""
+    monkeypatch.delenv("RADARSIM_NO_CODE", raising=False)
+    folder = tmp_path / "own"
+    (folder / "data").mkdir(parents=True)
+    (folder / "my_filter.py").write_text(FILTER.format(mark=str(tmp_path / "mark")))
+    (folder / "data" / "gain.txt").write_text("1.0")
+    (folder / "mine.yaml").write_text(CONFIG)
+    monkeypatch.chdir(folder)
+    command("run", "mine.yaml", "--no-figures", "--quiet")
+    (tmp_path / "elsewhere").mkdir()
+    return folder
+
+
+def test_code_is_packed_on_request_and_run_by_those_who_trust_it(own, temporary, tmp_path, monkeypatch):
+    mark = tmp_path / "mark"
+    command("pack", "results/mine", "-o", tmp_path / "elsewhere" / "s.zip", "--code")
+    with Archive(tmp_path / "elsewhere" / "s.zip") as archive:
+        assert {"results/mine/my_filter.py", "results/mine/data/gain.txt"} <= {*archive.names}
+        assert not any(
+            str(tmp_path).encode() in archive.read(name) for name in archive.names if "my_filter" not in name
+        )
+    shutil.rmtree(own)
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    mark.unlink()
+    told = command("check", "s.zip", code=3).stderr
+    assert "nothing could be recomputed: that runs code of its author: my_filter.py:follow; read it, then give" in told
+    assert "--trust-code" in command("run", "s.zip", code=2).stderr
+    assert not mark.exists()
+    assert "RADARSIM_NO_CODE" not in os.environ
+    told = command("check", "s.zip", "--trust-code").stdout
+    assert "2,000 of 2,000 realisations (100 %)" in told
+    assert mark.exists()
+    told = command("run", "s.zip", "--trust-code", "--no-figures")
+    assert "note: runs code of s.zip: results/mine/my_filter.py" in told.stderr
+    assert "the same bytes as in s.zip" in told.stdout
+    assert "--trust-code applies to a study.zip" in command("run", "rls2", "--trust-code", code=2).stderr
+
+
+def test_without_its_code_a_result_is_checked_as_far_as_it_goes(own, tmp_path, monkeypatch):
+    told = command("pack", "results/mine", "-o", tmp_path / "elsewhere" / "s.zip").stdout
+    assert "note: results/mine: the code of its filters is not packed: my_filter.py:follow; --code adds it" in told
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert "code that is not in the archive: my_filter.py:follow" in command("check", "s.zip", code=3).stderr
+    assert "a result does not contain the code" in command("check", "s.zip", "--trust-code", code=3).stderr
+    monkeypatch.chdir(own)
+    assert "all intact" in command("check", tmp_path / "elsewhere" / "s.zip", "--trust-code").stdout
+
+
+def test_code_that_has_changed_since_is_not_packed_with_a_result(own, tmp_path):
+    (own / "data" / "gain.txt").write_text("1.5")
+    told = command("pack", "results/mine", "-o", tmp_path / "s.zip", "--code", code=2).stderr
+    assert "has changed since it ran: run it again before packing" in told
+    assert not (tmp_path / "s.zip").exists()
+
+
+def test_a_directory_of_results_is_packed_as_a_whole(out, tmp_path):
+    for words in ([out], [*out.iterdir()]):
+        command("pack", *(word for word in words if word.name != ".blocks"), "-o", tmp_path / "s.zip")
+        with Archive(tmp_path / "s.zip") as archive:
+            assert [*archive.facts["results"]] == ["rls1", "rls2"]
+    assert "no folder of results" in command("pack", out / "index.html", "-o", tmp_path / "s.zip", code=2).stderr
+
+
+def test_other_commands_say_what_takes_an_archive(study):
+    for words in (("report", study), ("claims", study), ("doctor", study), ("compare", study, "rls2")):
+        assert "radarsim check" in command(*words, code=2).stderr
+
+
+def killed_after(seconds, *words):
+    """The command in a process of its own, killed (-9) after so many seconds; whether it had ended by then."""
+    child = os.fork()
+    if not child:
+        for number in (1, 2):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+        command(*words)
+        os._exit(0)
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if os.waitpid(child, os.WNOHANG)[0]:
+            return True
+        time.sleep(0.0005)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    return False
+
+
+def seconds_of(*words):
+    """How long a command takes in a process of its own."""
+    started = time.monotonic()
+    assert killed_after(100, *words)
+    return time.monotonic() - started
+
+
+@pytest.mark.slow
+def test_a_kill_at_fifty_moments_leaves_the_old_result_or_the_new_one(out):
+    """Also where the next program that looks is doctor."""
+    folder, runs = out / "rls2", [("run", "rls2", "-n", n, "--out", out, "--quiet") for n in (N, 7000)]
+    tables = []
+    for words in runs:
+        command(*words)
+        tables.append(csv_bytes(folder))
+    command(*runs[0])
+    duration, seen = seconds_of(*runs[1]), []
+    for moment in range(50):
+        command(*runs[0])
+        killed_after(duration * (0.2 + 0.8 * moment / 49), *runs[1])
+        assert "all intact" in command("doctor", folder).stdout
+        assert csv_bytes(folder) in tables
+        seen.append(tables.index(csv_bytes(folder)))
+    assert {*seen} == {0, 1}, duration
+
+
+@pytest.mark.slow
+def test_a_kill_at_fifty_moments_leaves_the_old_archive_or_the_new_one(out, tmp_path):
+    archive, packs = tmp_path / "s.zip", [("pack", out / name, "-o", tmp_path / "s.zip") for name in ("rls1", "rls2")]
+    contents = []
+    for words in packs:
+        command(*words)
+        contents.append(archive.read_bytes())
+    duration, seen = seconds_of(*packs[1]), []
+    for moment in range(50):
+        command(*packs[0])
+        killed_after(1.2 * duration * moment / 49, *packs[1])
+        seen.append(contents.index(archive.read_bytes()))
+    assert {*seen} == {0, 1}, duration
