@@ -96,7 +96,7 @@ def test_a_pack_is_unpacked_by_hand_too(study, tmp_path):
 
 def test_only_blocks_behind_the_result_are_packed(out, tmp_path):
     for n in (7000, 9000, N):
-        command("run", "rls2", "-n", n, "--no-figures", "--quiet", "--out", out)
+        command("run", "rls2", "-n", n, "--no-figures", "--quiet", "--replace", "--out", out)
     command("pack", out / "rls2", "-o", tmp_path / "s.zip")
     with Archive(tmp_path / "s.zip") as archive:
         names = [Path(name).stem for name in blocks_in(archive.names)]
@@ -363,7 +363,7 @@ def seconds_of(*words):
 @pytest.mark.slow
 def test_a_kill_at_fifty_moments_leaves_the_old_result_or_the_new_one(out):
     """Also where the next program that looks is doctor."""
-    folder, runs = out / "rls2", [("run", "rls2", "-n", n, "--out", out, "--quiet") for n in (N, 7000)]
+    folder, runs = out / "rls2", [("run", "rls2", "-n", n, "--out", out, "--quiet", "--replace") for n in (N, 7000)]
     tables = []
     for words in runs:
         command(*words)

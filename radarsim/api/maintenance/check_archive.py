@@ -59,6 +59,15 @@ def check_archive(
         return CheckedArchive(archive.path, archive.sha256, len(archive.names), inspections)
 
 
+def has_its_counts(archive: Archive, experiment: Experiment, folder: Path) -> bool:
+    """Whether the tables in a folder are of as many realisations as those of a result in an archive."""
+    record = read_record(folder) or {"cases": {}}
+    packed = archive.facts["results"][experiment.stem].get("cases", {})
+    return {name: case["done"] for name, case in record["cases"].items()} == {
+        name: case.get("realisations") for name, case in packed.items()
+    }
+
+
 def differences(archive: Archive, experiment: Experiment, folder: Path) -> tuple[dict[str, bool], list[str]]:
     """The tables of a result in an archive that are those of a folder, and whether to the byte; and a line for each
     that is not."""
@@ -150,8 +159,13 @@ def _check_names(archive: Archive) -> None:
 def _are_facts(results: Mapping[str, object]) -> Iterator[bool]:
     """For each result whether the manifest says of it what `pack` says."""
     for facts in results.values():
-        code = facts.get("code") if isinstance(facts, dict) else None
-        yield isinstance(code, list) and all(isinstance(name, str) for name in code)
+        code, cases = (facts.get("code"), facts.get("cases")) if isinstance(facts, dict) else (None, None)
+        yield (
+            isinstance(code, list)
+            and all(isinstance(name, str) for name in code)
+            and isinstance(cases, dict)
+            and all(isinstance(case, dict) for case in cases.values())
+        )
 
 
 def _check_outputs(archive: Archive, folder: Path) -> None:
