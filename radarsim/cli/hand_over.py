@@ -157,10 +157,11 @@ def compare_with_archives(
         if different or quiet:
             continue
         values = {"tables": plural("{count} table", "{count} tables", len(equal)), "archive": str(archive.path)}
+        values["config"] = experiment.stem
         words = (
-            tr("{tables}, the same bytes as in {archive}", **values)
+            tr("{config}: {tables}, the same bytes as in {archive}", **values)
             if all(equal.values())
-            else tr("{tables}, equal to those in {archive} to rounding", **values)
+            else tr("{config}: {tables}, equal to those in {archive} to rounding", **values)
         )
         console.print_field("compared", words)
     if faults:

@@ -228,7 +228,7 @@ def test_it_runs_anew_elsewhere_with_the_same_bytes(study, out, temporary, tmp_p
     monkeypatch.chdir(tmp_path)
     shutil.move(out, tmp_path / "gone")
     told = command("run", "study.zip", "--no-figures", "--out", "again")
-    assert "compared  6 tables, the same bytes as in study.zip" in told.stdout
+    assert "compared  rls2: 6 tables, the same bytes as in study.zip" in told.stdout
     assert csv_bytes(tmp_path / "again" / "rls2") == csv_bytes(tmp_path / "gone" / "rls2")
     assert str(temporary) not in told.output
     written = "".join(path.read_text() for path in (tmp_path / "again" / "rls2").iterdir())
