@@ -30,6 +30,8 @@ def stored_experiment(record: Mapping, folder: Path) -> Experiment | None:
 def recomputable_experiment(record: Mapping, folder: Path) -> Experiment:
     """The experiment of a result with the realisations of each case that its tables hold. Where an earlier version
     wrote no config.yaml, its cases are as run.json resolved them. Raises ConfigError where it cannot be read."""
+    if judged := record.get("judged"):
+        raise ConfigError(f"{folder}: a result does not contain the estimates of its judged filter {', '.join(judged)}")
     if CONFIG_FILE in record["outputs"]:
         experiment = stored_experiment(record, folder)
         if experiment is None:

@@ -10,6 +10,7 @@ import time
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from radarsim.api.archive import Archive, write_archive
@@ -320,6 +321,19 @@ def test_code_that_has_changed_since_is_not_packed_with_a_result(own, tmp_path):
     told = command("pack", "results/mine", "-o", tmp_path / "s.zip", "--code", code=2).stderr
     assert "has changed since it ran: run it again before packing" in told
     assert not (tmp_path / "s.zip").exists()
+
+
+def test_a_judged_result_says_what_it_lacks(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    command("simulate", "rls2", "--realisations", "0:500", "-o", "plots.npz")
+    ranges = np.load("plots.npz")["range_m"]
+    np.savez("estimates.npz", estimates=np.stack([ranges, np.zeros_like(ranges)], axis=2))
+    command("judge", "rls2", "estimates.npz", "--no-figures", "--quiet")
+    told = command("pack", "results/rls2_mine", "-o", "s.zip").stdout
+    assert "the estimates of its judged filter mine are not in it" in told
+    lack = "nothing could be recomputed: s.zip/results/rls2_mine: a result does not contain the estimates"
+    assert lack in command("check", "s.zip", code=3).stderr
+    assert "holds no estimates of its judged filter mine" in command("run", "s.zip", code=2).stderr
 
 
 def test_a_directory_of_results_is_packed_as_a_whole(out, tmp_path):

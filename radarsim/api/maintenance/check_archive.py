@@ -114,12 +114,15 @@ def unpacked(path: str | os.PathLike[str], trust_code: bool) -> Iterator[tuple[A
 
 
 def runnable_results(archive: Archive, folder: Path, trust_code: bool) -> list[tuple[str, Path]]:
-    """The results in an unpacked archive, by name, with their folders. Raises ConfigError for those that run code which
-    nobody trusts."""
+    """The results in an unpacked archive, by name, with their folders. Raises ConfigError for those that cannot be run:
+    of judged estimates, or of code which nobody trusts."""
     places = {name: folder / RESULTS / name for name in archive.facts["results"]}
     faults = []
     for name, place in places.items():
-        named = code_names(read_record(place) or {})
+        record = read_record(place) or {}
+        if judged := record.get("judged"):
+            faults.append(f"{archive.path}: {name}: holds no estimates of its judged filter {', '.join(judged)}")
+        named = code_names(record)
         if named and not trust_code:
             reason = _untrusted(named, archive.facts["results"][name]["code"])
             faults.append(f"{archive.path}: {name}: {reason.replace('recomputed', 'run')}")

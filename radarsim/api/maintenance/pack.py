@@ -113,7 +113,9 @@ def _block_files(folder: Path, record: Mapping[str, Any], notes: list[str]) -> d
         if audit.faults:
             raise StoreError(*audit.faults, f"{folder}: its stored blocks are damaged, and it is not packed")
         contents |= {f"{identity}/{piece.name}.sums": _block(store, piece) for piece in _pieces_behind(audit, done)}
-    if missing:
+    if judged := record.get("judged"):
+        notes.append(f"{folder}: the estimates of its judged filter {', '.join(judged)} are not in it: hashes alone")
+    elif missing:
         others = f" and {len(missing) - 1} other cases" if len(missing) > 1 else ""
         notes.append(f"{folder}: no blocks of {missing[0]}{others} are stored: it can only be recomputed as a whole")
     return contents
