@@ -37,11 +37,11 @@ class CheckedArchive:
 
 def check_archive(
     path: str | os.PathLike[str],
-    max_pieces: int = RECOMPUTED_PIECES,
+    recompute: int = RECOMPUTED_PIECES,
     trust_code: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> CheckedArchive:
-    """Check an archive of results: its files, the stored blocks, max_pieces of them of each case computed again, and
+    """Check an archive of results: its files, its blocks, as many of each case computed again as `recompute` says, and
     the tables made from the sums. What is read from it is gone afterwards.
 
     Code of user filters in it is run only with trust_code. Raises ConfigError for what is no archive of results,
@@ -52,8 +52,8 @@ def check_archive(
             place = folder / RESULTS / name
             named = code_names(read_record(place) or {})
             refused = bool(named) and not trust_code
-            inspections[name] = inspect_result(place, 0 if refused else max_pieces, progress)
-            if refused and max_pieces:
+            inspections[name] = inspect_result(place, 0 if refused else recompute, progress)
+            if refused and recompute:
                 inspections[name].not_checked = [_untrusted(named, facts["code"])]
             _name_archive(inspections[name], str(folder), str(archive.path))
         return CheckedArchive(archive.path, archive.sha256, len(archive.names), inspections)

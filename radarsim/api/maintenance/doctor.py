@@ -12,7 +12,7 @@ from typing import Any
 
 from radarsim.api.case_work import CaseWork
 from radarsim.api.maintenance.inspection import Inspection
-from radarsim.api.maintenance.recompute import Progress, recompute
+from radarsim.api.maintenance.recompute import Progress, recompute_result
 from radarsim.api.stored_cases import recomputable_experiment, stored_case, stored_experiment
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores, instruction_set, machine_facts
@@ -55,10 +55,10 @@ def cluster() -> str:
         return "Dask is not installed; `pip install 'radarsim[cluster]'` adds --workers and --scheduler"
 
 
-def inspect_result(folder: str | os.PathLike[str], max_pieces: int = 0, progress: Progress | None = None) -> Inspection:
+def inspect_result(folder: str | os.PathLike[str], recompute: int = 0, progress: Progress | None = None) -> Inspection:
     """Check a folder of results against its run.json, and all stored blocks of its cases; compute some of it again.
 
-    max_pieces is the number of stored pieces to compute again for each case, the smallest first; if above 0, cases
+    recompute is the number of stored pieces to compute again for each case, the smallest first; if above 0, cases
     without blocks are computed from the config, and the tables are made from the sums and compared. progress(done,
     total) counts the realisations. What could not be checked is in `not_checked`; blocks that other sources made are
     noted. Raises ConfigError where the folder holds no results, or code of another user would have to run."""
@@ -68,7 +68,7 @@ def inspect_result(folder: str | os.PathLike[str], max_pieces: int = 0, progress
     if _digest(record["resolved"]) != record["resolved_sha256"]:
         inspection.faults.append(f"{inspection.folder / 'run.json'}: damaged: the config in it is not the one that ran")
     inspection.total = sum(case["done"] for case in record["cases"].values())
-    experiment = _experiment(inspection, record) if max_pieces else None
+    experiment = _experiment(inspection, record) if recompute else None
     known = experiment or stored_experiment(record, inspection.folder)
     audits = {}
     for name, stored_identity in record["identities"].items():
@@ -79,8 +79,8 @@ def inspect_result(folder: str | os.PathLike[str], max_pieces: int = 0, progress
         if audit is not None:
             audits[name] = audit
     if experiment is not None:
-        recompute(inspection, record, experiment, audits, max_pieces, blocks.parent, progress)
-    elif not max_pieces and (absent := [name for name in record["identities"] if name not in audits]):
+        recompute_result(inspection, record, experiment, audits, recompute, blocks.parent, progress)
+    elif not recompute and (absent := [name for name in record["identities"] if name not in audits]):
         others = f" and {len(absent) - 1} other cases" if len(absent) > 1 else ""
         cases = "" if len(absent) == len(record["identities"]) else f" of {absent[0]}{others}"
         inspection.not_checked.append(f"nothing{cases} could be recomputed: no blocks are stored")

@@ -55,7 +55,7 @@ class Counter:
             self._progress(self.done, self._total)
 
 
-def recompute(
+def recompute_result(
     inspection: Inspection,
     record: Mapping[str, Any],
     experiment: Experiment,
