@@ -89,14 +89,14 @@ def _name_faults(names: Sequence[str]) -> list[str]:
     """Why names are not those of files in an archive."""
     faults = [f"has {len(names):,} files, the limit is {MAX_FILES:,}"] if len(names) > MAX_FILES else []
     faults += [f"{name!r}: is no path of a file in an archive" for name in names if not _is_safe(name)]
-    seen: set[str] = set()
+    folded_names: set[str] = set()
     for name in names:
         folded = unicodedata.normalize("NFC", name).casefold()
-        if folded in seen:
+        if folded in folded_names:
             faults.append(f"{name!r}: is there twice, or as the same file on some systems")
-        seen.add(folded)
-    folders = {folded.rpartition("/")[0] for folded in seen}
-    faults += [f"{name!r}: is a file and a folder" for name in seen & folders]
+        folded_names.add(folded)
+    folders = {folded.rpartition("/")[0] for folded in folded_names}
+    faults += [f"{name!r}: is a file and a folder" for name in folded_names & folders]
     return faults
 
 

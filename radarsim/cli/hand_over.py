@@ -1,5 +1,6 @@
 """The command pack, and what check and run do with an archive."""
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -51,7 +52,7 @@ def pack(results: tuple[str, ...], archive: str, code: bool, as_json: bool) -> N
     console.print_line(tr("{path}: {files}, {size:.1f} MB", path=str(packed.path), files=files, size=packed.size / 1e6))
     console.print_field("results", ", ".join(packed.results))
     console.print_field("SHA-256", packed.sha256)
-    console.print_field("verify", f"radarsim check {packed.path}")
+    console.print_field("verify", shlex.join(["radarsim", "check", str(packed.path)]))
     for note in packed.notes:
         console.print_line(tr("note: {words}", words=note))
 
@@ -65,11 +66,11 @@ def are_archives(sources: Sequence[str]) -> bool:
 
 
 def refuse_options(archives: Sequence[str], values: Mapping[str, Any]) -> None:
-    """Raise UsageError for options of configs that are given with an archive: options or names of them, with values."""
-    given = [name if name.startswith("-") else f"--{name}" for name, value in values.items() if value]
-    given = [name for name in given if (name, values.get("of")) != ("--of", "sigma")]
-    if given:
-        raise click.UsageError(f"{archives[0]}: {', '.join(given)} does not go with an archive")
+    """Raise UsageError for options of configs beside an archive; values: of all options, by option or name."""
+    used_options = [name if name.startswith("-") else f"--{name}" for name, value in values.items() if value]
+    used_options = [name for name in used_options if (name, values.get("of")) != ("--of", "sigma")]
+    if used_options:
+        raise click.UsageError(f"{archives[0]}: {', '.join(used_options)} does not go with an archive")
 
 
 @contextmanager
@@ -83,14 +84,14 @@ def loadable(sources: Sequence[str], trust_code: bool) -> "Iterator[list[tuple[s
         yield [(source, None) for source in sources]
         return
     with ExitStack() as stack:
-        found: list[tuple[str, Archive | None]] = []
+        results: list[tuple[str, Archive | None]] = []
         for source in sources:
             archive, folder = stack.enter_context(check_archive.unpacked(source, trust_code))
             for name, place in check_archive.runnable_results(archive, folder, trust_code):
-                found.append((str(place), archive))
+                results.append((str(place), archive))
                 for file in archive.facts["results"][name]["code"]:
                     click.echo(f"note: runs code of {source}: results/{name}/{file}", err=True)
-        yield found
+        yield results
 
 
 def named_by_results(
@@ -122,8 +123,8 @@ def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: 
         for name, inspection in checked.results.items():
             faults += inspection.faults
             not_checked += [f"{archive}: {name}: {line}" for line in inspection.not_checked]
-        found = {name: json_output.fields(inspection) for name, inspection in checked.results.items()}
-        documents.append({"archive": archive, "sha256": checked.sha256, "files": checked.files, "results": found})
+        results = {name: json_output.fields(inspection) for name, inspection in checked.results.items()}
+        documents.append({"archive": archive, "sha256": checked.sha256, "files": checked.files, "results": results})
         if as_json:
             continue
         files = plural("{count} file", "{count} files", checked.files)

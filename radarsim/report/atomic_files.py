@@ -163,18 +163,18 @@ def _journal(path: Path) -> Replacement | None:
     try:
         if path.is_symlink() or foreign_owner(path) is not None:
             return None
-        found = Replacement(**json.loads(path.read_bytes()))
-        names = (*found.files, *found.removed)
+        replacement = Replacement(**json.loads(path.read_bytes()))
+        names = (*replacement.files, *replacement.removed)
         inside = os.path.realpath(path.parent)  # which a folder that is a link might leave
         places = {os.path.realpath((path.parent / name).parent) for name in names}
         valid = (
-            re.fullmatch("[0-9a-f]{32}", found.token)
+            re.fullmatch("[0-9a-f]{32}", replacement.token)
             and all(map(_is_inside, names))
             and all(os.path.commonpath([place, inside]) == inside for place in places)
         )
     except (ValueError, TypeError, RecursionError):
         return None
-    return found if valid else None
+    return replacement if valid else None
 
 
 def _is_inside(name: str) -> bool:

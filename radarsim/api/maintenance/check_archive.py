@@ -50,11 +50,11 @@ def check_archive(
         inspections = {}
         for name, facts in archive.facts["results"].items():
             place = folder / RESULTS / name
-            named = code_names(read_record(place) or {})
-            refused = bool(named) and not trust_code
+            code_places = code_names(read_record(place) or {})
+            refused = bool(code_places) and not trust_code
             inspections[name] = inspect_result(place, 0 if refused else recompute, progress)
             if refused and recompute:
-                inspections[name].not_checked = [_untrusted(named, facts["code"])]
+                inspections[name].not_checked = [_untrusted(code_places, facts["code"])]
             _name_archive(inspections[name], str(folder), str(archive.path))
         return CheckedArchive(archive.path, archive.sha256, len(archive.names), inspections)
 
@@ -122,18 +122,18 @@ def runnable_results(archive: Archive, folder: Path, trust_code: bool) -> list[t
         record = read_record(place) or {}
         if judged := record.get("judged"):
             faults.append(f"{archive.path}: {name}: holds no estimates of its judged filter {', '.join(judged)}")
-        named = code_names(record)
-        if named and not trust_code:
-            reason = _untrusted(named, archive.facts["results"][name]["code"])
+        code_places = code_names(record)
+        if code_places and not trust_code:
+            reason = _untrusted(code_places, archive.facts["results"][name]["code"])
             faults.append(f"{archive.path}: {name}: {reason.replace('recomputed', 'run')}")
     if faults:
         raise ConfigError(*faults)
     return [*places.items()]
 
 
-def _untrusted(named: Sequence[str], packed: Sequence[str]) -> str:
+def _untrusted(code_places: Sequence[str], packed: Sequence[str]) -> str:
     """Why nothing is computed again where code that nobody trusts would have to run."""
-    names = ", ".join(named)
+    names = ", ".join(code_places)
     if not packed:
         return (
             f"nothing could be recomputed: its filters are code that is not in the archive: {names}; put it into the "
@@ -179,8 +179,8 @@ def _check_outputs(archive: Archive, folder: Path) -> None:
         if record is None:
             raise ConfigError(f"{archive.path}: {place}{RECORD} is missing")
         code = archive.facts["results"][result].get("code", ())
-        named = {f"{place}{name}" for name in (RECORD, *record["outputs"], *code)}
-        odd = [name for name in archive.names if name.startswith(place) and name not in named]
+        recorded_paths = {f"{place}{name}" for name in (RECORD, *record["outputs"], *code)}
+        odd = [name for name in archive.names if name.startswith(place) and name not in recorded_paths]
         if odd:
             raise ConfigError(f"{archive.path}: {odd[0]!r} is not named by {place}{RECORD}")
 

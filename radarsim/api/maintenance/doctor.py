@@ -69,10 +69,10 @@ def inspect_result(folder: str | os.PathLike[str], recompute: int = 0, progress:
         inspection.faults.append(f"{inspection.folder / 'run.json'}: damaged: the config in it is not the one that ran")
     inspection.total = sum(case["done"] for case in record["cases"].values())
     experiment = _experiment(inspection, record) if recompute else None
-    known = experiment or stored_experiment(record, inspection.folder)
+    recorded = experiment or stored_experiment(record, inspection.folder)
     audits = {}
     for name, stored_identity in record["identities"].items():
-        case = stored_case(record, name, known)
+        case = stored_case(record, name, recorded)
         if experiment is None and case is not None and any(member.written for member in case.user_filters):
             case = None  # of which code would run
         audit = _audit_case(inspection, record, name, blocks / stored_identity, case)
@@ -81,8 +81,8 @@ def inspect_result(folder: str | os.PathLike[str], recompute: int = 0, progress:
     if experiment is not None:
         recompute_result(inspection, record, experiment, audits, recompute, blocks.parent, progress)
     elif not recompute and (absent := [name for name in record["identities"] if name not in audits]):
-        others = f" and {len(absent) - 1} other cases" if len(absent) > 1 else ""
-        cases = "" if len(absent) == len(record["identities"]) else f" of {absent[0]}{others}"
+        further_cases = f" and {len(absent) - 1} other cases" if len(absent) > 1 else ""
+        cases = "" if len(absent) == len(record["identities"]) else f" of {absent[0]}{further_cases}"
         inspection.not_checked.append(f"nothing{cases} could be recomputed: no blocks are stored")
     return inspection
 

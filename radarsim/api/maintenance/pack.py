@@ -62,10 +62,10 @@ def pack(results: Sequence[str | os.PathLike[str]], archive: str | os.PathLike[s
     for folder in _folders_of_results(results):
         record, files = _result_files(folder)
         code_files = packed_code(folder, record) if code else {}
-        if taken := sorted({*files} & {*code_files}):
-            raise ConfigError(f"{folder}: {taken[0]} is a file of the result, and one that the code of a filter reads")
-        if not code and (named := code_names(record)):
-            notes.append(f"{folder}: the code of its filters is not packed: {', '.join(named)}; --code adds it")
+        if clashes := [name for name in files if code_files.get(name, files[name]) != files[name]]:
+            raise ConfigError(f"{folder}: {clashes[0]} is both a file of the result and another that a filter reads")
+        if not code and (code_places := code_names(record)):
+            notes.append(f"{folder}: the code of its filters is not packed: {', '.join(code_places)}; --code adds it")
         files |= code_files
         name = record["config"] if is_stem(str(record["config"])) else folder.name
         if name in facts:
@@ -116,8 +116,10 @@ def _block_files(folder: Path, record: Mapping[str, Any], notes: list[str]) -> d
     if judged := record.get("judged"):
         notes.append(f"{folder}: the estimates of its judged filter {', '.join(judged)} are not in it: hashes alone")
     elif missing:
-        others = f" and {len(missing) - 1} other cases" if len(missing) > 1 else ""
-        notes.append(f"{folder}: no blocks of {missing[0]}{others} are stored: it can only be recomputed as a whole")
+        further_cases = f" and {len(missing) - 1} other cases" if len(missing) > 1 else ""
+        notes.append(
+            f"{folder}: no blocks of {missing[0]}{further_cases} are stored: it can only be recomputed as a whole"
+        )
     return contents
 
 

@@ -122,7 +122,7 @@ def _smallest_pieces(audit: Audit, block: int, done: int, max_pieces: int) -> li
     for piece in [piece for piece in by_size if sum(spans[piece]) <= done] or by_size:
         first, count = spans[piece]
         if len(chosen) < max_pieces and not any(
-            first < sum(spans[other]) and spans[other][0] < first + count for other in chosen
+            first < sum(spans[earlier]) and spans[earlier][0] < first + count for earlier in chosen
         ):
             chosen.append(piece)
     return chosen
