@@ -149,7 +149,7 @@ def _refusal(record: Mapping[str, Any], experiment: Experiment, out: Path_, diff
     """The error that a result would replace another one, and how that is kept or brought back."""
     folder = Path(out) / experiment.stem
     counts = sorted({*_counts(record).values()})
-    held = plural(
+    sentence = plural(
         "{folder} holds tables of {count} realisation {difference}",
         "{folder} holds tables of {count} realisations {difference}",
         max(counts),
@@ -159,7 +159,7 @@ def _refusal(record: Mapping[str, Any], experiment: Experiment, out: Path_, diff
     )
     replace_option, out_argument = argument("replace=True", "--replace"), argument("out", "--out")
     remedy = tr("give {out} another directory, or {replace} to replace them", out=out_argument, replace=replace_option)
-    return ConfigError(f"{held}; {remedy}; {_way_back(record, out, folder)}")
+    return ConfigError(f"{sentence}; {remedy}; {_way_back(record, out, folder)}")
 
 
 def _way_back(record: Mapping[str, Any], out: Path_, folder: Path) -> str:

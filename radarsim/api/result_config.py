@@ -19,10 +19,12 @@ def config_files(
     if results is not None:
         done = {result.name: result.count for result in results}
     try:
-        written = complete_config(experiment, done, shipped_stem(experiment), registry.keys(experiment.study), taken)
+        kept_config = complete_config(
+            experiment, done, shipped_stem(experiment), registry.keys(experiment.study), taken
+        )
     except OSError:
         return {}
-    return {} if written is None else {CONFIG_FILE: written.text.encode(), **written.files}
+    return {} if kept_config is None else {CONFIG_FILE: kept_config.text.encode(), **kept_config.files}
 
 
 def config_text(experiment: Experiment, results: Sequence[CaseResult] | None = None) -> str:

@@ -57,8 +57,14 @@ def missing_realisations(stock: Inventory) -> str:
     """Which realisations a store lacks, and which shares these look like."""
     runs = shorten_names([tr("{first:,} to {last:,}", first=first, last=last) for first, last in stock.missing], 3)
     if stock.part != (1, 1):
-        number, of = stock.part
-        counts = {"number": number, "of": of, "missing": stock.missing_blocks, "blocks": stock.blocks, "runs": runs}
+        number, share_count = stock.part
+        counts = {
+            "number": number,
+            "of": share_count,
+            "missing": stock.missing_blocks,
+            "blocks": stock.blocks,
+            "runs": runs,
+        }
         return tr("share {number} of {of}: {missing} of {blocks} pieces missing, realisations {runs}", **counts)
     if stock.shares is None:
         return tr("realisations {runs}", runs=runs)

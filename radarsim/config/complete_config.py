@@ -99,8 +99,8 @@ def complete_config(
     content = _portable(content, names, experiment.cases)
     files = {name: Path(path).read_bytes() for path, name in names.items()}
     filters = (member for case in experiment.cases for member in case.user_filters)
-    untold = list(dict.fromkeys(_one_line(member.name) for member in filters if not member.written))
-    return CompleteConfig(_text(content, model, untold), files)
+    unnamed_filters = list(dict.fromkeys(_one_line(member.name) for member in filters if not member.written))
+    return CompleteConfig(_text(content, model, unnamed_filters), files)
 
 
 def _with_realisations(content: Content, experiment: Experiment, done: Mapping[str, int]) -> Content:
@@ -127,18 +127,18 @@ def _file_names(content: Content, taken: Iterable[str]) -> dict[str, str]:
 
     The name of a swept file is part of the names of cases, so it changes only where it must."""
     names: dict[str, str] = {}
-    used = {name.casefold() for name in (*taken, CONFIG_FILE)}
+    used_names = {name.casefold() for name in (*taken, CONFIG_FILE)}
     for data_path in _data_paths(content):
         if data_path.path in names:
             continue
-        written = Path(data_path)
-        inside = not written.is_absolute() and ".." not in written.parts
-        candidates = [written.as_posix()] if inside else []
-        numbered = (f"{INPUTS}/{n}/{written.name}" for n in range(2, len(used) + 3))
-        candidates += [f"{INPUTS}/{written.name}", *numbered]
-        name = next(name for name in candidates if name.casefold() not in used)
+        written_path = Path(data_path)
+        inside = not written_path.is_absolute() and ".." not in written_path.parts
+        candidates = [written_path.as_posix()] if inside else []
+        numbered = (f"{INPUTS}/{n}/{written_path.name}" for n in range(2, len(used_names) + 3))
+        candidates += [f"{INPUTS}/{written_path.name}", *numbered]
+        name = next(name for name in candidates if name.casefold() not in used_names)
         names[data_path.path] = name
-        used.add(name.casefold())
+        used_names.add(name.casefold())
     return names
 
 
@@ -162,14 +162,19 @@ def _portable(value: Any, file_names: Mapping[str, str], cases: Iterable[Case]) 
     return content | ({"source": source[:SOURCE_DIGITS]} if source else {})
 
 
-def _text(content: Content, model: type[Model], untold: Sequence[str]) -> str:
-    """The content as YAML, each key of a single config with its description. untold: filters that it cannot name."""
+def _text(content: Content, model: type[Model], unnamed_filters: Sequence[str]) -> str:
+    """The content as YAML, each key of a single config with its description.
+
+    unnamed_filters: those that it cannot describe."""
     yaml = CommentedYaml(exact_yaml)
     common = {key: value for key, value in content.items() if key in CommonKeys.model_fields}
     first = {key: common.pop(key) for key in ("name", "like", "study") if key in common}
     lines = [
         f"# The whole experiment of this result: `radarsim run {CONFIG_FILE}` computes the same tables anywhere.",
-        *(f"# Without {name}: that filter was given as estimates or as an object of Python." for name in untold),
+        *(
+            f"# Without {name}: that filter was given as estimates or as an object of Python."
+            for name in unnamed_filters
+        ),
         *(line for key, value in first.items() for line in yaml.key_lines(key, value, CommonKeys, "")),
     ]
     if "include" in common:

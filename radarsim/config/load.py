@@ -34,8 +34,8 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Override
         faults.add(Origin("config"), (), f"must be a path, a name or a mapping, got {repr(source)[:60]}")
     experiment = None
     if document is not None:
-        given = Path() if isinstance(source, Mapping) else Path(os.fsdecode(source))
-        is_path = not isinstance(source, Mapping) and document.file in (given, given / CONFIG_FILE)
+        given_path = Path() if isinstance(source, Mapping) else Path(os.fsdecode(source))
+        is_path = not isinstance(source, Mapping) and document.file in (given_path, given_path / CONFIG_FILE)
         path = document.file if is_path else None
         experiment = Expander(read_document, settings, faults, studies, path).experiment(document)
     if document is not None and changes_included(document):

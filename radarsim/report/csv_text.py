@@ -41,10 +41,10 @@ def from_csv(content: bytes, whole_numbers: bool = False) -> "pd.DataFrame":
     numbers if asked for. Raises ValueError where a row has another length."""
     names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
     columns = zip(*rows, strict=True) if rows else ([] for _ in names)
-    read = {name: (_read(name, column), column) for name, column in zip(names, columns, strict=True)}
+    columns_read = {name: (_read(name, column), column) for name, column in zip(names, columns, strict=True)}
     if not whole_numbers:
-        return frame({name: values for name, (values, _) in read.items()})
-    return frame({name: _as_whole(values, column) for name, (values, column) in read.items()})
+        return frame({name: values for name, (values, _) in columns_read.items()})
+    return frame({name: _as_whole(values, column) for name, (values, column) in columns_read.items()})
 
 
 def _as_whole(values: Sequence[str] | np.ndarray, column: Sequence[str]) -> Sequence[str] | np.ndarray:
