@@ -13,8 +13,8 @@ from radarsim.api.load_experiments import combine_overrides
 from radarsim.api.precision_target import check_precision
 from radarsim.api.progress import Progress
 from radarsim.api.repeat_command import repeat_command
-from radarsim.api.run_errors import parse_span
 from radarsim.api.replacement import check_replacement, larger_counts, stored_counts, with_counts
+from radarsim.api.run_errors import parse_span
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, simulate
 from radarsim.api.stored_runs import config_filter_warnings, make_result
@@ -71,8 +71,8 @@ def run(
     workers: number of processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already
     open. width_mm: width of the figures, instead of their own. replace: whether tables of other settings or another
     seed, or of more realisations, may be replaced in the folder of the result; otherwise ConfigError is raised before
-    anything is computed, and of more realisations the stored ones are shown. runs: scans, `2:60` or `all`, for the table
-    `runs` of each run's root-mean-square error over them (`Result.add_runs_table`). progress is called with the
+    anything is computed, and of more realisations the stored ones are shown. runs: scans, `2:60` or `all`, for the
+    table `runs` of each run's root-mean-square error over them (`Result.add_runs_table`). progress is called with the
     realisations that are done, are to be done, and were stored, where cases are weighed by their time.
 
     Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
