@@ -5,7 +5,7 @@
 >>> result.gains.columns[0]
 'case'
 >>> result.figure("gain_r")  # doctest: +ELLIPSIS
-<Figure size ...>
+<PrintableFigure size ...>
 
 In a notebook a result shows its answer and first figure; `radarsim.load("rls2")` gives one that was run before.
 `check`, `solve`, `tune`, `sensitivity`, `compare`, `chart`, `claims` and `interpretations` do what the commands of

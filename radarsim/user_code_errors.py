@@ -121,6 +121,26 @@ def study_context(name: str) -> Iterator[None]:
         _owner.reset(token)
 
 
+def is_code_forbidden() -> bool:
+    """Whether no code of the user may run."""
+    return bool(os.environ.get(NO_CODE_VARIABLE))
+
+
+@contextmanager
+def code_allowed(trusted: bool) -> Iterator[None]:
+    """While entered no code of users runs, here and in processes started here, unless it is trusted."""
+    before = os.environ.get(NO_CODE_VARIABLE)
+    if not trusted:
+        os.environ[NO_CODE_VARIABLE] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(NO_CODE_VARIABLE, None)
+        else:
+            os.environ[NO_CODE_VARIABLE] = before
+
+
 def call_user_function(function: Callable[..., Any], *arguments: Any, owner: str = "") -> Any:
     """The value of an author's function; ConfigError with its file and line where it fails.
 

@@ -54,6 +54,7 @@ ROOMS = {
     "studies.noise": ("config.experiment", "config.identity", "kernels.random"),
     "studies.radial_truth": ("constants", "physics"),
     "studies.random_numbers": ("kernels.random",),
+    "studies.gross_errors": ("kernels.likelihood",),
     "studies.plot_arrays": ("studies.random_numbers",),
     "studies.recording_interface": ("config.experiment", "studies.plot_arrays"),
     "studies.floors": ("engine.results", "report", "studies.interface"),
@@ -78,7 +79,8 @@ ROOMS = {
     "studies.linear_exact": ("studies.linear_design",),
     "studies.linear_problem": ("config.experiment", "kernels", "studies.linear_design", "studies.noise"),
     "studies.linear_recordings": (
-        *("kernels", "studies.linear", "studies.linear_design", "studies.recording_interface"),
+        *("kernels", "studies.gross_errors", "studies.linear", "studies.linear_design"),
+        "studies.recording_interface",
     ),
     "studies.stepwise": (
         *("config.experiment", "config.study_keys", *SUMS, "kernels", "report", "report.drawing"),
@@ -111,7 +113,7 @@ ROOMS = {
     ),
     "api.maintenance": (
         *("api", "config", "engine", "engine.store", "extensions", "kernels.cache", "report"),
-        *("studies.identity", "studies.registry"),
+        *("studies.identity", "studies.registry", "user_code_errors"),
     ),
     "recordings": (
         *("recordings.fit", "recordings.formats", "recordings.registration", "recordings.report"),
@@ -162,7 +164,7 @@ ROLES = {
         (*NUMBERS, "studies.noise", "studies.plot_arrays", "studies.recording_interface"),
         (*COMPUTED, "tracking"),
     ),
-    "plot_likelihood": ((*NUMBERS, "studies.recording_interface"), (*COMPUTED, "tracking")),
+    "plot_likelihood": ((*NUMBERS, "studies.gross_errors", "studies.recording_interface"), (*COMPUTED, "tracking")),
     "recorded_plots": (
         ("config.experiment", "constants", "studies.plot_arrays", "studies.recording_interface"),
         (*COMPUTED, "tracking", "plot_likelihood", "recorded_plots"),

@@ -113,7 +113,7 @@ def _module_beside(file: Path) -> list[ModuleType]:
     path = file.with_suffix(".py")
     if not path.is_file():
         return []
-    if os.environ.get(user_code_errors.NO_CODE_VARIABLE):
+    if user_code_errors.is_code_forbidden():
         raise ConfigError(f"{path}: is code of yours, and --no-code runs none")
     specification = importlib.util.spec_from_file_location(f"_radarsim_claims_{file.stem}", path)
     assert specification is not None  # the name ends in .py

@@ -95,9 +95,9 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
             tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
         ]
         parts = track_rows.join_tracks(pieces)
-        scale = np.where(plot_files.sigma > 0, plot_files.sigma, 1.0)
-        assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(plot_files.estimate))
-        assert np.nanmax(np.abs(parts.estimate - plot_files.estimate) / scale) < track_rounding(whole)
+        scale = np.where(whole.sigma > 0, whole.sigma, 1.0)
+        assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(whole.estimate))
+        assert np.nanmax(np.abs(parts.estimate - whole.estimate) / scale) < track_rounding(whole)
 
 
 def test_uneven_times_and_missing_values_are_least_squares_without_a_manoeuvre():

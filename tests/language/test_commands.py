@@ -92,7 +92,9 @@ def test_interpretations_of_a_claim_and_their_curve(claim, tmp_path):
         page = markdown_pages(done)
         over = done.papers[0].claims[0]
         texts = shown(specification_curve(over))
-    every = [one.name for choice in over.of.choices for one in choice.alternatives]  # the page has them as keys
+    every = [
+        one.name for choice in over.interpretations.choices for one in choice.alternatives
+    ]  # the page has them as keys
     typed = {part for name in every for part in re.findall("[A-Za-z]+", name)} | {"same", "time"}
     names = NAMES | typed | {"interpretations", "markdown", "results", "verdicts"}
     assert {text: found for text in [*texts, *page.splitlines()] if (found := untranslated(text, names))} == {}
@@ -131,14 +133,12 @@ def test_reasons_of_claims_that_are_not_judged(why):
 
 @pytest.mark.slow
 def test_every_reason_that_the_sources_give_is_known():
-    """What `Missing` and `Unreadable` are raised with stands in the catalogues."""
+    """What `MissingEvidence` is raised with stands in the catalogues."""
     found = {text for _, text, _ in messages.found()}
     raised = set()
     for path in sorted((messages.PACKAGE).rglob("*.py")):
         if path.name != "recorded.py" and not {"one_file", "one_step"} & set(path.parts):
-            raised |= set(
-                re.findall(r'raise (?:claims\.)?(?:Missing|Unreadable)\("([^"]+)"', path.read_text(encoding="utf-8"))
-            )
+            raised |= set(re.findall(r'raise MissingEvidence\("([^"]+)"', path.read_text(encoding="utf-8")))
     assert len(raised) > 4
     assert raised <= found
     assert key_differences  # its texts are the patterns of `reasons`
@@ -183,7 +183,7 @@ def test_what_import_says_is_russian_and_its_faults_and_its_file_are_not(tmp_pat
         fault = command("import", log, "-o", plots, "--track", "1", "--bias", "range_m=9999", code=2)
     assert re.search(r"plots.csv \(3 строки, 1 трасса: .*\n +csv, прочитано 4 записи", said.stdout)
     assert said.stderr.split("\n")[:-1] == [
-        " " * 14 + "не учтено: строки не позже предыдущей той же трассы (1)",
+        " " * 14 + "не учтено: строки, переданные повторно, с тем же временем и теми же значениями (1)",
         " " * 14 + "отметок вне трасс, которые `radarsim track` пропустит: 1 из 3",
     ]
     assert plots.read_bytes() == english

@@ -130,6 +130,7 @@ def edit(package, old, new):
     package.file.write_text(text.replace(old, new), encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_class_does_not_outlive_the_edit_of_its_measure(package):
     package.command("run", NAME, "-n", "2000", "--no-figures", "-q")
     first = package.command("interpretations", NAME, "--no-figures").stdout
@@ -146,6 +147,7 @@ def test_a_class_does_not_outlive_the_edit_of_its_measure(package):
     assert f"{NAME}.1 refuted as shipped; other interpretations not judged" in " ".join(after.split())
 
 
+@pytest.mark.slow
 def test_a_measure_under_an_interpretation_sees_its_keys(package):
     line = next(line for line in package.file.read_text().splitlines() if "name: the first position, kind: U" in line)
     edit(package, line, line + "\n  - {name: longer steps, kind: U, reason: a test, sets: {target.sigma_step_m: 2}}")

@@ -20,9 +20,9 @@ from radarsim.config.find_files import is_stem
 from radarsim.engine.store.block_file import piece_named
 from radarsim.errors import ConfigError, RadarsimError
 from radarsim.extensions import extensions
+from radarsim.user_code_errors import code_allowed
 
 RECOMPUTED_PIECES = 2  # of each case
-NO_CODE = "RADARSIM_NO_CODE"
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def unpacked(path: str | os.PathLike[str], trust_code: bool) -> Iterator[tuple[A
     Meanwhile no code of users runs, unless it is trusted. Nothing is written before the whole archive is checked."""
     with Archive(path) as archive:
         _check_names(archive)
-        with tempfile.TemporaryDirectory(prefix="radarsim-") as temporary, _code_allowed(trust_code):
+        with tempfile.TemporaryDirectory(prefix="radarsim-") as temporary, code_allowed(trust_code):
             folder = Path(os.path.realpath(temporary))
             archive.extract(folder, archive.names)
             try:
@@ -183,21 +183,6 @@ def _check_outputs(archive: Archive, folder: Path) -> None:
         odd = [name for name in archive.names if name.startswith(place) and name not in recorded_paths]
         if odd:
             raise ConfigError(f"{archive.path}: {odd[0]!r} is not named by {place}{RECORD}")
-
-
-@contextmanager
-def _code_allowed(trusted: bool) -> Iterator[None]:
-    """While entered no code of users runs, here and in processes started here, unless it is trusted."""
-    before = os.environ.get(NO_CODE)
-    if not trusted:
-        os.environ[NO_CODE] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            os.environ.pop(NO_CODE, None)
-        else:
-            os.environ[NO_CODE] = before
 
 
 def _name_archive(inspection: Inspection, folder: str, archive: str) -> None:

@@ -264,7 +264,8 @@ def outlier_rows_text(rows: Sequence[OutlierRow]) -> str:
     """Where numbers are outliers: range_m at 120 s, 124 s; velocity_mps at 8 s; with the names of several tracks."""
     places: dict[str, list[str]] = {}
     for row in rows:
-        place = f"{row.t_s:g} s" if isinstance(row.track, int) else f"{row.t_s:g} s ({row.track})"
+        time = f"{row.t_s:g} {tr('s')}"
+        place = time if isinstance(row.track, int) else f"{time} ({row.track})"
         places.setdefault(row.column, []).append(place)
     texts = []
     for column, times in places.items():

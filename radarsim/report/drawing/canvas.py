@@ -43,7 +43,7 @@ FILE_STYLE: Any = {name: STYLE[name] for name in ("pdf.fonttype", "ps.fonttype",
 CACHED_METHODS = ("_update_ticks", "_get_ticklabel_bboxes")  # of Matplotlib's axes; arguments: none; ticks, renderer
 
 
-class PublishableCanvas(Canvas):
+class PrintableFigure(Canvas):
     """A figure of Matplotlib that embeds fonts in its files as the command does, however it is saved."""
 
     def savefig(self, *arguments: Any, **options: Any) -> None:
@@ -149,7 +149,7 @@ def _layout(figure: Figure, plan: LegendPlan) -> Canvas:
     height_mm = sum(heights) + _legends_height_mm(figure, plan, rows, columns, in_cell)
     height_mm += HEADLINE_MM * (headline.count("\n") + 1) if headline else 0.0
     layout = ConstrainedLayoutEngine(w_pad=0.03, h_pad=0.03, wspace=0.04, hspace=0.05)
-    canvas = PublishableCanvas(figsize=(figure.width_mm * MM, height_mm * MM), dpi=PNG_DPI, layout=layout)
+    canvas = PrintableFigure(figsize=(figure.width_mm * MM, height_mm * MM), dpi=PNG_DPI, layout=layout)
     FigureCanvasAgg(canvas)
     if headline:
         canvas.suptitle(headline, x=0.01, ha="left", fontsize=STYLE["font.size"], gid=HEADLINE_ID)

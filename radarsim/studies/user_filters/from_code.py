@@ -64,7 +64,7 @@ def filter_from_code(
     """The filter that a config in a folder names at a place. ConfigError where there is none, or none may run.
 
     Code that a result names by its hash is looked for beside its config, then in the working directory."""
-    if os.environ.get(user_code_errors.NO_CODE_VARIABLE):
+    if user_code_errors.is_code_forbidden():
         raise ConfigError(f"is code of yours, and --no-code runs none, got {keys.python!r}")
     where, _, object_name = keys.python.rpartition(":")
     if not where or not object_name.isidentifier():

@@ -155,6 +155,8 @@ def test_bad_value(good, said, key, value, message):
     lines = said(spoil(good, key, value))
     if value == {} and key.endswith("manoeuvre_variance"):  # a mapping says what it is to make least
         assert lines == [f"config: {key}.{missing}: required key is missing" for missing in ("minimise", "over")]
+    elif value == {} and key == "realisations":  # a mapping has the numbers of each case
+        assert lines == ["config: realisations: must hold at least 1, got {}"]
     elif key == "include":
         assert line in lines
     else:
@@ -181,7 +183,8 @@ RADAR = (
     "detection_probability, bias_range_m, bias_velocity_mps, sigma_bias_range_m, sigma_bias_velocity_mps"
 )
 FILTER = "name, kind, observes, initial_scans, manoeuvre_variance, process_noise"
-TOP = "radar, target, filters, baseline, scans, duration_s, study, include, sweep, realisations, seed, figures"
+TOP = "radar, target, filters, baseline, scans, duration_s, "
+TOP += "name, like, study, include, sweep, realisations, seed, figures, scenarios"
 UNKNOWN = [
     ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
     ("filters.0.manoeuver_variance", f"unknown key; did you mean manoeuvre_variance? allowed: {FILTER}"),
