@@ -1,5 +1,6 @@
 """Claims that a user writes: on a stored run of any config, and on a table that radarsim did not make."""
 
+import codecs
 import importlib.util
 import os
 from collections.abc import Iterable, Mapping
@@ -54,11 +55,12 @@ def _as_table(table: Any) -> "pd.DataFrame":
     if isinstance(table, Mapping):
         return frame({name: list(column) for name, column in table.items()})
     try:
-        return csv_text.from_csv(atomic_files.read(Path(table)))
+        content = atomic_files.read(Path(table)).removeprefix(codecs.BOM_UTF8)  # which spreadsheets write
+        return csv_text.from_csv(content.rstrip(b"\r\n"))
     except OSError as error:
         raise ConfigError(f"{table}: cannot be read: {error.strerror}") from error
     except ValueError as error:
-        raise ConfigError(f"{table}: is no table in CSV: {error}") from error
+        raise ConfigError(f"{table}: is no table in CSV with commas: {error}") from error
 
 
 def rows_on_stored_run(

@@ -88,15 +88,25 @@ def value(evidence: TableEvidence, rows: Any, column: str, lo: str = "", hi: str
 
     Default: columns COLUMN_lo and COLUMN_hi, or COLUMN_se, where the table has them; else it is without noise."""
     number, table = evidence.number(rows, column), evidence.table
+    if not math.isfinite(number):
+        return exact_number(math.nan)
     if bool(lo) != bool(hi) or (lo and se):
         raise ConfigError("takes lo and hi, or se alone")
     if not (lo or se):
         defaults = {end: f"{column}_{end}" for end in ("lo", "hi", "se") if f"{column}_{end}" in table}
         lo, hi, se = (defaults.get(end, "") for end in ("lo", "hi", "se"))
+        if bool(lo) != bool(hi):
+            raise ConfigError(f"column {lo or hi!r} is one end of an interval, and the table has no other")
     if lo and hi:
-        return Estimate(number, evidence.number(rows, lo), evidence.number(rows, hi))
+        low, high = evidence.number(rows, lo), evidence.number(rows, hi)
+        if not low <= number <= high:
+            raise ConfigError(f"{column} {number:.6g} is not between {lo} {low:.6g} and {hi} {high:.6g}")
+        return Estimate(number, low, high)
     if se:
-        half = statistics.Z95 * evidence.number(rows, se)
+        error = evidence.number(rows, se)
+        if not 0 <= error < math.inf:
+            raise ConfigError(f"{se} must be a standard error >= 0, got {error:.6g}")
+        half = statistics.Z95 * error
         return Estimate(number, number - half, number + half)
     return exact_number(number)
 

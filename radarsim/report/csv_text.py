@@ -38,8 +38,15 @@ def to_csv(table: "pd.DataFrame") -> bytes:
 
 def from_csv(content: bytes, whole_numbers: bool = False) -> "pd.DataFrame":
     """A table from `to_csv`'s bytes: labels as text, all else as exactly the numbers written, whole ones as whole
-    numbers if asked for. Raises ValueError where a row has another length."""
-    names, *rows = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
+    numbers if asked for. Raises ValueError where there is no row of names, or a row has another length."""
+    reader = csv.reader(io.StringIO(content.decode("utf-8"), newline=""), strict=True)
+    names, rows = next(reader, None), []
+    if not names:
+        raise ValueError("has no names of columns in its first line")
+    for row in reader:
+        if len(row) != len(names):
+            raise ValueError(f"line {reader.line_num} has {len(row)} cells, and the first line {len(names)}")
+        rows.append(row)
     columns = zip(*rows, strict=True) if rows else ([] for _ in names)
     columns_read = {name: (_read(name, column), column) for name, column in zip(names, columns, strict=True)}
     if not whole_numbers:

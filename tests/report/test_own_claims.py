@@ -39,7 +39,10 @@ TABLE = {
     "mean_hi": [0.3825, 0.3125, 0.43],
     "error": [0.01, 0.02, 0.03],
     "n": [20000, 20000, 500],
+    "half": [0.2, 0.2, 0.2],
+    "half_lo": [0.1, 0.1, 0.1],
 }
+BAD_TABLE = {"x": [1.0], "x_lo": [1.2], "x_hi": [0.8], "y": [1.0], "y_se": [-0.1], "z": [1.0], "z_se": [math.nan]}
 
 
 def test_a_number_of_a_row_is_judged_with_its_interval(tmp_path):
@@ -56,7 +59,9 @@ def test_a_number_of_a_row_is_judged_with_its_interval(tmp_path):
     assert (rows[1]["margin_kind"], rows[1]["n"], rows[2]["needed"] > 20000) == ("sample", 20000, True)
     file = tmp_path / "mine.csv"
     pd.DataFrame(TABLE).to_csv(file, index=False)
-    for same in (file, str(file), pd.DataFrame(TABLE), pd.DataFrame(TABLE).set_index("filter")):
+    spreadsheet = tmp_path / "spreadsheet.csv"
+    spreadsheet.write_bytes(b"\xef\xbb\xbf" + file.read_bytes().replace(b"\n", b"\r\n") + b"\r\n")
+    for same in (file, str(file), spreadsheet, pd.DataFrame(TABLE), pd.DataFrame(TABLE).set_index("filter")):
         pd.testing.assert_frame_equal(pd.DataFrame(judged(same, *parts)), pd.DataFrame(rows))
 
 
@@ -95,6 +100,7 @@ def test_statistics_of_rows_that_are_runs():
         ("[{}]", "{value: {column: mean}}", "value: of: 3 rows have {}: name one; mean takes all of them"),
         ("[{filter: ekf}]", "{value: {column: filter}}", "value: column 'filter' has cells that are no numbers"),
         ("[{filter: ekf}]", "{value: {column: mean, lo: mean_lo}}", "value: takes lo and hi, or se alone"),
+        ("[{filter: ekf}]", "{value: {column: half}}", "value: column 'half_lo' is one end of an interval"),
         ("[ekf]", "{value: {column: mean}}", "value: of: must name cells, {COLUMN: VALUE}, got 'ekf'"),
     ],
 )
@@ -105,8 +111,23 @@ def test_a_mistake_is_a_reason_with_its_line(of, measure, said):
     assert said in row["why"]
 
 
-def test_a_measure_without_a_number_is_not_judged():
-    (row,) = judged({"a": [math.nan]}, ("[{}]", "{value: {column: a}}", "{above: 0}"))
+@pytest.mark.parametrize(
+    ("column", "said"),
+    [
+        ("x", "value: x 1 is not between x_lo 1.2 and x_hi 0.8"),
+        ("y", "value: y_se must be a standard error >= 0, got -0.1"),
+        ("z", "value: z_se must be a standard error >= 0, got nan"),
+    ],
+)
+def test_an_interval_that_is_none_is_not_judged(column, said):
+    (row,) = judged(BAD_TABLE, ("[{}]", f"{{value: {{column: {column}}}}}", "{above: 0}"))
+    assert row["verdict"] == "not judged here"
+    assert said in row["why"]
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+def test_a_measure_without_a_number_is_not_judged(number):
+    (row,) = judged({"a": [number]}, ("[{}]", "{value: {column: a}}", "{above: 0}"))
     assert (row["class"], row["why"]) == ("not judged here", "its measure gives no number")
 
 
@@ -132,9 +153,14 @@ def test_claims_or_tables_that_cannot_be_read_are_named(tmp_path):
         radarsim.claims.judge(tmp_path / "nowhere.yaml", TABLE)
     with pytest.raises(ConfigError, match=r"nowhere\.csv: cannot be read"):
         radarsim.claims.judge(text, tmp_path / "nowhere.csv")
-    (tmp_path / "odd.csv").write_text("a,b\n1\n")
-    with pytest.raises(ConfigError, match=r"odd\.csv: is no table in CSV"):
-        radarsim.claims.judge(text, tmp_path / "odd.csv")
+    for content, said in (
+        ("a,b\n1\n", "line 2 has 1 cells, and the first line 2"),
+        ("a;b\n0,5;1\n", "line 2 has 2 cells, and the first line 1"),
+        ("", "has no names of columns"),
+    ):
+        (tmp_path / "odd.csv").write_text(content)
+        with pytest.raises(ConfigError, match=rf"odd\.csv: is no table in CSV with commas: {said}"):
+            radarsim.claims.judge(text, tmp_path / "odd.csv")
     choices = "choices: [{key: a, asks: b, original: c, alternatives: [{name: d, kind: U, reason: e}]}]\n"
     with pytest.raises(ConfigError, match="choices: need runs of a study in a package"):
         radarsim.claims.judge(text + choices, TABLE)
