@@ -53,6 +53,9 @@ def test_below_a_posterior_bound_is_nothing_that_sees_only_the_plots():
     assert "the posterior Cramér-Rao bound" in result.answer[1]
     assert "Below it no estimator can be, biased or not" in result.answer[1]
     assert "biased, or knows" not in result.answer[1]
+    assert re.search(
+        r": mine is \d\d\.\d % \[\d\d\.?\d*, \d\d\.?\d*\] below it; above it is r\+Vr \d", result.answer[1]
+    )
 
 
 def test_of_gains_over_all_scans_those_are_left_out_that_compare_nothing():

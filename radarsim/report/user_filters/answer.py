@@ -284,18 +284,22 @@ def _floor_sentence(comparison: _Comparison) -> list[Sentence]:
     if np.isnan(lowest):
         return []
     estimate, intervals = comparison.best_estimate
-    above = wording.estimate((100 * (number / lowest - 1) for number in estimate), "%", ".3g")
+    above = [round(100 * (number / lowest - 1), 9) for number in estimate]  # without the rounding of σ
+    is_below = above[0] < 0
+    distance = wording.estimate((-above[0], -above[2], -above[1]) if is_below else above, "%", ".3g")
     rivals = [
         f"{name} {wording.number(round(100 * (sigma / lowest - 1), 2), 3)} %"
         for name, sigma in comparison.rivals.items()
     ]
     is_of_unbiased = comparison.sigma["floor_kind"].startswith("CRB")
     text = tr(
-        "The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.",
+        "The floor there, {kind}, is {floor}: {name} is {own} below it; above it is {others}."
+        if is_below
+        else "The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.",
         kind=tr(UNBIASED if is_of_unbiased else ANY),
         floor=f"{wording.number(lowest)} {comparison.unit}".rstrip(),
         name=comparison.name,
-        own=above,
+        own=distance,
         others=join_names(rivals),
     )
     if estimate.hi < lowest and is_of_unbiased:
