@@ -266,7 +266,8 @@ def test_what_a_filter_may_not_give_is_said_with_its_place():
     assert "components: must differ, got r, r" in refusal(
         lambda plots: np.zeros((plots.n, 15, 2)), components=("r", "r")
     )
-    assert "must have start(world) and step(plots)" in refusal(type("Half", (), {"step": Odd.step}))
+    for odd_class in (type("Half", (), {"step": Odd.step}), type("Neither", (), {})):
+        assert "must have start(world) and step(plots)" in refusal(odd_class)
     assert refusal([[1.0, 2.0], [3.0]]).endswith("or a file, got [[1.0, 2.0], [3.0]]")
     for none in (np.full((1, 1), "a"), np.ones((1, 1)) * 1j):
         given = refusal(lambda plots, none=none: (plots["range_m"], np.broadcast_to(none, (plots.n, 15, 1, 1))))
@@ -859,3 +860,15 @@ def test_a_function_takes_plots_as_judge_gives_them(config, overrides):
     np.testing.assert_array_equal(known.t_s, world.t_s)
     with pytest.raises(KeyError, match="range: plots have range_m, "):
         plots["range"]
+
+
+def test_a_class_whose_objects_are_functions_is_judged():
+    class Smoother:
+        def __call__(self, plots):
+            return plots["range_m"]
+
+    tables = [
+        radarsim.judge("rls2", target, realisations=256, figures=False, threads=1).curves
+        for target in (Smoother, Smoother())
+    ]
+    pd.testing.assert_frame_equal(*tables)

@@ -107,14 +107,13 @@ class CalledFilter(UserFilter):
 
     def estimates(self, plots: Plots) -> Any:
         with self._lock, np.errstate():  # which the code may change
-            target = self.target
-            if hasattr(target, "step") or hasattr(target, "start"):
-                instance = build_filter(self.name, target) if isinstance(target, type) else target
-                if not (hasattr(instance, "step") and hasattr(instance, "start")):
-                    raise ConfigError(
-                        f"{self.name}: a filter that is asked scan by scan must have start(world) and step(plots)"
-                    )
-                return run_steps(self.name, instance, plots)
+            target = build_filter(self.name, self.target) if isinstance(self.target, type) else self.target
+            if hasattr(target, "step") and hasattr(target, "start"):
+                return run_steps(self.name, target, plots)
+            if hasattr(target, "step") or hasattr(target, "start") or not callable(target):
+                raise ConfigError(
+                    f"{self.name}: a filter that is asked scan by scan must have start(world) and step(plots)"
+                )
             if not self.takes_one_realisation:
                 return target(plots)
             answers = [copy_estimates(target(plots_of_realisation(plots, i))) for i in range(plots.n)]
