@@ -143,13 +143,28 @@ def _note_signal(number: int, frame: object) -> None:
     """The pipe has it already."""
 
 
+_fork = threading.local()  # mask: the signals that a thread blocked before it began to fork
+
+
+def _block_in_fork() -> None:
+    """Until its handlers are reset, a signal in a new process would write to the pipe of this one."""
+    if Signals.is_entered:
+        _fork.mask = signal.pthread_sigmask(signal.SIG_BLOCK, Signals.numbers)
+
+
+def _unblock_after_fork() -> None:
+    if (mask := vars(_fork).pop("mask", None)) is not None:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
 def _reset_in_fork() -> None:
     """A process that somebody's code forks is ended by its signals, of which this one does not learn."""
     if Signals.is_entered:
         signal.set_wakeup_fd(-1)
         for number in Signals.numbers:
             signal.signal(number, signal.SIG_DFL)
+    _unblock_after_fork()
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_reset_in_fork)
+    os.register_at_fork(before=_block_in_fork, after_in_parent=_unblock_after_fork, after_in_child=_reset_in_fork)

@@ -180,3 +180,20 @@ def test_a_real_full_disk_in_a_file_system_of_its_own(tmp_path):
     )
     digest = hashlib.sha256(textbook(WORK, 100_000).tobytes()).hexdigest()
     assert done.stdout.split()[-3:] == ["running", "100000", digest]
+
+
+def test_a_signal_to_a_process_as_it_is_forked_is_not_one_to_the_run():
+    script = """if True:
+        import os, signal, time
+        os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGTERM))  # before that of radarsim
+        from radarsim.engine.stopping import Signals
+        with Signals() as signals:
+            child = os.fork()
+            if not child:
+                os._exit(0)
+            print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+            time.sleep(0.3)
+            print(signals())
+    """
+    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["-15", "None"]
