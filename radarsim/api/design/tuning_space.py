@@ -137,10 +137,9 @@ def searched_keys(
         searched_key = _searched_key(spec.members[i], filter_keys, path, keys_by_path[path], between)
         searched += [] if searched_key is None else [searched_key]
     if not searched:
-        suggestion = ", ".join(path for path, key in keys_by_path.items() if key.value is not None)
-        raise ConfigError(
-            f"{option}: filter {filter_name!r} states no real number other than zero: name one of {suggestion}"
-        )
+        names = ", ".join(path for path, key in keys_by_path.items() if key.value is not None)
+        suggestion = f": name one of {names}" if names else ""
+        raise ConfigError(f"{option}: filter {filter_name!r} states no real number other than zero{suggestion}")
     if not requested_ranges and len(searched) > MAX_KEYS:
         names = shorten_names(list(dict.fromkeys(path.partition(".")[0] for path in ranges)), 8)
         raise ConfigError(
