@@ -55,8 +55,9 @@ def _error_factor(x: np.ndarray, truth: np.ndarray, shift: int) -> float:
 
 
 def _medians(errors: np.ndarray) -> np.ndarray:
-    """The median of each component (d,) of errors (n, K, d), over what is finite."""
-    return np.array([np.median(part[np.isfinite(part)]) for part in np.moveaxis(errors, -1, 0) if part.size])
+    """The median of each component (d,) of errors (n, K, d), over what is finite; NaN where nothing is."""
+    finite = (part[np.isfinite(part)] for part in np.moveaxis(errors, -1, 0))
+    return np.array([np.median(part) if part.size else np.nan for part in finite])
 
 
 def _is_prediction(errors: np.ndarray, plots: np.ndarray) -> bool:

@@ -872,3 +872,10 @@ def test_a_class_whose_objects_are_functions_is_judged():
         for target in (Smoother, Smoother())
     ]
     pd.testing.assert_frame_equal(*tables)
+
+
+def test_a_filter_without_any_estimate_fails_without_words_of_numpy():
+    result = radarsim.judge(
+        "rls2", lambda plots: np.full((plots.n, 15, 1), np.nan), realisations=256, figures=False, threads=1
+    )
+    assert "mine fails in 100 %" in result.answer[0]
