@@ -165,14 +165,14 @@ def _refusal(record: Mapping[str, Any], experiment: Experiment, out: Path_, diff
 def _way_back(record: Mapping[str, Any], out: Path_, folder: Path) -> str:
     """How the tables of a record are brought back after they were replaced, or kept."""
     command = str(record.get("command", ""))
-    if _gives(command, record):
+    if _gives(command, record, folder):
         return tr("`{command}` brings them back", command=f"{command}{out_option(out)} --replace")
     copy = shlex.join(["cp", "-r", str(folder), f"{folder}-before"])
     return tr("`{command}` keeps them", command=copy)
 
 
-def _gives(command: str, record: Mapping[str, Any]) -> bool:
-    """Whether a recorded command still runs what its record says."""
+def _gives(command: str, record: Mapping[str, Any], folder: Path) -> bool:
+    """Whether a recorded command still runs what its record says after the result in its folder is replaced."""
     try:
         words = shlex.split(command)
         program, verb, config, *options = words
@@ -181,6 +181,7 @@ def _gives(command: str, record: Mapping[str, Any]) -> bool:
         overrides = [keys[option] + value for option, value in pairs if option in keys]
         experiment = configs.load(config, overrides)
         is_run = (program, verb) == ("radarsim", "run")
-        return is_run and provenance.is_same_config(record["resolved"], experiment.resolved)
+        is_replaced = folder.resolve() in Path(config).resolve().parents  # config.yaml of this very result
+        return is_run and not is_replaced and provenance.is_same_config(record["resolved"], experiment.resolved)
     except (RadarsimError, ValueError, LookupError, TypeError):
         return False

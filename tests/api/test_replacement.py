@@ -56,6 +56,15 @@ def test_where_no_command_brings_them_back_a_copy_is_advised(tmp_path):
     assert f"`cp -r {folder} {folder}-before` keeps them" in fault
 
 
+def test_a_config_that_is_replaced_too_brings_nothing_back(out, monkeypatch):
+    monkeypatch.chdir(out.parent)
+    setting = ("--set", "radar.sigma_range_m=300", "-n", 2000, "--replace")
+    command("run", "rls2", *setting, "--out", "out", *QUIET)
+    command("run", "out/rls2/config.yaml", "--out", "out", *QUIET)
+    fault = command("run", "rls2", "-n", 2000, "--out", "out", *QUIET, code=2).stderr
+    assert "`cp -r out/rls2 out/rls2-before` keeps them" in fault
+
+
 def radarsim_config(folder, sigma_range_m):
     text = f"include: [rls2]\nradar: {{sigma_range_m: {sigma_range_m}}}\n"
     (folder / "mine.yaml").write_text(text)
