@@ -10,6 +10,7 @@ from radarsim.api import stored_tables
 from radarsim.api.stored_cases import cases_of_result, stored_experiment
 from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Case, Experiment
+from radarsim.config.find_files import is_stem
 from radarsim.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -60,10 +61,16 @@ def find_result(path: str | os.PathLike[str]) -> ResultFolder | None:
     return None if record is None else ResultFolder(Path(path), record)
 
 
+def result_places(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> list[Path]:
+    """The folders in which a result may be: of a name that in `out`, then one here; of a path that alone."""
+    name = os.fspath(source)
+    return [Path(out) / name, Path(name)] if is_stem(name) else [Path(name)]
+
+
 def result_of(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> ResultFolder:
     """The result in a folder, or that of a config's name in `out`. Raises ConfigError where there is none."""
-    for folder in (Path(source), Path(out) / os.fspath(source)):
+    for folder in result_places(source, out):
         if (found := find_result(folder)) is not None:
             return found
-    name = os.fspath(source)
-    raise ConfigError(f"{name}: no result: there is no run.json in {name}, nor in {Path(out) / name}")
+    places = ", nor in ".join(map(str, result_places(source, out)))
+    raise ConfigError(f"{os.fspath(source)}: no result: there is no run.json in {places}")

@@ -11,10 +11,9 @@ from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import Config, Overrides
 from radarsim.api.result import Result
 from radarsim.api.result_content import question_text
-from radarsim.api.result_folder import ResultFolder, find_result
+from radarsim.api.result_folder import ResultFolder, find_result, result_places
 from radarsim.api.stored_runs import stored_result
 from radarsim.config.experiment import Experiment
-from radarsim.config.find_files import is_stem
 from radarsim.errors import ConfigError, StoreError
 
 if TYPE_CHECKING:
@@ -115,8 +114,7 @@ def load(
     True
     """
     if isinstance(config, str | os.PathLike) and not overrides:
-        places = [Path(config), Path(out) / os.fspath(config)] if is_stem(os.fspath(config)) else [Path(config)]
-        for place in places:
+        for place in result_places(config, out):
             if (stored := find_result(place)) is not None:
                 return read_result(stored)
     return stored_result(config, out=out, overrides=overrides)

@@ -48,6 +48,14 @@ def test_a_name_needs_no_overrides(ran):
     assert loaded.figure("sigma_r")
 
 
+def test_a_name_is_of_the_given_directory_before_one_here(ran, tmp_path, monkeypatch):
+    shutil.copytree(ran.written.folder, tmp_path / "rls2")
+    monkeypatch.chdir(tmp_path)
+    assert radarsim.load("rls2", out=ran.written.folder.parent).figure("sigma_r")
+    assert radarsim.load("./rls2", out=ran.written.folder.parent).figures == ()
+    assert radarsim.load("rls2").figures == ()
+
+
 def test_without_blocks_figures_and_writing_say_what_they_need(ran, tmp_path):
     shutil.copytree(ran.written.folder, tmp_path / "moved")
     loaded = radarsim.load(tmp_path / "moved")
@@ -97,7 +105,7 @@ def test_the_netcdf_file_is_the_dataset(ran, folder, tmp_path):
 
 def test_export_of_nothing_says_where_it_looked(tmp_path):
     fault = command("export", "rls2", "--out", tmp_path, "--netcdf", tmp_path / "a.nc", code=2).stderr
-    assert "no result: there is no run.json in rls2" in fault
+    assert f"no result: there is no run.json in {tmp_path / 'rls2'}, nor in rls2" in fault
     assert not (tmp_path / "a.nc").exists()
 
 
