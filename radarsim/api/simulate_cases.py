@@ -61,17 +61,22 @@ class SimulatedCases:
 
 @dataclass(frozen=True)
 class Shares:
-    """Result of computing share `number` of `of`, by case name; cases of one identity appear once."""
+    """Result of computing share `number` of `of`, by case name; cases of one identity appear once. pieces: the blocks of
+    these cases in the share, of which some are missing after an early end."""
 
     config: str
     number: int
     of: int
     cases: dict[str, ShareResult]
+    pieces: int = 0
+    missing_pieces: int = 0
 
     @property
     def unmet(self) -> list[str]:
-        """Why the share is incomplete."""
-        return list(dict.fromkeys(share.stopped for share in self.cases.values() if share.stopped))
+        """Why the share is incomplete, and how much of it is missing."""
+        reasons = [share.stopped for share in self.cases.values() if share.stopped]
+        missing = f"share {self.number} of {self.of}: {self.missing_pieces} of {self.pieces} pieces missing"
+        return [f"{stopped}; {missing}" for stopped in dict.fromkeys(reasons)]
 
     @property
     def warnings(self) -> list[str]:
@@ -230,12 +235,15 @@ def compute_shares(
     works = dict(works_by_identity(experiment))
     weighted_progress = WeightedProgress(progress, {key: (work, -(-key[1] // share[1])) for key, work in works.items()})
     shares: dict[str, ShareResult] = {}
+    pieces, missing_pieces = 0, 0
     for key, work in works.items():
         share_result = _collector(work, options, weighted_progress.case_callback(key), compute_share)(key[1], share)
         shares[work.case.name] = share_result
+        pieces += -(-share_result.asked // work.block)
+        missing_pieces += -(-(share_result.asked - share_result.done) // work.block)
         if share_result.stopped:
             break
-    return Shares(experiment.stem, *share, shares)
+    return Shares(experiment.stem, *share, shares, pieces, missing_pieces)
 
 
 def collected_results(simulated: SimulatedCases) -> list[CaseResult]:

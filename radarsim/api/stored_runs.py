@@ -69,7 +69,10 @@ def missing_realisations(stock: Inventory) -> str:
     if stock.shares is None:
         return tr("realisations {runs}", runs=runs)
     numbers, share_count = stock.shares
-    share = tr("share {number} of {of}", number=join_names([str(number) for number in numbers]), of=share_count)
+    values = {"number": join_names([str(number) for number in numbers]), "of": share_count}
+    if len(numbers) > 1:
+        return tr("realisations {runs}; perhaps shares {number} of {of} were not copied", runs=runs, **values)
+    share = tr("share {number} of {of}", **values)
     return tr("realisations {runs}; perhaps {share} was not copied", runs=runs, share=share)
 
 
