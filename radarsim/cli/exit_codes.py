@@ -62,6 +62,7 @@ def fail(error: RadarsimError) -> NoReturn:
     """Report a fault, a line each, and leave with its exit code."""
     from radarsim.cli.console import break_lines
 
+    sys.stdout.flush()  # what was found stands before what failed where both streams go into one file
     for line in dict.fromkeys(error.lines):
         for broken_line in break_lines(line, sys.stderr):
             click.echo(broken_line, err=True)

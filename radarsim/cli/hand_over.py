@@ -144,17 +144,20 @@ def compare_with_archives(
     experiments: "Sequence[Experiment]", sources: "Sequence[tuple[str, Archive | None]]", out: str, quiet: bool
 ) -> None:
     """Say whether the tables of results that were run are those of their archives, see `loadable`. Raises StoreError
-    for tables that differ."""
-    from radarsim.api.maintenance.check_archive import differences, has_its_counts
+    for tables that differ, else NotChecked for one that was not computed."""
+    from radarsim.api.maintenance.check_archive import differences, has_its_counts, missing_runs_option
     from radarsim.cli import console
 
     faults: list[str] = []
+    not_checked: list[str] = []
     for experiment, (_, archive) in zip(experiments, sources, strict=True):
         folder = Path(out) / experiment.stem
         if archive is None or not has_its_counts(archive, experiment, folder):
             continue
         equal, different = differences(archive, experiment, folder)
         faults += different
+        if option := missing_runs_option(archive, experiment, folder):
+            not_checked.append(f"{archive.path}: {experiment.stem}: runs.csv was not compared: `{option}` computes it too")
         if different or quiet:
             continue
         values = {"tables": plural("{count} table", "{count} tables", len(equal)), "archive": str(archive.path)}
@@ -167,3 +170,5 @@ def compare_with_archives(
         console.print_field("compared", words)
     if faults:
         raise StoreError(*faults)
+    if not_checked:
+        raise NotChecked(*not_checked)

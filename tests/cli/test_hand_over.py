@@ -245,6 +245,24 @@ def test_tables_that_come_out_otherwise_are_named(study, tmp_path, monkeypatch):
     assert f"{study}/results/rls2/curves.csv: the table computed here differs by 1.0e-03 of σ" in told
 
 
+def test_a_table_of_runs_is_compared_where_it_is_computed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    command("run", "rls2", "-n", 2000, "--runs", "3:10", "--no-figures", "-q")
+    command("pack", "results/rls2", "-o", "s.zip")
+    run = ("run", "s.zip", "--no-figures", "--out", "again")
+    told = command(*run, code=3)
+    assert "compared  rls2: 6 tables, the same bytes as in s.zip" in told.stdout
+    assert told.stderr == "s.zip: rls2: runs.csv was not compared: `--runs 3:10` computes it too\n"
+    assert "compared  rls2: 7 tables, the same bytes" in command(*run, "--runs", "3:10").stdout
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
+def test_a_full_temporary_folder_is_named(study, temporary, monkeypatch):
+    monkeypatch.setattr("radarsim.api.archive.create_private_file", lambda path: open("/dev/full", "wb"))
+    fault = command("check", study, code=4).stderr
+    assert fault == f"{temporary}: cannot be written: No space left on device; TMPDIR names another\n"
+
+
 FILTER = """
 import pathlib
 import numpy as np

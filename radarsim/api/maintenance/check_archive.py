@@ -1,5 +1,6 @@
 """`radarsim check study.zip`: verify results that somebody handed over, without leaving anything behind."""
 
+import csv
 import os
 import re
 import tempfile
@@ -18,11 +19,12 @@ from radarsim.api.stored_tables import read_content, read_record
 from radarsim.config.experiment import Experiment
 from radarsim.config.find_files import is_stem
 from radarsim.engine.store.block_file import piece_named
-from radarsim.errors import ConfigError, RadarsimError
+from radarsim.errors import ConfigError, RadarsimError, StoreError
 from radarsim.extensions import extensions
 from radarsim.user_code_errors import code_allowed
 
 RECOMPUTED_PIECES = 2  # of each case
+RUNS_TABLE = "runs"  # of `run --runs`: of no config
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,8 @@ def differences(archive: Archive, experiment: Experiment, folder: Path) -> tuple
             continue
         stored, computed = archive.read(name), read_content(folder / table)
         stem = table.removesuffix(".csv")
+        if computed is None and stem == RUNS_TABLE:
+            continue  # see `missing_runs_option`
         difference = (
             "was not written"
             if computed is None
@@ -94,6 +98,16 @@ def differences(archive: Archive, experiment: Experiment, folder: Path) -> tuple
     return equal, different
 
 
+def missing_runs_option(archive: Archive, experiment: Experiment, folder: Path) -> str:
+    """The option that also makes the table of runs, which a result in an archive has and a folder lacks; else empty."""
+    name = f"{RESULTS}/{experiment.stem}/{RUNS_TABLE}.csv"
+    if name not in archive.names or (folder / f"{RUNS_TABLE}.csv").exists():
+        return ""
+    rows = csv.DictReader(archive.read(name).decode("utf-8", "replace").splitlines())
+    spans = {f"{row.get('first_k')}:{row.get('last_k')}" for row in rows}
+    return f"--runs {spans.pop()}" if len(spans) == 1 else "--runs"
+
+
 @contextmanager
 def unpacked(path: str | os.PathLike[str], trust_code: bool) -> Iterator[tuple[Archive, Path]]:
     """An archive of results, and a temporary folder for this user alone that holds its files.
@@ -103,7 +117,10 @@ def unpacked(path: str | os.PathLike[str], trust_code: bool) -> Iterator[tuple[A
         _check_names(archive)
         with tempfile.TemporaryDirectory(prefix="radarsim-") as temporary, code_allowed(trust_code):
             folder = Path(os.path.realpath(temporary))
-            archive.extract(folder, archive.names)
+            try:
+                archive.extract(folder, archive.names)
+            except OSError as error:
+                raise StoreError(f"{folder.parent}: cannot be written: {error.strerror}; TMPDIR names another") from error
             try:
                 _check_outputs(archive, folder)
                 yield archive, folder
