@@ -3,6 +3,7 @@
 A result of the same settings and seed is extended; of fewer realisations, those that are stored are shown. Anything
 else in its place must be asked for by `replace`."""
 
+import csv
 import os
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,6 +23,7 @@ from radarsim.report import provenance
 
 MAX_NAMED_KEYS = 3  # in a message
 MAX_VALUE_CHARACTERS = 40
+RUNS_TABLE = "runs"  # the table of `run --runs`, which no config asks for
 Path_ = str | os.PathLike[str]
 
 
@@ -82,6 +84,23 @@ def stored_counts(experiment: Experiment, out: Path_) -> dict[str, int]:
     """The realisations of each case that the tables in the folder of an experiment have; empty without tables."""
     record = _record(experiment, out)
     return {} if record is None else _counts(record)
+
+
+def lost_runs_note(experiment: Experiment, out: Path_) -> str:
+    """A sentence on the table of runs that the folder of an experiment holds, and that a run without it removes; empty
+    where there is none."""
+    content = stored_tables.read_content(Path(out) / experiment.stem / f"{RUNS_TABLE}.csv")
+    if content is None or _record(experiment, out) is None:
+        return ""
+    values = {"config": experiment.stem, "table": f"{RUNS_TABLE}.csv", "option": runs_option(content)}
+    return tr("{config}: {table} is removed; `radarsim run` with `{option}` writes it again", **values)
+
+
+def runs_option(content: bytes) -> str:
+    """The option that makes a table of runs, given its content."""
+    rows = csv.DictReader(content.decode("utf-8", "replace").splitlines())
+    spans = {f"{row.get('first_k')}:{row.get('last_k')}" for row in rows}
+    return f"--runs {spans.pop()}" if len(spans) == 1 else "--runs all"
 
 
 def _counts(record: Mapping[str, Any]) -> dict[str, int]:

@@ -157,7 +157,9 @@ def compare_with_archives(
         equal, different = differences(archive, experiment, folder)
         faults += different
         if option := missing_runs_option(archive, experiment, folder):
-            not_checked.append(f"{archive.path}: {experiment.stem}: runs.csv was not compared: `{option}` computes it too")
+            not_checked.append(
+                f"{archive.path}: {experiment.stem}: runs.csv was not compared: `{option}` computes it too"
+            )
         if different or quiet:
             continue
         values = {"tables": plural("{count} table", "{count} tables", len(equal)), "archive": str(archive.path)}

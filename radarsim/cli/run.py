@@ -107,7 +107,8 @@ def run(
         loaded = _load_experiments(names, overrides, None if precision is None else (precision, of), decide)
         loaded = hand_over.named_by_results(loaded, sources, out)
         if not (shard or replace):
-            check_replacements(loaded, out, quiet, ends_early=precision is not None or decide)
+            ends_early = precision is not None or decide
+            check_replacements(loaded, out, quiet, ends_early, makes_runs_table=runs is not None)
         if not trust_code:
             _print_user_code(loaded, quiet)
         if scheduler and not quiet and (line := executor.scheduler_warning(scheduler)):
@@ -126,9 +127,12 @@ def run(
             hand_over.compare_with_archives(loaded, sources, out, quiet or as_json)
 
 
-def check_replacements(loaded: "list[Experiment]", out: str, quiet: bool, ends_early: bool = False) -> None:
+def check_replacements(
+    loaded: "list[Experiment]", out: str, quiet: bool, ends_early: bool = False, makes_runs_table: bool = False
+) -> None:
     """Check before any runs that none replaces tables of something else, and say where stored realisations are shown
-    in place of fewer. ends_early: whether a run may end before its number of realisations. Raises ConfigError."""
+    in place of fewer, or a table of runs is removed. ends_early: whether a run may end before its number of
+    realisations. Raises ConfigError."""
     from radarsim.api import replacement
     from radarsim.cli import console
 
@@ -140,8 +144,10 @@ def check_replacements(loaded: "list[Experiment]", out: str, quiet: bool, ends_e
         except ConfigError as error:
             faults += error.lines
             continue
-        if larger and not quiet:
-            console.print_error_line(tr("note: {words}", words=replacement.larger_counts_note(experiment, larger, out)))
+        notes = [replacement.larger_counts_note(experiment, larger, out)] if larger else []
+        notes += [] if makes_runs_table else [replacement.lost_runs_note(experiment, out)]
+        for note in () if quiet else filter(None, notes):
+            console.print_error_line(tr("note: {words}", words=note))
     if faults:
         raise ConfigError(*faults)
 

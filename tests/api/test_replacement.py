@@ -65,6 +65,15 @@ def test_a_config_that_is_replaced_too_brings_nothing_back(out, monkeypatch):
     assert "`cp -r out/rls2 out/rls2-before` keeps them" in fault
 
 
+def test_a_table_of_runs_is_not_removed_in_silence(out):
+    again = ("run", "rls2", "-n", 4000, "--no-figures", "--out", out)
+    assert command(*again, "--runs", "3:10").stderr == ""
+    assert command(*again, "--runs", "3:10").stderr == ""
+    note = "note: rls2: runs.csv is removed; `radarsim run` with `--runs 3:10` writes it again\n"
+    assert command(*again).stderr == note
+    assert not (out / "rls2" / "runs.csv").exists()
+
+
 def radarsim_config(folder, sigma_range_m):
     text = f"include: [rls2]\nradar: {{sigma_range_m: {sigma_range_m}}}\n"
     (folder / "mine.yaml").write_text(text)

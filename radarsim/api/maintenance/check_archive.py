@@ -1,6 +1,5 @@
 """`radarsim check study.zip`: verify results that somebody handed over, without leaving anything behind."""
 
-import csv
 import os
 import re
 import tempfile
@@ -15,6 +14,7 @@ from radarsim.api.maintenance.doctor import inspect_result
 from radarsim.api.maintenance.inspection import Inspection
 from radarsim.api.maintenance.pack import README, RECORD, RESULTS
 from radarsim.api.maintenance.packed_code import code_names
+from radarsim.api.replacement import RUNS_TABLE, runs_option
 from radarsim.api.stored_tables import read_content, read_record
 from radarsim.config.experiment import Experiment
 from radarsim.config.find_files import is_stem
@@ -24,7 +24,6 @@ from radarsim.extensions import extensions
 from radarsim.user_code_errors import code_allowed
 
 RECOMPUTED_PIECES = 2  # of each case
-RUNS_TABLE = "runs"  # of `run --runs`: of no config
 
 
 @dataclass(frozen=True)
@@ -103,9 +102,7 @@ def missing_runs_option(archive: Archive, experiment: Experiment, folder: Path) 
     name = f"{RESULTS}/{experiment.stem}/{RUNS_TABLE}.csv"
     if name not in archive.names or (folder / f"{RUNS_TABLE}.csv").exists():
         return ""
-    rows = csv.DictReader(archive.read(name).decode("utf-8", "replace").splitlines())
-    spans = {f"{row.get('first_k')}:{row.get('last_k')}" for row in rows}
-    return f"--runs {spans.pop()}" if len(spans) == 1 else "--runs"
+    return runs_option(archive.read(name))
 
 
 @contextmanager
@@ -120,7 +117,9 @@ def unpacked(path: str | os.PathLike[str], trust_code: bool) -> Iterator[tuple[A
             try:
                 archive.extract(folder, archive.names)
             except OSError as error:
-                raise StoreError(f"{folder.parent}: cannot be written: {error.strerror}; TMPDIR names another") from error
+                raise StoreError(
+                    f"{folder.parent}: cannot be written: {error.strerror}; TMPDIR names another"
+                ) from error
             try:
                 _check_outputs(archive, folder)
                 yield archive, folder
