@@ -61,8 +61,9 @@ class SimulatedCases:
 
 @dataclass(frozen=True)
 class Shares:
-    """Result of computing share `number` of `of`, by case name; cases of one identity appear once. pieces: the blocks of
-    these cases in the share, of which some are missing after an early end."""
+    """Result of computing share `number` of `of`, by case name; cases of one identity appear once.
+
+    pieces: the blocks of these cases in the share, of which some are missing after an early end."""
 
     config: str
     number: int

@@ -45,6 +45,16 @@ def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Override
     return experiment
 
 
+def _without_config(folder: Path) -> str:
+    """Why a folder is not run; of a result of an earlier version of the program, what else is done with it."""
+    if not (folder / "run.json").is_file():
+        return f"is a directory without {CONFIG_FILE}, so no result"
+    return (
+        f"is a result without {CONFIG_FILE}, as earlier versions wrote: it cannot be run; run the command in its "
+        "report.html, or `radarsim doctor` with --recompute"
+    )
+
+
 def _is_result(name: str) -> bool:
     """Whether a name is that of a folder of results."""
     return os.path.isfile(os.path.join(name, CONFIG_FILE))
@@ -69,7 +79,7 @@ def _find_config(source: str | bytes | os.PathLike[str], studies: Studies, fault
     if os.path.isdir(file):
         file = file / CONFIG_FILE
         if not file.is_file():
-            faults.add(Origin(str(file.parent)), (), f"is a directory without {CONFIG_FILE}, so no result")
+            faults.add(Origin(str(file.parent)), (), _without_config(file.parent))
             return None
     if file.suffix.lower() == ".zip":
         faults.add(Origin(name), (), "is an archive: `radarsim check` verifies it, and `radarsim run` takes it")

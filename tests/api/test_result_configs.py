@@ -191,3 +191,6 @@ def test_faults_name_their_place(content, fault, tmp_path):
 def test_a_folder_without_config_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"is a directory without config.yaml, so no result"):
         configs.load(tmp_path)
+    (tmp_path / "run.json").touch()
+    with pytest.raises(ConfigError, match=r"is a result without config.yaml, as earlier versions wrote"):
+        configs.load(tmp_path)

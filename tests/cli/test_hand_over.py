@@ -258,7 +258,7 @@ def test_a_table_of_runs_is_compared_where_it_is_computed(tmp_path, monkeypatch)
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")
 def test_a_full_temporary_folder_is_named(study, temporary, monkeypatch):
-    monkeypatch.setattr("radarsim.api.archive.create_private_file", lambda path: open("/dev/full", "wb"))
+    monkeypatch.setattr("radarsim.api.archive.create_private_file", lambda path: Path("/dev/full").open("wb"))  # noqa: SIM115
     fault = command("check", study, code=4).stderr
     assert fault == f"{temporary}: cannot be written: No space left on device; TMPDIR names another\n"
 

@@ -109,7 +109,7 @@ def _changed_sentence(names: list[str], record: Mapping[str, Any]) -> str:
     versions = f" (radarsim {before} made it, this is {now})" if before != now else ""
     return (
         f"{', '.join(names)}: cannot be computed again: the sources that compute have changed since{versions}; "
-        "all that is stored is intact"
+        "all that is stored is intact; `radarsim run` computes all of it anew"
     )
 
 
