@@ -44,7 +44,7 @@ nitpick_ignore_regex = [
     (
         "py:.*",
         r"(np|numpy|pd|pandas|matplotlib|collections|contextlib|importlib|_frozen_importlib|ast|io|os|pathlib|types|numba"
-        r"|click|pydantic|markupsafe|xarray)\..*",
+        r"|click|re|pydantic|markupsafe|xarray)\..*",
     ),
     ("py:class", r"Canvas|DataclassInstance"),
     # Keys have a page of their own.
