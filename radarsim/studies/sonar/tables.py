@@ -19,7 +19,6 @@ Index = tuple[np.ndarray, ...]
 table = common.TableMakers()
 
 
-# ---- parts of tables ----------------------------------------------------------------------------------------------
 def coordinate_rows(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[Index, dict[str, np.ndarray]]:
     """The indices (filter, scan, coordinate), each (n,), where mask (F, K, C) is true, and the rows' first columns.
 
@@ -31,7 +30,6 @@ def coordinate_rows(result: CaseResult[SonarAxes], mask: np.ndarray) -> tuple[In
     )
 
 
-# ---- tables -------------------------------------------------------------------------------------------------------
 def complete_counts(result: CaseResult[SonarAxes]) -> np.ndarray:
     """The number of realisations (F, K, C) in which the state of a filter is complete in a coordinate."""
     counts = np.asarray(result.sums["estimates"])
@@ -100,7 +98,6 @@ def _operations(results: Sequence[CaseResult[SonarAxes]]) -> "pd.DataFrame":
     return common.frame(dict(zip(names, columns, strict=True)))
 
 
-# ---- smoothing -----------------------------------------------------------------------------------------------------
 def textbook(result: CaseResult[GivenPlotsAxes]) -> bool:
     """Whether the closed forms apply: known association, equal intervals and weights, white errors, no misses."""
     sensor, target = result.spec.sensor, result.spec.target
