@@ -13,6 +13,7 @@ from radarsim.studies.recording_interface import (
     MANOEUVRES,
     NEAR_PART,
     OUTLIERS,
+    USUAL_NEAR_WIDTH,
     Track,
     outlier_shares,
     usual_interval_s,
@@ -191,7 +192,7 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
     ) -> float:
         """The logarithm of the likelihood."""
         return float(self._scores(values, outlier_shares(outliers, near, near_width, manoeuvres), correlation).sum())
@@ -201,7 +202,7 @@ class PlotLikelihood:
         values: np.ndarray,
         outliers: float,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
         correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""

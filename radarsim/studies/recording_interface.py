@@ -65,7 +65,7 @@ MAX_PREPARED = 4  # cases that stay prepared: those whose plots were drawn last
 
 OUTLIERS, BIAS, CORRELATION, MANOEUVRES = EXPLANATIONS = ("outliers", "bias", "correlation", "manoeuvres")
 NEAR, NEAR_PART = "near", 0.5  # the part of outliers that is near, where it is not fitted
-NEAR_WIDTH = "near_width"  # their width, in σ
+NEAR_WIDTH, USUAL_NEAR_WIDTH = "near_width", 3.0  # their width in σ, and that where it is not fitted
 
 
 class Likelihood(Protocol):
@@ -92,7 +92,7 @@ class Likelihood(Protocol):
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
     ) -> float:
         """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
 
@@ -106,7 +106,7 @@ class Likelihood(Protocol):
         values: "np.ndarray",
         outliers: float,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
         correlation: float = 0.0,
     ) -> "Sequence[Mapping[str, np.ndarray]]":
         """The times t_s of each track, and the probability of each number that it is no outlier, by column; (n,)."""

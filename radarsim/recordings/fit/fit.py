@@ -35,7 +35,15 @@ from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sampl
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
 from radarsim.recordings.track_rows import split_by_track
-from radarsim.studies.recording_interface import CORRELATION, MANOEUVRES, NEAR, NEAR_PART, OUTLIERS, Likelihood
+from radarsim.studies.recording_interface import (
+    CORRELATION,
+    MANOEUVRES,
+    NEAR,
+    NEAR_PART,
+    OUTLIERS,
+    USUAL_NEAR_WIDTH,
+    Likelihood,
+)
 
 FITTED_EXPLANATIONS = (OUTLIERS, CORRELATION)  # for which a fit can allow
 SECOND_FIT_COST = 1.5  # evaluations of a fit that allows for more, in those of the plain one
@@ -126,7 +134,7 @@ class CorrelatedLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
     ) -> float:
         """The logarithm of the likelihood; `correlation` is that of the last of the values (n,), whatever is given."""
         return self.likelihood(values[:-1], outliers, bias, self._correlation(values), manoeuvres, near, near_width)
@@ -136,7 +144,7 @@ class CorrelatedLikelihood:
         values: np.ndarray,
         outliers: float,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
         correlation: float = 0.0,
     ) -> Sequence[Mapping[str, np.ndarray]]:
         """As the likelihood's, with the correlation of the last of the values."""
@@ -349,7 +357,7 @@ def find_outlier_rows(
     values: np.ndarray,
     outliers: float,
     near: float = NEAR_PART,
-    near_width: float = 3.0,
+    near_width: float = USUAL_NEAR_WIDTH,
     correlation: float = 0.0,
 ) -> tuple[OutlierRow, ...]:
     """The numbers that are probably outliers for values of the keys and explanations; none where the likelihood knows

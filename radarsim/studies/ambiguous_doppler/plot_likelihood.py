@@ -12,7 +12,14 @@ from radarsim.studies.ambiguous_doppler.followers import list_limits, packed_mot
 from radarsim.studies.ambiguous_doppler.kernels import recorded_rows
 from radarsim.studies.ambiguous_doppler.tracking import MEASURED, plot_rows
 from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
-from radarsim.studies.recording_interface import BIAS, NEAR_PART, OUTLIERS, outlier_shares, usual_interval_s
+from radarsim.studies.recording_interface import (
+    BIAS,
+    NEAR_PART,
+    OUTLIERS,
+    USUAL_NEAR_WIDTH,
+    outlier_shares,
+    usual_interval_s,
+)
 
 START_RANGES = 3  # of a track, among which gross errors are left out
 MIN_SIGMA_RATIO, MIN_VARIANCE_RATIO = 1e-4, 1e-6  # to the configured values: smaller ones count as zero
@@ -107,7 +114,7 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
     ) -> float:
         """The log likelihood. bias: of the velocity, in units of its σ; correlation and manoeuvres are ignored."""
         return float(self._scores(values, outlier_shares(outliers, near, near_width), bias).sum())
@@ -117,7 +124,7 @@ class PlotLikelihood:
         values: np.ndarray,
         outliers: float,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
         correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""

@@ -17,7 +17,7 @@ from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.study import banks
 from radarsim.studies.multimodel.tracking import lane_rows, sigmas
-from radarsim.studies.recording_interface import NEAR_PART, OUTLIERS, outlier_shares, usual_interval_s
+from radarsim.studies.recording_interface import NEAR_PART, OUTLIERS, USUAL_NEAR_WIDTH, outlier_shares, usual_interval_s
 
 MIN_VALUE_RATIO = 1e-4  # to a key's configured value: smaller values count as zero
 
@@ -115,7 +115,7 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
     ) -> float:
         """The log likelihood; of the explanations only outliers are part of the model."""
         return self._total(values, "moment", outlier_shares(outliers, near, near_width))
@@ -129,7 +129,7 @@ class PlotLikelihood:
         values: np.ndarray,
         outliers: float,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
         correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each plot that it is no outlier, for all its numbers the same."""

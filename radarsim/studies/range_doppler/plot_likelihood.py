@@ -15,7 +15,13 @@ from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filter_design import noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import recorded_rows
 from radarsim.studies.range_doppler.tracking import MEASURED, START_RANGES, configured_variances
-from radarsim.studies.recording_interface import EXPLANATIONS, NEAR_PART, outlier_shares, usual_interval_s
+from radarsim.studies.recording_interface import (
+    EXPLANATIONS,
+    NEAR_PART,
+    USUAL_NEAR_WIDTH,
+    outlier_shares,
+    usual_interval_s,
+)
 
 MIN_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 WIDE_VELOCITY_MPS, WIDE_ACCELERATION_MPS2 = 3e4, 3e3  # standard deviations before the first plot: nothing is known
@@ -110,7 +116,7 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
     ) -> float:
         """The logarithm of the likelihood; bias: of the velocity, in its σ."""
         shares = outlier_shares(outliers, near, near_width, manoeuvres)
@@ -121,7 +127,7 @@ class PlotLikelihood:
         values: np.ndarray,
         outliers: float,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
         correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; zero of gross errors before the start."""

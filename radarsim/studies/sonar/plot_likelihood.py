@@ -14,6 +14,7 @@ from radarsim.studies.recording_interface import (
     MANOEUVRES,
     NEAR_PART,
     OUTLIERS,
+    USUAL_NEAR_WIDTH,
     outlier_shares,
     usual_interval_s,
 )
@@ -155,7 +156,7 @@ class PlotLikelihood:
         correlation: float = 0.0,
         manoeuvres: float = 0.0,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
     ) -> float:
         """The logarithm of the likelihood; a bias is not part of the model."""
         return self._score(values, outlier_shares(outliers, near, near_width, manoeuvres), correlation)
@@ -165,7 +166,7 @@ class PlotLikelihood:
         values: np.ndarray,
         outliers: float,
         near: float = NEAR_PART,
-        near_width: float = 3.0,
+        near_width: float = USUAL_NEAR_WIDTH,
         correlation: float = 0.0,
     ) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; in x and y of range and bearing together."""
