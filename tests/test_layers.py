@@ -22,7 +22,7 @@ STUDIES = sorted(path.parent.name for path in PACKAGE.glob("studies/*/config.py"
 TEMPLATE_FOLDERS = "api/maintenance/one_file", "api/maintenance/one_step"  # what `radarsim new-study` copies
 
 # An entry names one module, or a room: the modules of that package, without those of its rooms in this table.
-BASICS = ("errors", "threads", "private_files")  # any other room may import them
+BASICS = ("errors", "system")  # any other room may import them
 SUMS = ("engine.results", "engine.sums")  # the engine's plain data, which studies fill
 CASE = ("config.experiment", "config.radial_keys", "config.rare_event_keys")
 SCHEMA = (
@@ -31,18 +31,15 @@ SCHEMA = (
 )
 ROOMS = {
     "errors": (),
-    "threads": (),
-    "private_files": (),
+    "system": (),
     "constants": (),
-    "user_code_errors": (),
-    "module_sources": (),
-    "user_files": ("module_sources",),
+    "user_code": (),
     "language": (),
     "extensions": ("api", "config", "engine.results", "report.drawing"),  # for a type checker alone
     "config": ("constants", "extensions"),
     "engine": ("engine.store",),
     "engine.store": ("engine.blocks", "engine.machine", "engine.sums"),
-    "kernels": ("module_sources", "user_files"),
+    "kernels": ("user_code.files", "user_code.module_sources"),
     "physics": ("constants",),
     "bursts": ("bursts.kernels",),
     "bursts.kernels": ("kernels",),
@@ -65,7 +62,7 @@ ROOMS = {
     "studies.onefile": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "language", "report", "report.drawing"),
         *("studies.interface", "studies.onefile_recordings", "studies.plot_arrays", "studies.recording_interface"),
-        "user_code_errors",
+        "user_code.errors",
     ),
     "studies.onefile_recordings": (
         *("config.experiment", "studies.onefile", "studies.plot_arrays", "studies.recording_interface"),
@@ -85,22 +82,22 @@ ROOMS = {
     "studies.stepwise": (
         *("config.experiment", "config.study_keys", *SUMS, "kernels", "report", "report.drawing"),
         *("studies.noise", "studies.onefile", "studies.plot_arrays", "studies.step_checks", "studies.step_tracker"),
-        "user_code_errors",
+        "user_code.errors",
     ),
-    "studies.step_checks": ("kernels", "user_code_errors"),
+    "studies.step_checks": ("kernels", "user_code.errors"),
     "studies.step_tracker": (
         *("kernels.tracing", "studies.recording_interface", "studies.step_checks", "studies.stepwise"),
-        "user_code_errors",
+        "user_code.errors",
     ),
     "studies.user_filters": (
-        *("config", *SUMS, "language", "module_sources", "studies.interface", "studies.noise", "studies.plot_arrays"),
-        *("studies.random_numbers", "user_code_errors", "user_files"),
+        *("config", *SUMS, "language", "studies.interface", "studies.noise", "studies.plot_arrays"),
+        *("studies.random_numbers", "user_code"),
     ),
     "studies.registry": (
         *("config", "extensions", "report.quantities", "studies.interface", "studies.user_filters"),
-        "user_code_errors",
+        "user_code.errors",
     ),
-    "studies.sources": ("config", "module_sources", "studies.registry", "studies.user_filters", "user_files"),
+    "studies.sources": ("config", "studies.registry", "studies.user_filters", "user_code"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
     "api": (
         *("api.design", "config", "engine", "engine.store", "extensions", "language"),
@@ -113,7 +110,7 @@ ROOMS = {
     ),
     "api.maintenance": (
         *("api", "config", "engine", "engine.store", "extensions", "kernels.cache", "report"),
-        *("studies.identity", "studies.registry", "user_code_errors"),
+        *("studies.identity", "studies.registry", "user_code.errors"),
     ),
     "recordings": (
         *("recordings.fit", "recordings.formats", "recordings.registration", "recordings.report"),
@@ -130,7 +127,7 @@ ROOMS = {
     "papers": (  # adds itself by `extensions`; only the names for users import it
         *("api", "bursts", "cli", "config", "engine", "extensions", "kernels", "language", "physics"),
         *("report", "report.drawing", "report.user_filters"),
-        *("studies.interface", "studies.onefile", "studies.registry", "studies.sources", "user_code_errors"),
+        *("studies.interface", "studies.onefile", "studies.registry", "studies.sources", "user_code.errors"),
     ),
     "cli": (
         *("__init__", "api", "api.design", "api.maintenance", "config", "engine", "extensions", "language"),
@@ -142,7 +139,7 @@ ROOMS = {
 
 # Inside a study: what each role may import of the rooms, and of its own study's roles.
 NUMBERS = (
-    *("errors", "user_code_errors", "threads", "constants", "kernels", "physics", "bursts", "bursts.kernels"),
+    *("errors", "user_code.errors", "system.threads", "constants", "kernels", "physics", "bursts", "bursts.kernels"),
     *(*CASE, *SUMS),
 )
 DISPLAY = ("config.experiment", "engine.results", "kernels", "report")
@@ -155,7 +152,7 @@ ROLES = {
     "design": ((*NUMBERS, "studies.noise", "studies.radial_truth"), DESIGN),  # all that prepares numbers
     "study": ((*NUMBERS, "studies.noise"), COMPUTED),
     "floor": ((*NUMBERS, "studies.floors"), COMPUTED),
-    "cost": (("kernels", "threads"), COMPUTED),
+    "cost": (("kernels", "system.threads"), COMPUTED),
     "tables": ((*DISPLAY, "bursts"), DISPLAYED),
     "figures": ((*DISPLAY, "report.drawing", "language"), DISPLAYED),
     "answer": ((*DISPLAY, "language"), (*DISPLAYED, "answer")),
@@ -376,7 +373,7 @@ PLANTED = [
     ("engine.results", "radarsim.report.tables"),
     ("engine.store.store", "radarsim.engine.collect"),
     ("kernels.linear_states", "radarsim.physics.motion"),
-    ("kernels.tracing", "radarsim.user_code_errors"),
+    ("kernels.tracing", "radarsim.user_code.errors"),
     ("report.panel_layout", "radarsim.studies.sonar.study"),
     ("report.drawing.canvas", "radarsim.report.tables"),
     ("report.tables", "radarsim.report.user_filters.tables"),

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from radarsim.errors import ConfigError, StoreError
-from radarsim.private_files import create_private_file, make_private_folder
 from radarsim.report import atomic_files, provenance
+from radarsim.system.private_files import create_private_file, make_private_folder
 
 SUFFIX = ".zip"
 FORMAT = "radarsim study 1"

@@ -26,7 +26,7 @@ from radarsim.engine.machine import available_cores
 from radarsim.engine.stopping import Signals, Stop
 from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.extensions import StopRule, stop_rule
-from radarsim.threads import limited
+from radarsim.system.threads import limited
 
 if TYPE_CHECKING:
     from radarsim.api.result import Result

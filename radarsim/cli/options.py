@@ -13,7 +13,7 @@ import click
 from radarsim.cli.exit_codes import fail
 from radarsim.errors import ConfigError
 from radarsim.language import current
-from radarsim.threads import limited
+from radarsim.system.threads import limited
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem

@@ -10,7 +10,7 @@ from radarsim.cli.console import rich_console
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import term, tr
 from radarsim.report.output_labels import clock
-from radarsim.threads import forbidden
+from radarsim.system.threads import forbidden
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

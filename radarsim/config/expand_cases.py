@@ -36,7 +36,7 @@ from radarsim.config.study_keys import StudyKeys
 from radarsim.config.user_filter_keys import is_code, names_code, separate_code_filters
 from radarsim.config.validate import validate
 from radarsim.extensions import extension_figures
-from radarsim.private_files import foreign_owner
+from radarsim.system.private_files import foreign_owner
 
 MAPPING_KEYS = ("sweep", "figures")  # common keys that are mappings: the text after their dot is a single key
 MAX_CASES = 10_000

@@ -14,7 +14,7 @@ from radarsim.config.model import Model
 from radarsim.config.study_keys import StudyKeys
 from radarsim.config.validate import validate
 from radarsim.errors import ConfigError
-from radarsim.private_files import foreign_owner
+from radarsim.system.private_files import foreign_owner
 
 # User filters among those of a study: `{name: mine, python: my_filter.py:MyFilter, hidden: 8}`. This part reads how a
 # config names them; `radarsim.studies.user_filters.from_code` finds their sources and runs them.

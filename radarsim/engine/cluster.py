@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Self
 from radarsim.engine.blocks import Node, Partial, Work
 from radarsim.engine.executors import Outcome, run_task
 from radarsim.errors import ClusterError, ConfigError, Interruption, argument
-from radarsim.private_files import distrust_reason
+from radarsim.system.private_files import distrust_reason
 
 if TYPE_CHECKING:
     from distributed import Future, LocalCluster

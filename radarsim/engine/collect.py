@@ -8,7 +8,7 @@ from radarsim.engine.dispatch import CollectedSums, Dispatch, Run, Share, ShareR
 from radarsim.engine.executors import Executor, Serial, Threads
 from radarsim.engine.stopping import Stop
 from radarsim.errors import StoreError
-from radarsim.threads import forbidden, limited
+from radarsim.system.threads import forbidden, limited
 
 
 def collect(

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from radarsim.errors import Interruption
-from radarsim.threads import forbidden
+from radarsim.system.threads import forbidden
 
 Stop = Callable[[], str | None]
 

@@ -21,7 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from radarsim.kernels.call_graph import source_hash
-from radarsim.private_files import (
+from radarsim.system.private_files import (
     UntrustedFileError,
     distrust_reason,
     make_trusted_folder,

@@ -12,8 +12,8 @@ from types import FunctionType, ModuleType
 
 import numpy as np
 
-from radarsim.module_sources import module_digest
-from radarsim.user_files import is_user_module
+from radarsim.user_code.files import is_user_module
+from radarsim.user_code.module_sources import module_digest
 
 
 def source_hash(function: Callable) -> str:

@@ -42,7 +42,7 @@ from numba.core.typing import Context
 from numba.np.arrayobj import make_array
 
 from radarsim.kernels.cache import KernelEntries
-from radarsim.module_sources import module_digest
+from radarsim.user_code.module_sources import module_digest
 
 
 class KernelCache(Cache):

@@ -25,7 +25,6 @@ from string import Template
 from types import ModuleType, NoneType, UnionType
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
-from radarsim import user_code_errors
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList
 from radarsim.config.error_text import KeyPath, quoted_value
@@ -46,6 +45,7 @@ from radarsim.papers.interpretations import (
     ImpossibleInterpretation,
 )
 from radarsim.report.statistics import Estimate
+from radarsim.user_code import errors as user_code_errors
 
 KeysModel = TypeVar("KeysModel", bound=Model)
 Declaration = TypeVar("Declaration", Claim, Choice)

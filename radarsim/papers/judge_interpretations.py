@@ -21,7 +21,7 @@ from radarsim.papers.open_papers import JudgingRequest, judging_requests
 from radarsim.papers.stored_verdicts import TABLE
 from radarsim.papers.verdict_rule import UNDECIDED
 from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts
-from radarsim.threads import limited
+from radarsim.system.threads import limited
 
 
 def judge_requests(

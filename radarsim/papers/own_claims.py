@@ -9,7 +9,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from radarsim import user_code_errors
 from radarsim.api.stored_runs import stored_result
 from radarsim.config.experiment import Experiment
 from radarsim.errors import AUTHOR_ERRORS, ConfigError
@@ -23,6 +22,7 @@ from radarsim.report import atomic_files, csv_text
 from radarsim.report.tables import frame
 from radarsim.studies.onefile import OneFile
 from radarsim.studies.registry import study
+from radarsim.user_code import errors as user_code_errors
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,7 +16,7 @@ from radarsim.recordings.study_part import recording_interface, refuse_inherited
 from radarsim.recordings.track_rows import split_by_track
 from radarsim.recordings.tracking_result import ErrorSums, InnovationTally, TrackingResult
 from radarsim.studies.recording_interface import Track
-from radarsim.threads import mapping
+from radarsim.system.threads import mapping
 
 if TYPE_CHECKING:
     from radarsim.recordings.track_rows import TrackRows

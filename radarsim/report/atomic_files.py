@@ -28,8 +28,8 @@ from types import MappingProxyType, ModuleType
 from typing import BinaryIO, NamedTuple, Self
 
 from radarsim.errors import ConfigError, StoreError
-from radarsim.private_files import create_readable_file, foreign_owner, make_readable_folder, write_private_file
-from radarsim.threads import mapping
+from radarsim.system.private_files import create_readable_file, foreign_owner, make_readable_folder, write_private_file
+from radarsim.system.threads import mapping
 
 fcntl: ModuleType | None
 try:

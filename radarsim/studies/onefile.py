@@ -49,7 +49,7 @@ from radarsim.report.quantities import COMMON, Component, Quantity
 from radarsim.studies.interface import Paper, Study
 from radarsim.studies.onefile_recordings import OneFileRecordings
 from radarsim.studies.recording_interface import Likelihood, RecordingInterface
-from radarsim.user_code_errors import call_user_function
+from radarsim.user_code.errors import call_user_function
 
 if TYPE_CHECKING:
     import numpy as np

@@ -16,7 +16,6 @@ from inspect import isabstract
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from radarsim import user_code_errors
 from radarsim.config.common_keys import COMMON_KEYS
 from radarsim.config.experiment import Case
 from radarsim.config.find_files import did_you_mean
@@ -26,6 +25,7 @@ from radarsim.errors import AUTHOR_ERRORS, ConfigError, RadarsimError, StudyErro
 from radarsim.extensions import extensions
 from radarsim.report.quantities import Quantity
 from radarsim.studies.interface import Study
+from radarsim.user_code import errors as user_code_errors
 
 Part = TypeVar("Part")
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from radarsim.kernels import small_matrices, tracing
-from radarsim.user_code_errors import call_user_function, user_code_error
+from radarsim.user_code.errors import call_user_function, user_code_error
 
 DIFFERENT_FORMULA = "gives another formula each time"
 

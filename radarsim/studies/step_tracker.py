@@ -10,7 +10,7 @@ from radarsim.errors import PlotFault
 from radarsim.kernels import tracing
 from radarsim.studies.recording_interface import Track
 from radarsim.studies.step_checks import check_length, check_same_shape, record, step_numbers, variances
-from radarsim.user_code_errors import study_context, user_code_error
+from radarsim.user_code.errors import study_context, user_code_error
 
 if TYPE_CHECKING:
     from radarsim.studies.stepwise import StepStudy

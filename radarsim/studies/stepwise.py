@@ -56,7 +56,7 @@ from radarsim.studies.step_checks import (
     variances,
 )
 from radarsim.studies.step_tracker import Tracker
-from radarsim.user_code_errors import study_context, user_code_error
+from radarsim.user_code.errors import study_context, user_code_error
 
 if TYPE_CHECKING:
     import pandas as pd

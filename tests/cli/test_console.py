@@ -14,7 +14,7 @@ from radarsim.papers.claims_table import CLASS_COLUMNS
 from radarsim.papers.print_claims import print_claims
 from radarsim.report import interval_notes, wording
 from radarsim.report.wording import significant_digits
-from radarsim.threads import limited
+from radarsim.system.threads import limited
 from tests.program import Terminal, command
 
 

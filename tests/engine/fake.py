@@ -14,7 +14,7 @@ from radarsim.engine.collect import collect
 from radarsim.engine.stopping import Signals
 from radarsim.engine.store import writer as store_writer
 from radarsim.engine.sums import Sums
-from radarsim.threads import limited
+from radarsim.system.threads import limited
 
 
 @dataclass(frozen=True)

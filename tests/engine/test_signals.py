@@ -16,7 +16,7 @@ from radarsim.engine.collect import collect, read_stored
 from radarsim.engine.stopping import Signals
 from radarsim.engine.store.store import Store
 from radarsim.errors import Interruption
-from radarsim.threads import limited
+from radarsim.system.threads import limited
 from tests.engine.fake import Fake, textbook
 
 ROOT = Path(__file__).parents[2]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from radarsim import user_code_errors
 from radarsim.api.design.solve import TARGET_TOLERANCE
+from radarsim.user_code import errors as user_code_errors
 from tests.program import csv_bytes
 from tests.studies import example_packages
 

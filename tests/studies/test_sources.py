@@ -11,10 +11,10 @@ from py_compile import PycInvalidationMode
 import pytest
 
 import radarsim
-from radarsim import module_sources
 from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 from radarsim.studies import registry, sources
+from radarsim.user_code import module_sources
 
 PACKAGE = Path(radarsim.__file__).parent
 CONFIGS = {

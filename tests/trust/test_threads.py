@@ -3,7 +3,7 @@
 import pytest
 
 import radarsim
-from radarsim.threads import forbidden, limited, mapping
+from radarsim.system.threads import forbidden, limited, mapping
 from tests.program import command
 
 BARRED = """

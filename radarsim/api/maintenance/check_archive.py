@@ -21,7 +21,7 @@ from radarsim.config.find_files import is_stem
 from radarsim.engine.store.block_file import piece_named
 from radarsim.errors import ConfigError, RadarsimError, StoreError
 from radarsim.extensions import extensions
-from radarsim.user_code_errors import code_allowed
+from radarsim.user_code.errors import code_allowed
 
 RECOMPUTED_PIECES = 2  # of each case
 

@@ -20,8 +20,8 @@ from radarsim.engine.store.audit import Audit, audit_blocks
 from radarsim.engine.store.block_file import is_directory
 from radarsim.engine.store.store import is_other_source, other_sources
 from radarsim.errors import ConfigError, StoreError
-from radarsim.private_files import foreign_owner
 from radarsim.report import atomic_files, provenance
+from radarsim.system.private_files import foreign_owner
 
 MAX_ATTEMPTS, ATTEMPT_INTERVAL_S = 4, 0.25
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from radarsim.api.configs import config_path
 from radarsim.config.error_text import one_line
 from radarsim.errors import ConfigError, StoreError
-from radarsim.private_files import create_readable_file, make_readable_folder
 from radarsim.studies import registry
+from radarsim.system.private_files import create_readable_file, make_readable_folder
 
 ONE_FILE, ONE_STEP = (Path(__file__).parent / name for name in ("one_file", "one_step"))
 FORMS = {"linear": (ONE_FILE,), "step": (ONE_FILE, ONE_STEP)}  # files of a later folder win

@@ -21,7 +21,7 @@ from radarsim.engine.store.block_file import (
 from radarsim.engine.store.store import folder_fault, mixture_warning
 from radarsim.engine.sums import Sums
 from radarsim.errors import StoreError
-from radarsim.private_files import UntrustedFileError
+from radarsim.system.private_files import UntrustedFileError
 
 ACROSS_PLATFORMS = 1e-9  # relative: sums made on several platforms agree to this
 

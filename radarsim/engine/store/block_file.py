@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from radarsim.engine.blocks import Node, Partial, Piece, Total
-from radarsim.private_files import UntrustedFileError, entry_fault
+from radarsim.system.private_files import UntrustedFileError, entry_fault
 
 MAGIC = b"radarsim sums 1\n"  # another number if the same realisations are ever added in another order
 SUFFIX = ".sums"

@@ -35,7 +35,7 @@ from radarsim.engine.store.block_file import (
 )
 from radarsim.engine.sums import Sums
 from radarsim.errors import StoreError
-from radarsim.private_files import (
+from radarsim.system.private_files import (
     UntrustedFileError,
     entry_fault,
     make_private_folder,

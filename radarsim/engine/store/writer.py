@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from radarsim.engine.blocks import Node, Piece
 from radarsim.engine.store.store import ATTEMPTS, Store
 from radarsim.engine.sums import Sums
-from radarsim.threads import forbidden
+from radarsim.system.threads import forbidden
 
 PERIOD_S = 1.0
 SMALLEST_SHARE = 1 / 64  # of the largest new node

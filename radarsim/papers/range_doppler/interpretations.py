@@ -18,7 +18,7 @@ from radarsim.papers.range_doppler import filter_versions, measures
 from radarsim.papers.range_doppler.filter_versions import Form, Start, Version
 from radarsim.papers.range_doppler.measures import RADARS
 from radarsim.report.statistics import Estimate
-from radarsim.threads import mapping
+from radarsim.system.threads import mapping
 
 FINAL_GAIN_CLAIM = "P1.5"
 FALLING_SIGMA_CLAIMS = ("P1.26", "P1.27")  # as far as a settled curve may rise again

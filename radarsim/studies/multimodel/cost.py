@@ -10,7 +10,7 @@ from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Filter
 from radarsim.studies.multimodel.kernels.layout import MODEL_NUMBERS, OUTPUT, PLOT, SIZE, START
 from radarsim.studies.multimodel.study import Plan
-from radarsim.threads import mapping
+from radarsim.system.threads import mapping
 
 # Additions, subtractions, multiplications, divisions, roots and exponentials of one step, all three axes, counted on
 # the formulas of `radarsim.kernels.kalman_algebra` and `kernels.hypothesis` (a test counts them again); PREDICT,

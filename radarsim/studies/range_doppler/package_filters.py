@@ -15,7 +15,7 @@ from radarsim.physics.motion import is_covariance, transition
 from radarsim.studies.range_doppler.config import FilterKeys
 from radarsim.studies.range_doppler.error_recursion import Plots, defects, start_errors
 from radarsim.studies.range_doppler.filter_design import LinearFilter, least_squares_start, update_covariance
-from radarsim.user_code_errors import call_user_function, user_code_error
+from radarsim.user_code.errors import call_user_function, user_code_error
 
 STEADY_TOLERANCE = 1e-9  # relative change of a gain from one scan to the next that counts as none
 

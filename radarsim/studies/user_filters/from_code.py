@@ -28,7 +28,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from radarsim import user_code_errors
 from radarsim.config.common_keys import UserFilterKeys
 from radarsim.config.experiment import Case
 from radarsim.config.identity import digest
@@ -49,6 +48,7 @@ from radarsim.studies.user_filters.sources import (
     sources,
     with_paths,
 )
+from radarsim.user_code import errors as user_code_errors
 
 RECORDED_REALISATIONS = 16  # the first ones, on which it is recorded what a filter reads
 MAX_NAMED_FILES = 3  # in a message, or one more

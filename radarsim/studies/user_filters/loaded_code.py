@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 from types import ModuleType
 from typing import Any
 
-from radarsim.module_sources import check_bytecode
 from radarsim.studies.interface import Study
 from radarsim.studies.user_filters.recording import Reads, Recorder
 from radarsim.studies.user_filters.sources import signature
+from radarsim.user_code.module_sources import check_bytecode
 
 imported_names: set[str] = set()  # of modules that were imported here: they may be imported anew, and from elsewhere
 

@@ -17,9 +17,9 @@ from types import FrameType
 from typing import Any
 from urllib.parse import unquote
 
-from radarsim.module_sources import INSTALLED
 from radarsim.studies.user_filters.sources import Kind, Signature, signature
-from radarsim.user_files import is_program_file, is_within, program_folders
+from radarsim.user_code.files import is_program_file, is_within, program_folders
+from radarsim.user_code.module_sources import INSTALLED
 
 Reads = dict[tuple[str, Kind], Signature | None]
 

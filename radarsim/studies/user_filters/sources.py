@@ -19,11 +19,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
-from radarsim import user_code_errors
 from radarsim.config.identity import digest
 from radarsim.errors import ConfigError
-from radarsim.module_sources import INSTALLED
-from radarsim.user_files import is_program_file
+from radarsim.user_code import errors as user_code_errors
+from radarsim.user_code.files import is_program_file
+from radarsim.user_code.module_sources import INSTALLED
 
 MAX_NAME = 255  # characters of the name of a file
 MIN_AGE_NS = 100_000_000  # file systems count in steps of milliseconds: of two writes in one step the times are equal

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from radarsim import private_files
-from radarsim.private_files import (
+from radarsim.system import private_files
+from radarsim.system.private_files import (
     UntrustedFileError,
     create_private_file,
     distrust_reason,

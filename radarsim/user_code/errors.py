@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from radarsim.errors import AUTHOR_ERRORS, ConfigError, RadarsimError
 
-LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), str(Path(__file__).parent))
+LIBRARIES = (*(sysconfig.get_path(name) for name in ("stdlib", "platstdlib")), str(Path(__file__).parents[1]))
 COMPILER_NOISE = re.compile(r"Failed in |-+$|\[\d\] |During: ")  # lines of a compiler's message that say where it was
 ARRAY_UFUNC = "__array_ufunc__"  # in NumPy's error about the sine of eight realisations
 MAX_MESSAGE_LENGTH = 300  # characters of a message

@@ -6,9 +6,9 @@ import sysconfig
 from functools import cache
 from pathlib import Path
 
-from radarsim.module_sources import INSTALLED, module_spec
+from radarsim.user_code.module_sources import INSTALLED, module_spec
 
-PACKAGE = str(Path(__file__).parent)
+PACKAGE = str(Path(__file__).parents[1])
 PROGRAM_FOLDERS = ("/proc", "/sys", "/dev", "/etc", "/usr", "/lib", "/lib64", "/bin", "/sbin", "/System", "/Library")
 
 

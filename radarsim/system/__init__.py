@@ -1,0 +1,1 @@
+"""The machine: whether threads may be started, and files to which only the user may write."""
