@@ -60,8 +60,7 @@ class StopRule(Protocol):
 class Extension:
     """An optional part of radarsim; a derived class overrides what it adds."""
 
-    command_module: str = ""  # registers commands with the group of `radarsim.cli.command_group` when it is imported
-    command_sections: Mapping[str, Sequence[str]] = {}  # titles and names of these commands in `radarsim --help`
+    command_sections: Mapping[str, Mapping[str, str]] = {}  # of `radarsim --help`: commands, and modules that add them
     figure_names: Sequence[str] = ()  # figures that it adds to results of any study
     table_names: Sequence[str] = ()  # tables that it adds, which its section of the report shows
     columns_from_elsewhere: Mapping[str, Sequence[str]] = {}  # of its tables: not of the result's own sums

@@ -60,7 +60,7 @@ def test_an_extension_adds_nothing_by_default():
     extension = Extension()
     assert not extension.tables((), {}, {}, "")
     assert extension.report_section({}, {}, {}, (), "range_doppler") is None
-    assert not extension.command_module
+    assert not extension.command_sections
     assert extension.stop_rule is None
 
 

@@ -2,21 +2,15 @@
 
 import gc
 import os
-from importlib import import_module
 
-from radarsim.cli import create, design, maintenance, results, run
 from radarsim.cli.command_group import main
 from radarsim.cli.streams import tolerant_output
-from radarsim.extensions import extensions
 
 # Matrices here are of a few rows: where other processes run too, a second thread of OpenBLAS made a Riccati equation
 # cost 15 times its processor time. It reads this when NumPy loads it, which is not yet.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-__all__ = ["create", "design", "entry", "main", "maintenance", "results", "run"]
-
-for module in filter(None, (extension.command_module for extension in extensions())):
-    import_module(module)  # adds commands to `main`
+__all__ = ["entry", "main"]
 
 
 def entry() -> None:

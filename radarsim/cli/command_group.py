@@ -1,6 +1,10 @@
-"""The group of commands `radarsim`: their sections in the help, and how they end."""
+"""The group of commands `radarsim`: their sections in the help, their modules, and how they end.
+
+A module of commands is imported when one of its commands is called or shown."""
 
 import functools
+from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
 import click
@@ -12,25 +16,48 @@ from radarsim.errors import AUTHOR_ERRORS, ON_COMMAND_LINE, ConfigError, Radarsi
 from radarsim.extensions import extensions
 from radarsim.language import current
 
-SECTIONS = {  # of commands in `radarsim --help`; extensions add theirs
-    "A question": ("list", "check", "run", "report", "compare", "pack", "export"),
-    "Your own radar": ("new", "solve", "tune", "sensitivity", "chart", "new-study"),
-    "Your own data": ("judge",),
-    "Upkeep": ("doctor",),
+CREATE, DESIGN, HAND_OVER = "radarsim.cli.create", "radarsim.cli.design", "radarsim.cli.hand_over"
+MAINTENANCE, RESULTS, RUN = "radarsim.cli.maintenance", "radarsim.cli.results", "radarsim.cli.run"
+SECTIONS: Mapping[str, Mapping[str, str]] = {  # of `radarsim --help`: commands and their modules; extensions add theirs
+    "A question": {
+        "list": MAINTENANCE,
+        "check": RUN,
+        "run": RUN,
+        "report": RESULTS,
+        "compare": RESULTS,
+        "pack": HAND_OVER,
+        "export": RESULTS,
+    },
+    "Your own radar": {
+        "new": CREATE,
+        "solve": DESIGN,
+        "tune": DESIGN,
+        "sensitivity": DESIGN,
+        "chart": DESIGN,
+        "new-study": CREATE,
+    },
+    "Your own data": {"judge": RESULTS},
+    "Upkeep": {"doctor": MAINTENANCE},
 }
-UNLISTED = ("compile", "schema", "clean")  # named in one line below the sections
+UNLISTED = dict.fromkeys(("compile", "schema", "clean"), MAINTENANCE)  # named in one line below the sections
 OLD_NAMES = {"readings": "interpretations"}  # names of commands in earlier versions, which still work
 SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
 
 
 @functools.cache
-def command_sections() -> dict[str, tuple[str, ...]]:
-    """Titles of the sections of `radarsim --help`, with their commands: those of extensions come first."""
+def command_sections() -> dict[str, Mapping[str, str]]:
+    """Titles of the sections of `radarsim --help`, with commands and their modules: those of extensions come first."""
     sections = dict(SECTIONS)
     for extension in extensions():
-        for title, names in extension.command_sections.items():
-            sections[title] = (*names, *sections.get(title, ()))
+        for title, modules in extension.command_sections.items():
+            sections[title] = {**modules, **sections.get(title, {})}
     return sections
+
+
+@functools.cache
+def command_modules() -> dict[str, str]:
+    """All commands, in the order of `radarsim --help`, with the module that registers each when it is imported."""
+    return {name: module for part in (*command_sections().values(), UNLISTED) for name, module in part.items()}
 
 
 class Commands(click.Group):
@@ -44,17 +71,21 @@ class Commands(click.Group):
         if (new_name := OLD_NAMES.get(cmd_name)) is not None:
             click.echo(f"note: `radarsim {cmd_name}` is called `radarsim {new_name}`", err=True)
             cmd_name = new_name
+        if (module := command_modules().get(cmd_name)) is not None:
+            import_module(module)
         return super().get_command(ctx, cmd_name)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [*(name for names in command_sections().values() for name in names), *UNLISTED]
+        return list(command_modules())
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        width = max(map(len, self.commands))
+        width = max(map(len, command_modules()))
         for title, names in command_sections().items():
-            rows = [(name.ljust(width), self.commands[name].get_short_help_str(100)) for name in names]
+            commands = [(name, self.get_command(ctx, name)) for name in names]
             with formatter.section(title):
-                formatter.write_dl(rows)
+                formatter.write_dl(
+                    [(name.ljust(width), command.get_short_help_str(100)) for name, command in commands if command]
+                )
         formatter.write_paragraph()
         formatter.write_text(f"Also: {', '.join(UNLISTED)}; `radarsim COMMAND --help` describes each.")
 

@@ -76,13 +76,13 @@ def refuse_options(archives: Sequence[str], values: Mapping[str, Any]) -> None:
 @contextmanager
 def loadable(sources: Sequence[str], trust_code: bool) -> "Iterator[list[tuple[str, Archive | None]]]":
     """The sources of configs, with each archive unpacked: its results' folders, and the archive. Elsewhere None."""
-    from radarsim.api.maintenance import check_archive
-
     if not are_archives(sources):
         if trust_code:
             raise click.UsageError("--trust-code applies to a study.zip")
         yield [(source, None) for source in sources]
         return
+    from radarsim.api.maintenance import check_archive
+
     with ExitStack() as stack:
         results: list[tuple[str, Archive | None]] = []
         for source in sources:

@@ -44,8 +44,9 @@ class UntilDecided:
 class PapersExtension(Extension):
     """Claims of papers: claims.csv, its part of the report, `claims`, `interpretations` and `run --decide`."""
 
-    command_module = "radarsim.papers.commands"
-    command_sections: Mapping[str, Sequence[str]] = {"The papers": ("claims", "interpretations")}
+    command_sections: Mapping[str, Mapping[str, str]] = {
+        "The papers": dict.fromkeys(("claims", "interpretations"), "radarsim.papers.commands")
+    }
     figure_names = (CLAIMS,)
     table_names = (CLAIMS,)
     columns_from_elsewhere: Mapping[str, Sequence[str]] = {CLAIMS: ("overall", "class", "as_shipped")}

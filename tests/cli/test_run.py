@@ -128,7 +128,7 @@ def test_an_unwritable_place_exits_with_4(tmp_path):
     assert str(tmp_path / "out") in result.stderr
 
 
-@pytest.mark.parametrize("name", sorted(main.commands))
+@pytest.mark.parametrize("name", sorted(main.list_commands(None)))
 def test_help_teaches_with_an_example(name):
     assert re.search(rf"Examples?\n( +radarsim .*\n)*? +radarsim {name}\b", command(name, "--help").stdout)
 

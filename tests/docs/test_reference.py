@@ -95,8 +95,8 @@ def test_reference_holds_every_key_and_every_command():
     assert not [key for _, key in KEYS if f"`{key}`" not in text]
     assert text.count("\n## study: ") == len(registry.study_names())
     made = commands.markdown()
-    assert not [name for name in main.commands if f"## radarsim {name}\n" not in made]
-    assert made.count("\n  -h, --help ") == len(main.commands) + 1  # as in the terminal
+    assert not [name for name in main.list_commands(None) if f"## radarsim {name}\n" not in made]
+    assert made.count("\n  -h, --help ") == len(main.list_commands(None)) + 1  # as in the terminal
 
 
 def test_marks_are_replaced_and_unknown_ones_refused():

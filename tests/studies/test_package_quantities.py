@@ -242,7 +242,7 @@ def test_a_study_that_takes_no_spec_is_one_line(monkeypatch):
 
 
 def test_a_name_that_another_option_has_is_refused_where_it_is_declared():
-    command = main.commands["solve"]
+    command = main.get_command(None, "solve")
     context = click.Context(command, parent=main.make_context("radarsim", [], resilient_parsing=True))
     params = click.Command.get_params(command, context)
     options = {name for param in params for name in param.opts if name.startswith("--")}
