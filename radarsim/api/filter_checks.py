@@ -15,15 +15,36 @@ from radarsim.config.experiment import Case
 from radarsim.config.seeds import OTHER_NOISE, other_seed
 from radarsim.errors import AUTHOR_ERRORS, ConfigError
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import tr
+from radarsim.language.translate import term, tr
 from radarsim.report import statistics
 from radarsim.studies.user_filters import estimates, sums
 from radarsim.studies.user_filters.filters import EstimateChunks, Plots, StoredEstimates, UserFilter
+from radarsim.studies.user_filters.independence import uses_generator
 from radarsim.studies.user_filters.sums import Plan
 
 TRIAL_REALISATIONS = 256  # realisations on which a filter is checked before it is judged
 MATERIAL_CHANGE = 1e-3  # of a component's rms error; smaller changes are rounding, even that of float32
 TRAINED = 4.5  # standard errors of a rank sum: by chance once in 300,000 filters
+LOWEST_RANKS = (24, 32, 48, 64, 96, 128, 192)  # of both trials together, among which learned realisations are sought
+DEPENDENCES = {  # warnings on a filter whose realisations depend on each other, by the reason
+    "repeated": term(
+        "{name}: draws the same random numbers in every block of {block} realisations: intervals do not hold then, "
+        "and are shown of one block alone; plots.normals(m) and plots.uniforms(m) give it others"
+    ),
+    "shared": term(
+        "{name}: seeds its random numbers anew, so that all realisations share them: its results are of this seed, and "
+        "no interval holds; plots.normals(m) and plots.uniforms(m) give each realisation others, and what is drawn in "
+        "__init__ is part of the filter"
+    ),
+    "place": term(
+        "{name}: its estimates depend on the row of a realisation in the batch, in every block alike: no interval "
+        "holds; compute a row from its own plots, and take random numbers from plots.normals(m) or plots.uniforms(m)"
+    ),
+    "others": term(
+        "{name}: its estimates of a realisation depend on the others in the batch: no interval holds; compute a row "
+        "from its own plots alone"
+    ),
+}
 MIN_FOLLOW_REALISATIONS = 50  # below it, it is not tested whether errors follow the plots
 MIN_ORDER_FACTOR = 10.0  # errors that another order or unit divides by it show that this is the right one
 
@@ -120,8 +141,12 @@ def _check_repeatable(plan: Plan, member: Any, x: np.ndarray, tolerance: np.ndar
             name=name,
         )
         return
-    if n > 1 and (warning := _batch_warning(plan, member, x, tolerance)):
-        yield warning
+    reason = plan.dependences[member.name]
+    if not reason and n > 1 and _depends_on_batch(plan, member, x, tolerance):
+        member.note_dependence(plan.world.case)
+        reason = "others"
+    if reason:
+        yield tr(DEPENDENCES[reason], name=name, block=plan.block)
         return
     if hasattr(member.target, "step") or K < 2 or n < 2:
         return
@@ -134,31 +159,21 @@ def _check_repeatable(plan: Plan, member: Any, x: np.ndarray, tolerance: np.ndar
                  "with smoothers, not with filters", name=name, k=cut)  # fmt: skip
 
 
-def _batch_warning(plan: Plan, member: Any, x: np.ndarray, tolerance: np.ndarray) -> str:
-    """A warning where estimates depend on the other realisations in the batch; none for random numbers that differ
-    from block to block."""
+def _depends_on_batch(plan: Plan, member: Any, x: np.ndarray, tolerance: np.ndarray) -> bool:
+    """Whether estimates depend on the other realisations in the batch, and not by random numbers that differ from block
+    to block."""
     n = len(x)
     rows = slice(n // 4, n // 4 + max(n // 2, 1))  # neither the first nor the last, on which such a filter may rely
     some_plots = sums.plots_of(plan, plan.draw(rows.start, rows.stop - rows.start))
     if not _differ(_repeated_estimates(plan, member, some_plots), x[rows], tolerance):
-        return ""
-    if member.name in plan.repeating:
-        return tr(
-            "{name}: draws the same random numbers in every block of {block} realisations: intervals do not hold then, "
-            "and are shown of one block alone; plots.normals(m) and plots.uniforms(m) give it others",
-            name=member.name,
-            block=plan.block,
-        )
-    source = some_plots.world.random
-    is_declared = source is not None and source.generator_used  # random numbers of `plots.generator`
+        return False
     other_block = replace(sums.plots_of(plan, plan.draw(0, n)), first=plan.block)
-    if is_declared or _differ(_repeated_estimates(plan, member, other_block), x, tolerance):
-        return ""
-    return tr("{name}: its estimates of a realisation depend on the others in the batch", name=member.name)
+    is_random = uses_generator(some_plots) or _differ(_repeated_estimates(plan, member, other_block), x, tolerance)
+    return not is_random
 
 
 def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) -> Iterator[str]:
-    """A warning where errors are larger on noise of another seed than chance explains (Mann and Whitney's test)."""
+    """A warning where errors are larger on noise of another seed than chance explains."""
     n = len(judged[0])
     other_plan = sums.with_other_noise(plan, case, other_seed(case.seed, OTHER_NOISE))
     plots = other_plan.draw(0, n)
@@ -175,8 +190,7 @@ def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) 
         return
     errors = sums.filter_errors(other_plan, member, answer, plots, sums.greatest_errors(inner))
     here, there = _mean_squares(judged, (errors.error, inner))
-    smaller = (here[:, None] < there).mean() + (here[:, None] == there).mean() / 2
-    if not smaller - 0.5 > TRAINED * np.sqrt((2 * n + 1) / (12 * n * n)):
+    if not _is_smaller_beyond_chance(here, there):
         return
     ratio = _error_ratio(there, here)
     member.note_training(case.name, ratio)
@@ -186,6 +200,26 @@ def _check_training(case: Case, plan: Plan, member: UserFilter, judged: Errors) 
         name=member.name,
         ratio=numeral(f"{ratio:.3g}").replace("inf", "∞"),
     )
+
+
+def _is_smaller_beyond_chance(here: np.ndarray, there: np.ndarray) -> bool:
+    """Whether values (n,) are smaller than others (n,), by their rank sum (Mann and Whitney), or too many of them among
+    the smallest of both, as where a filter has learned some realisations. By chance once in 150,000 filters."""
+    n = len(here)
+    smaller = (here[:, None] < there).mean() + (here[:, None] == there).mean() / 2
+    if smaller - 0.5 > TRAINED * np.sqrt((2 * n + 1) / (12 * n * n)):
+        return True
+    order = np.lexsort((np.repeat([1, 0], n), np.concatenate([here, there])))  # of equal ones those there first
+    counts = np.cumsum(order < n)
+    ranks = [rank for rank in LOWEST_RANKS if rank <= n]
+    by_chance = [_share_of_draws(n, rank, int(counts[rank - 1])) for rank in ranks]
+    return min(by_chance, default=1.0) * len(LOWEST_RANKS) < math.erfc(TRAINED / math.sqrt(2)) / 2
+
+
+def _share_of_draws(n: int, drawn: int, count: int) -> float:
+    """The share of draws out of n white and n black balls that hold at least so many white ones."""
+    held = range(count, drawn + 1)
+    return sum(math.comb(n, white) * math.comb(n, drawn - white) for white in held) / math.comb(2 * n, drawn)
 
 
 def _error_ratio(there: np.ndarray, here: np.ndarray) -> float:

@@ -17,7 +17,7 @@ from radarsim.report.statistics import Estimate, difference
 if TYPE_CHECKING:
     from radarsim.api.run_errors import CaseErrors
 
-REPEATED_NUMBERS = "a filter's random numbers repeat in every block: no interval holds"
+DEPENDENT_REALISATIONS = "realisations of a filter depend on each other: no interval holds"
 INTERVAL_ROUNDING = 1e-12  # of a number: an interval that is narrower is rounding
 
 
@@ -190,11 +190,11 @@ def shipped_spec(result: CaseResult) -> Any:
     return result.shipped_spec if isinstance(result, InterpretedCase) else result.spec
 
 
-def _check_numbers_differ(result: CaseResult, *filter_names: str) -> None:
-    """Raise MissingEvidence for a filter that draws the same random numbers in every block."""
+def _check_independent(result: CaseResult, *filter_names: str) -> None:
+    """Raise MissingEvidence for a filter whose realisations depend on each other."""
     axes: Any = result.user_filters and result.user_filters.axes
-    if axes and {*filter_names} & set(axes.repeating):
-        raise MissingEvidence(REPEATED_NUMBERS)
+    if axes and {*filter_names} & {name for name, _ in axes.dependent}:
+        raise MissingEvidence(DEPENDENT_REALISATIONS)
 
 
 class _WatchedTables(dict):
@@ -292,7 +292,7 @@ class Evidence:
         self.tables_read.add((table, component))
         if rows is None:
             raise self._lacking(result, filter_name, component, *base)
-        _check_numbers_differ(result, filter_name, *base)
+        _check_independent(result, filter_name, *base)
         value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
         if self._exact:
             if np.isnan(exact).any():
@@ -356,7 +356,7 @@ class Evidence:
         errors: CaseErrors = result.realisation_errors
         if filter_name not in errors.filters or component not in dict(errors.components):
             raise self._lacking(result, filter_name, component)
-        _check_numbers_differ(result, filter_name)
+        _check_independent(result, filter_name)
         return errors
 
     def row(self, table: str, **equal: object) -> Mapping[str, Any]:

@@ -30,7 +30,7 @@ DIFFERENCES = (
 )
 AND_MORE = term("and {count} more")
 PLAIN_REASONS = (
-    term("a filter's random numbers repeat in every block: no interval holds"),
+    term("realisations of a filter depend on each other: no interval holds"),
     *(term("no such experiment is shipped"), term("a required case is missing"), term("there is no gain")),
     term("its measure gives no number"),
     *(term("there is nothing to measure it with"), term("no such scans"), term("not known exactly")),

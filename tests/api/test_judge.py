@@ -5,6 +5,7 @@ import re
 import tracemalloc
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pandas as pd
 import pytest
@@ -248,6 +249,18 @@ class Odd:
     def step(self, plots):
         self.k += 1
         return np.stack([plots["range_m"], plots["velocity_mps"]][: 1 + (self.k > 3)], axis=1)
+
+
+@numba.njit
+def compiled(z, v):
+    return z
+
+
+def test_a_compiled_function_is_refused_with_the_function_to_write():
+    cure = r"def my_filter\(plots\): return compiled\(plots\['range_m'\], plots\['velocity_mps'\]\)"
+    assert re.search(cure, refusal(compiled))
+    assert "is a compiled function" in refusal(np.abs)
+    assert len(radarsim.judge("rls2", lambda plots: compiled(plots["range_m"], 0), realisations=20).answer)
 
 
 def test_what_a_filter_may_not_give_is_said_with_its_place():

@@ -73,7 +73,7 @@ def test_no_claim_rests_on_errors_of_a_filter_that_repeats_its_random_numbers(tm
     )
     result = radarsim.run(file, realisations=9000)
     evidence = Evidence(result.cases, result.tables, {})
-    with pytest.raises(MissingEvidence, match="random numbers repeat in every block"):
+    with pytest.raises(MissingEvidence, match="realisations of a filter depend on each other"):
         evidence.run_rms({}, "noisy", "r")
     assert evidence.run_rms({}, "r", "r").shape == (9000,)
 

@@ -1,9 +1,13 @@
 """Filters with random numbers: by counter, in any batch; repeated ones, and learned realisations, are detected."""
 
+import random
+
 import numpy as np
 import pytest
+from numpy.random import default_rng
 
 import radarsim
+from radarsim.api import filter_checks
 
 BLOCK = 4096  # realisations of `rls2`
 NOISE_M = 1000.0
@@ -124,6 +128,87 @@ def test_numbers_that_repeat_in_each_block_are_said_and_their_intervals_not_show
     assert "nan" not in " ".join(result.answer)
 
 
+class ByRow:
+    """The measured range and an offset that grows with the row; nothing is drawn."""
+
+    def start(self, world):
+        pass
+
+    def step(self, plots):
+        return (plots["range_m"] + 0.1 * NOISE_M * np.sin(np.arange(plots.n)))[:, None]
+
+
+class SameInAllRows(Own):
+    """A number at each scan, the same in all rows."""
+
+    def step(self, plots):
+        return (plots["range_m"] + NOISE_M * self.rng.standard_normal())[:, None]
+
+
+class SeededWhereBuilt(SameInAllRows):
+    def __init__(self):
+        self.rng = np.random.default_rng(4)
+
+    def start(self, world):
+        pass
+
+
+class Weights:
+    """A weight that is drawn where the filter is built, as that of a network: part of the filter."""
+
+    def __init__(self):
+        self.weight = random.Random(5).random()
+
+    def start(self, world):
+        pass
+
+    def step(self, plots):
+        return (plots["range_m"] + self.weight)[:, None]
+
+
+def anew_in_each_realisation(plots):
+    return plots["range_m"] + NOISE_M * default_rng(7).standard_normal(plots["range_m"].shape)
+
+
+def seeded_by_config(plots):
+    random.seed(plots.world.keys["radar"]["scan_period_s"])
+    return plots["range_m"] + [NOISE_M * random.gauss(0, 1) for _ in plots["range_m"]]
+
+
+def seeded_by_plots(plots):
+    rng = np.random.RandomState(int(abs(plots["range_m"][0]) * 1e3) % 2**32)
+    return plots["range_m"] + NOISE_M * rng.standard_normal(plots["range_m"].shape)
+
+
+@pytest.mark.parametrize("count", [300, BLOCK + 100])
+@pytest.mark.parametrize(
+    ("target", "alone", "words", "reason"),
+    [
+        (anew_in_each_realisation, True, "all realisations share them", "all realisations share its random numbers"),
+        (seeded_by_config, True, "all realisations share them", "all realisations share its random numbers"),
+        (SameInAllRows, False, "all realisations share them", "all realisations share its random numbers"),
+        (SeededWhereBuilt, False, "all realisations share them", "all realisations share its random numbers"),
+        (ByRow, False, "depend on the row of a realisation", "its estimates depend on the row in the batch"),
+        (beside, False, "depend on the others in the batch", "its estimates depend on the other realisations"),
+    ],
+)
+def test_realisations_that_depend_on_each_other_are_said_by_their_cause_and_have_no_intervals(
+    target, alone, words, reason, count
+):
+    result = judged(target, realisations=count, one_by_one=alone)
+    (warning,) = result.warnings
+    assert words in warning
+    assert own_rows(result)[["sigma_lo", "sigma_hi"]].isna().all(axis=None)
+    assert reason in result.answer[0]
+
+
+@pytest.mark.parametrize(("target", "alone"), [(Weights, False), (seeded_by_plots, True)])
+def test_numbers_that_belong_to_the_filter_or_to_the_plots_get_no_word(target, alone):
+    result = judged(target, realisations=300, one_by_one=alone)
+    assert result.warnings == []
+    assert own_rows(result)["sigma_lo"].notna().all()
+
+
 def test_one_block_alone_repeats_nothing():
     result = judged(Own, realisations=400)
     assert own_rows(result)[["sigma_lo", "sigma_hi"]].notna().all(axis=None)
@@ -188,6 +273,15 @@ def test_a_stored_run_keeps_the_warning_on_training(tmp_path):
     assert ran.answer[0].startswith("memo seems to have been trained on these realisations")
     assert stored.answer == ran.answer
     assert any('purpose="training"' in line for line in stored.warnings)
+
+
+def test_some_learned_realisations_of_256_are_noticed_and_chance_is_not():
+    rng = np.random.default_rng(1)
+    here, there = rng.gamma(2, size=(2, 300, 256))
+    assert not any(map(filter_checks._is_smaller_beyond_chance, here, there))
+    for learned, factor in ((25, 0.001), (40, 0.05), (60, 0.1)):
+        here[:50, :learned] = factor * rng.gamma(2, size=(50, learned))
+        assert np.mean([*map(filter_checks._is_smaller_beyond_chance, here[:50], there[:50])]) > 0.8
 
 
 def test_a_filter_that_fails_on_other_noise_is_judged_and_said():

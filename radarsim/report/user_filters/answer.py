@@ -27,6 +27,12 @@ SIGMA = ("sigma", "sigma_lo", "sigma_hi")
 NARROWER = 2.0  # times: a σ from a paired ratio is told in place of the measured one where it is so much narrower
 MATERIAL_LOSS = 1.0  # per cent: a smaller one in another component is not told in the first sentence
 NEGLIGIBLE = 1e-3  # of the largest σ of a filter's component over time: what is below is known, not estimated
+DEPENDENCES = {  # why a filter has no intervals, after "as"
+    "repeated": term("its random numbers repeat in every block"),
+    "shared": term("all realisations share its random numbers"),
+    "place": term("its estimates depend on the row in the batch"),
+    "others": term("its estimates depend on the other realisations in the batch"),
+}
 UNBIASED = term("the Cramér-Rao bound of unbiased estimators")
 ANY = term("the posterior Cramér-Rao bound")
 
@@ -61,6 +67,7 @@ class _Comparison:
     exact_sigmas: Mapping[str, float]  # of the config's filters for which it is known
     best_sigma: "pd.Series[Any]"  # of `curves`: that of the config's best filter
     rivals: Mapping[str, float]  # the config's best filter, then its best tuned one, if any; their σ, exact first
+    dependence: str  # why the user filter has no intervals; empty where it has
 
     @property
     def best(self) -> str:
@@ -156,7 +163,9 @@ def _compare(
     unit = key_labels.unit_label(unit)
     exact = {row["filter"]: float(row["exact_sigma"]) for row in rows.values() if row["exact_sigma"] > 0}
     exact = {baseline: exact[baseline] for baseline in baselines if baseline in exact}
-    return _Comparison(name, unit, gains, rows[name], exact, rows[best], {rival: sigma[rival] for rival in rivals})
+    dependence = dict(user_filter_cases(result)[0].axes.dependent).get(name, "")
+    rival_sigmas = {rival: sigma[rival] for rival in rivals}
+    return _Comparison(name, unit, gains, rows[name], exact, rows[best], rival_sigmas, dependence)
 
 
 def _losses(
@@ -226,9 +235,10 @@ def _against_best(comparison: _Comparison, best: str) -> Sentence:
     }
     if np.isnan(row["gain_lo"]):
         text = tr(
-            "{name} cannot be judged against {best}, the config's best in {component} at {t} s, as its random numbers "
-            "repeat in every block and no interval holds: gain {gain}",
+            "{name} cannot be judged against {best}, the config's best in {component} at {t} s, as {reason} and no "
+            "interval holds: gain {gain}",
             **fields,
+            reason=tr(DEPENDENCES[comparison.dependence or "others"]),
         )
     elif row["gain_lo"] > 0:
         text = tr("{name} is better than {best}, the config's best in {component} at {t} s: gain {gain}", **fields)

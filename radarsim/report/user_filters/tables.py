@@ -177,9 +177,9 @@ def measured_rows(results: Sequence[CaseResult]) -> TablesByName:
 
 
 def without_intervals(table: "pd.DataFrame", results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """A table without the ends of intervals that do not hold: of filters whose random numbers repeat in each block."""
+    """A table without the ends of intervals that do not hold: of filters whose realisations depend on each other."""
     cases = [case for result in results for case in user_filter_cases(result)]
-    names = {(case.name, name) for case in cases for name in case.axes.repeating}
+    names = {(case.name, name) for case in cases for name, _ in case.axes.dependent}
     if not names or not len(table):
         return table
     rows = np.full(len(table), False)

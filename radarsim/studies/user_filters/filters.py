@@ -16,6 +16,7 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -32,6 +33,9 @@ from radarsim.studies.user_filters.estimates import (
     copy_estimates,
     stack_estimates,
 )
+from radarsim.studies.user_filters.seeding import building_filter
+
+COMPILERS = ("numba", "jaxlib")  # packages whose functions take arrays and numbers alone
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,7 @@ class UserFilter(ABC):
     baseline: bool = False  #: whether gains of the others are against it too
     answer_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
     training_ratios: Mapping[str, float] = MappingProxyType({})  #: by case, see `note_training`
+    dependent_cases: frozenset[str] = frozenset()  #: see `note_dependence`
 
     @abstractmethod
     def estimates(self, plots: Plots) -> Any:
@@ -86,6 +91,10 @@ class UserFilter(ABC):
         """Note that its σ on other noise is so many times as large, beyond chance: it knows the realisations of a case
         that it is judged on."""
         vars(self)["training_ratios"] = {**self.training_ratios, case: ratio}
+
+    def note_dependence(self, case: str) -> None:
+        """Note that its estimates of a realisation depend on the others in the batch, in a case."""
+        vars(self)["dependent_cases"] = self.dependent_cases | {case}
 
     def warnings(self) -> list[str]:
         """Warnings about its numbers, from what has run so far."""
@@ -114,12 +123,25 @@ class CalledFilter(UserFilter):
                 raise ConfigError(
                     f"{self.name}: a filter that is asked scan by scan must have start(world) and step(plots)"
                 )
+            _check_not_compiled(self.name, target, plots)
             if not self.takes_one_realisation:
                 return target(plots)
             answers = [copy_estimates(target(plots_of_realisation(plots, i))) for i in range(plots.n)]
             return stack_estimates(
                 self.name, answers, [f"realisation {plots.first + i}" for i in range(plots.n)], axis=0
             )
+
+
+def _check_not_compiled(name: str, target: Any, plots: Plots) -> None:
+    """Raise ConfigError for a compiled function, which cannot take plots."""
+    function = target.func if isinstance(target, partial) else target
+    if type(function).__module__.partition(".")[0] in COMPILERS or isinstance(function, np.ufunc):
+        called = getattr(function, "__name__", "compiled")
+        columns = ", ".join(f"plots[{column!r}]" for column in plots.columns)
+        raise ConfigError(
+            f"{name}: is a compiled function, which takes arrays, not plots: call it in a function of Python, "
+            f"def my_filter(plots): return {called}({columns})"
+        )
 
 
 def plots_of_realisation(plots: Plots, i: int) -> Plots:
@@ -129,7 +151,8 @@ def plots_of_realisation(plots: Plots, i: int) -> Plots:
 
 def build_filter(name: str, target: type, **keys: Any) -> Any:
     """An object of a filter's class."""
-    instance = target(**keys)
+    with building_filter():
+        instance = target(**keys)
     if components_of(instance) != components_of(target):
         raise ConfigError(f"{name}: components must be an attribute of the class itself, not of its objects")
     return instance

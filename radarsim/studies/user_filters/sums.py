@@ -22,8 +22,8 @@ from radarsim.errors import ConfigError
 from radarsim.studies.plot_arrays import World
 from radarsim.studies.user_filters.estimates import check_estimates, columns_of
 from radarsim.studies.user_filters.filters import Plots, UserFilter
+from radarsim.studies.user_filters.independence import Dependence, dependence
 from radarsim.studies.user_filters.plots import drawing_setup, plots_for_filter
-from radarsim.studies.user_filters.repeated_numbers import repeats_numbers
 
 if TYPE_CHECKING:
     from radarsim.studies.interface import Study
@@ -46,7 +46,7 @@ class UserFilterAxes(Axes):
     answer_at: tuple[str, float] | None = None
     answer_points: tuple[tuple[str, float], ...] = ()  #: see `Study.answer_points`
     training_ratios: tuple[tuple[str, float], ...] = ()  #: by the name of a filter: see `UserFilter.note_training`
-    repeating: tuple[str, ...] = ()  #: filters whose random numbers repeat in each block: their intervals do not hold
+    dependent: tuple[tuple[str, Dependence], ...] = ()  #: filters whose intervals do not hold, and why
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,22 @@ class Plan:
         return tuple(name for name, _ in self.axes.components)
 
     @cached_property
-    def repeating(self) -> tuple[str, ...]:
-        """The filters whose random numbers repeat in each block."""
-        return tuple(member.name for member in self.members if repeats_numbers(self, member))
+    def dependences(self) -> dict[str, Dependence]:
+        """Why realisations of each filter depend on each other; empty where they do not."""
+        return {member.name: dependence(self, member) for member in self.members}
+
+    def invalid_intervals(self, count: int) -> tuple[tuple[str, Dependence], ...]:
+        """The filters without intervals among so many realisations, and why; one block alone repeats nothing."""
+        reasons: dict[str, Dependence] = {
+            member.name: self.dependences[member.name]
+            or ("others" if self.world.case in member.dependent_cases else "")
+            for member in self.members
+        }
+        return tuple(
+            (name, reason)
+            for name, reason in reasons.items()
+            if reason and (reason != "repeated" or count > self.block)
+        )
 
 
 def prepare(study: "Study", case: Case, inner: Any) -> Plan:
@@ -237,7 +250,6 @@ def error_powers(error: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
 
 def result(plan: Plan, study_result: CaseResult, sums: Mapping[str, np.ndarray]) -> CaseResult:
     """The user filters as a case of their own: available only where some realisation has an estimate."""
-    repeating = plan.repeating if study_result.count > plan.block else ()
     case = plan.world.case
     ratios = tuple((m.name, m.training_ratios[case]) for m in plan.members if case in m.training_ratios)
     axes = replace(
@@ -245,6 +257,6 @@ def result(plan: Plan, study_result: CaseResult, sums: Mapping[str, np.ndarray])
         available=sums["estimates"] > 0,
         answer_points=tuple(plan.study.answer_points(study_result)),
         training_ratios=ratios,
-        repeating=repeating,
+        dependent=plan.invalid_intervals(study_result.count),
     )
     return replace(study_result, sums=sums, axes=axes, further_baselines=())
