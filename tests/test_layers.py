@@ -51,9 +51,10 @@ ROOMS = {
     "studies.noise": ("config.experiment", "config.identity", "kernels.random"),
     "studies.radial_truth": ("constants", "physics"),
     "studies.random_numbers": ("kernels.random",),
+    "studies.error_law": (),
     "studies.gross_errors": ("kernels.likelihood",),
     "studies.plot_arrays": ("studies.random_numbers",),
-    "studies.recording_interface": ("config.experiment", "studies.plot_arrays"),
+    "studies.recording_interface": ("config.experiment", "studies.error_law", "studies.plot_arrays"),
     "studies.floors": ("engine.results", "report", "studies.interface"),
     "studies.interface": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "report", "report.drawing"),
@@ -76,7 +77,7 @@ ROOMS = {
     "studies.linear_exact": ("studies.linear_design",),
     "studies.linear_problem": ("config.experiment", "kernels", "studies.linear_design", "studies.noise"),
     "studies.linear_recordings": (
-        *("kernels", "studies.gross_errors", "studies.linear", "studies.linear_design"),
+        *("kernels", "studies.error_law", "studies.gross_errors", "studies.linear", "studies.linear_design"),
         "studies.recording_interface",
     ),
     "studies.stepwise": (
@@ -115,14 +116,17 @@ ROOMS = {
     "recordings": (
         *("recordings.fit", "recordings.formats", "recordings.registration", "recordings.report"),
         *("api", "cli", "config", "extensions", "language", "report"),
-        *("studies.plot_arrays", "studies.recording_interface", "studies.registry", "studies.user_filters"),
+        *("studies.error_law", "studies.plot_arrays", "studies.recording_interface", "studies.registry"),
+        "studies.user_filters",
     ),
     "recordings.formats": ("recordings", "recordings.fit.folded_doppler", "language", "physics", "report"),
-    "recordings.fit": ("recordings", "config", "language", "report", "studies.recording_interface"),
+    "recordings.fit": (
+        *("recordings", "config", "language", "report", "studies.error_law", "studies.recording_interface"),
+    ),
     "recordings.registration": ("recordings", "recordings.formats", "language", "report"),
     "recordings.report": (
         *("recordings", "recordings.fit", "config", "language", "report", "report.drawing"),
-        "studies.recording_interface",
+        *("studies.error_law", "studies.recording_interface"),
     ),
     "papers": (  # adds itself by `extensions`; only the names for users import it
         *("api", "bursts", "cli", "config", "engine", "extensions", "kernels", "language", "physics"),
@@ -161,7 +165,10 @@ ROLES = {
         (*NUMBERS, "studies.noise", "studies.plot_arrays", "studies.recording_interface"),
         (*COMPUTED, "tracking"),
     ),
-    "plot_likelihood": ((*NUMBERS, "studies.gross_errors", "studies.recording_interface"), (*COMPUTED, "tracking")),
+    "plot_likelihood": (
+        (*NUMBERS, "studies.error_law", "studies.gross_errors", "studies.recording_interface"),
+        (*COMPUTED, "tracking"),
+    ),
     "recorded_plots": (
         ("config.experiment", "constants", "studies.plot_arrays", "studies.recording_interface"),
         (*COMPUTED, "tracking", "plot_likelihood", "recorded_plots"),

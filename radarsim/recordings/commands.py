@@ -291,7 +291,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> 
     from radarsim.recordings import print_results
     from radarsim.recordings.fit import fit as fit_fit
     from radarsim.report import output_labels
-    from radarsim.studies.recording_interface import CORRELATION, OUTLIERS
+    from radarsim.studies.error_law import CORRELATION, OUTLIERS
 
     (loaded,) = load_experiments.load_all([config], overrides)
     explanations = tuple(

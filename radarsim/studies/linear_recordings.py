@@ -6,18 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column
 from radarsim.studies.linear_design import period
-from radarsim.studies.recording_interface import (
-    CORRELATION,
-    MANOEUVRES,
-    NEAR_PART,
-    OUTLIERS,
-    USUAL_NEAR_WIDTH,
-    Track,
-    outlier_shares,
-    usual_interval_s,
-)
+from radarsim.studies.recording_interface import Track, usual_interval_s
 
 if TYPE_CHECKING:
     from radarsim.studies.linear import LinearStudy
@@ -153,13 +145,11 @@ class PlotLikelihood:
         ]
         self.usual_s = usual_interval_s(tracks)
 
-    def _track_scores(
-        self, values: np.ndarray, shares: np.ndarray, correlation: float
-    ) -> list[tuple[np.ndarray, np.ndarray]]:
+    def _track_scores(self, values: np.ndarray, law: ErrorLaw) -> list[tuple[np.ndarray, np.ndarray]]:
         """The log-densities (n, D) of the numbers of each track, and their probabilities to be no outliers."""
         from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
 
-        spec = self.spec
+        spec, shares, correlation = self.spec, law.shares(), law.correlation
         for key, value in zip(self.keys, values, strict=True):
             spec = _changed(spec, key.split("."), float(value))
         start = self.model.study.assumed_motion(spec, self.model.filter_keys)
@@ -177,42 +167,26 @@ class PlotLikelihood:
             result.append((score, soundness))
         return result
 
-    def _scores(self, values: np.ndarray, shares: np.ndarray, correlation: float) -> np.ndarray:
+    def _scores(self, values: np.ndarray, law: ErrorLaw) -> np.ndarray:
         """Sums over all tracks for each number of a plot."""
         total: np.ndarray = np.zeros(len(self.model.columns))
-        for score, _ in self._track_scores(values, shares, correlation):
+        for score, _ in self._track_scores(values, law):
             total += score.sum(axis=0)
         return total
 
-    def __call__(
-        self,
-        values: np.ndarray,
-        outliers: float = 0.0,
-        bias: float = 0.0,
-        correlation: float = 0.0,
-        manoeuvres: float = 0.0,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-    ) -> float:
+    def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The logarithm of the likelihood."""
-        return float(self._scores(values, outlier_shares(outliers, near, near_width, manoeuvres), correlation).sum())
+        return float(self._scores(values, law).sum())
 
-    def soundness(
-        self,
-        values: np.ndarray,
-        outliers: float,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-        correlation: float = 0.0,
-    ) -> list[dict[str, np.ndarray]]:
+    def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""
-        scores = self._track_scores(values, outlier_shares(outliers, near, near_width), correlation)
+        scores = self._track_scores(values, law)
         judged = [(i, np.arange(len(soundness)), soundness) for i, (_, soundness) in enumerate(scores)]
         return soundness_by_column(self.model.columns, self.given_tracks, self.given_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of each number of a plot."""
-        return dict(zip(self.model.columns, self._scores(values, np.zeros(4), 0.0).tolist(), strict=True))
+        return dict(zip(self.model.columns, self._scores(values, STATED_ERRORS).tolist(), strict=True))
 
 
 def _changed(model: Any, path: Sequence[str], value: float) -> Any:

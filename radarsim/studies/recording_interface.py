@@ -7,6 +7,7 @@ from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from radarsim.errors import ConfigError
+from radarsim.studies.error_law import STATED_ERRORS, ErrorLaw
 from radarsim.studies.plot_arrays import TRUTH_PREFIX, UNITS_IN_NAMES, DrawPlots, SimulatedPlots
 
 if TYPE_CHECKING:
@@ -63,10 +64,6 @@ class Tracker(Protocol):
 
 MAX_PREPARED = 4  # cases that stay prepared: those whose plots were drawn last
 
-OUTLIERS, BIAS, CORRELATION, MANOEUVRES = EXPLANATIONS = ("outliers", "bias", "correlation", "manoeuvres")
-NEAR, NEAR_PART = "near", 0.5  # the part of outliers that is near, where it is not fitted
-NEAR_WIDTH, USUAL_NEAR_WIDTH = "near_width", 3.0  # their width in σ, and that where it is not fitted
-
 
 class Likelihood(Protocol):
     """The likelihood of recorded plots under a filter, as a function of the config keys that it was designed with.
@@ -84,31 +81,10 @@ class Likelihood(Protocol):
     explains: tuple[str, ...]
     usual_s: float
 
-    def __call__(
-        self,
-        values: "np.ndarray",
-        outliers: float = 0.0,
-        bias: float = 0.0,
-        correlation: float = 0.0,
-        manoeuvres: float = 0.0,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-    ) -> float:
-        """The log-likelihood of values (n,) of the keys. Only explanations in `explains` may be given.
+    def __call__(self, values: "np.ndarray", law: ErrorLaw = STATED_ERRORS) -> float:
+        """The log-likelihood of values (n,) of the keys. law: only with explanations in `explains`."""
 
-        outliers: their share among the numbers, of which the part `near` has `near_width` times its σ and the rest any
-        size (`radarsim.kernels.likelihood`); bias: a constant error of a number that can show one, in its σ;
-        correlation: of the errors of neighbouring plots, at the recording's usual interval; manoeuvres: the share of
-        intervals in which the target manoeuvres far harder than in the others."""
-
-    def soundness(
-        self,
-        values: "np.ndarray",
-        outliers: float,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-        correlation: float = 0.0,
-    ) -> "Sequence[Mapping[str, np.ndarray]]":
+    def soundness(self, values: "np.ndarray", law: ErrorLaw) -> "Sequence[Mapping[str, np.ndarray]]":
         """The times t_s of each track, and the probability of each number that it is no outlier, by column; (n,)."""
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
@@ -121,14 +97,6 @@ def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:
 
     medians = [float(np.median(np.diff(track["t_s"]))) for track in tracks if len(track["t_s"]) > 1]
     return float(np.median(medians)) if medians else 1.0
-
-
-def outlier_shares(outliers: float, near: float, near_width: float, manoeuvres: float = 0.0) -> "np.ndarray":
-    """The shares of near and far outliers and of hard manoeuvres, and the width of near outliers (4,), as
-    `radarsim.kernels.likelihood` takes them."""
-    import numpy as np
-
-    return np.array([outliers * near, outliers * (1 - near), manoeuvres, near_width])
 
 
 class TurnError(NamedTuple):

@@ -15,8 +15,8 @@ from radarsim.recordings.fit.likelihood_slice import no_progress
 from radarsim.recordings.report import sentences
 from radarsim.report import wording
 from radarsim.report.statistics import Z95
+from radarsim.studies.error_law import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS, ErrorLaw
 from radarsim.studies.range_doppler.plot_likelihood import PlotLikelihood
-from radarsim.studies.recording_interface import BIAS, CORRELATION, EXPLANATIONS, OUTLIERS
 from radarsim.studies.registry import study
 from tests.program import command
 from tests.tolerances import Z, rounding, share_error, sigma_error
@@ -184,7 +184,7 @@ def test_what_is_advised_is_the_top(options):
     def at(what, factor):
         changed = values | {what: values[what] * factor}
         keys = np.array([changed.get(key, stated) for key, stated in zip(one.keys, one.stated, strict=True)])
-        return one(keys, **{name: changed[name] for name in EXPLANATIONS if name in changed})
+        return one(keys, ErrorLaw(**{name: changed[name] for name in EXPLANATIONS if name in changed}))
 
     for what in values:
         below, here, above = (at(what, 1 + step) for step in (-0.01, 0.0, 0.01))
@@ -244,7 +244,7 @@ def test_an_end_is_found_where_outliers_have_to_rise_from_none():
             near, far = np.minimum(np.exp(at[2:4]), profile_search.MAX_OUTLIER_SHARES)
             width = np.exp(np.clip(at[4], np.log(2.5), np.log(100)))
             values = np.array([*np.exp(at[:2]), variance])
-            return -one(values, near + far, near=near / (near + far), near_width=width)
+            return -one(values, ErrorLaw(near + far, near / (near + far), width))
 
         shares = ((1e-7, 1e-7, 5), (0.05, 1e-7, 3), (0.05, 1e-7, 10), (1e-7, 0.05, 5))
         starts = [[*np.log(best[:2]), *np.log(shape)] for shape in shares]

@@ -12,6 +12,7 @@ from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.recordings import simulate_plots
 from radarsim.recordings.fit import advice, fit
 from radarsim.recordings.study_part import recording_interface
+from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.multimodel.model_bank import start_weights
 from radarsim.studies.sonar import conversion
 from tests.recordings.error_laws import error_laws
@@ -252,7 +253,7 @@ def test_errors_of_a_sonar_that_last_have_the_density_of_their_correlations():
         spread = sigma**2 * (lasting + 1) + rate**2 * np.outer(t[1:], t[1:])
         expected += density(off, spread) - density(off[:2], spread[:2, :2])
         size += density_size(off, spread)
-    assert_rounded(one(one.stated, correlation=rho), expected, size, operations=len(t))
+    assert_rounded(one(one.stated, ErrorLaw(correlation=rho)), expected, size, operations=len(t))
     timed = fit.CorrelatedLikelihood(one)
     assert_rounded(timed(np.append(one.stated, -usual / np.log(rho))), expected, size, operations=len(t))
     assert timed(np.append(one.stated, 0.0)) == one(one.stated)
@@ -369,8 +370,8 @@ def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(shares):
         one = likelihood(case, name, columns)
         (options,) = (each for each in case.spec.filters if each.name == name)
         expected = interacting(case, options, columns, T, shares)
-        near = shares[0] / (sum(shares) or 1)
-        assert one(one.stated, sum(shares), near=near) == pytest.approx(expected, rel=density_rounding(case, columns))
+        law = ErrorLaw(sum(shares), shares[0] / (sum(shares) or 1))
+        assert one(one.stated, law) == pytest.approx(expected, rel=density_rounding(case, columns))
 
 
 def test_the_multimodel_likelihood_does_not_leap():

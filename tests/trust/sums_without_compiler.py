@@ -360,6 +360,7 @@ def tracks():
     from radarsim.kernels import second_order
     from radarsim.studies.ambiguous_doppler.kernels import realisations
     from radarsim.studies.ambiguous_doppler.recorded_plots import FoldedRecordedPlots
+    from radarsim.studies.error_law import ErrorLaw
     from radarsim.studies.multimodel import study as multimodel
     from radarsim.studies.multimodel import tracking as multimodel_tracking
     from radarsim.studies.multimodel.recorded_plots import FlightRecordedPlots
@@ -389,7 +390,9 @@ def tracks():
             made[f"folded likelihood {options.name}"] = np.array([likelihood(likelihood.stated)])
     one = work(*RUNS["linear"][:2])
     likelihood = plot_likelihood.PlotLikelihood(one.case, None, [recorded])
-    made["linear likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1, 0.5)])
+    made["linear likelihood"] = np.array(
+        [likelihood(likelihood.stated), likelihood(likelihood.stated, ErrorLaw(0.1, bias=0.5))]
+    )
     one = work(*RUNS["multimodel families"][:2])
     z, R, _ = multimodel.simulate_plots(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R
@@ -401,7 +404,9 @@ def tracks():
     track = multimodel_tracking.track(one.case, recorded)
     made["multimodel track"] = np.nan_to_num(track.estimate)
     likelihood = FlightRecordedPlots().likelihood(one.case, None, [recorded])
-    made["multimodel likelihood"] = np.array([likelihood(likelihood.stated), likelihood(likelihood.stated, 0.1)])
+    made["multimodel likelihood"] = np.array(
+        [likelihood(likelihood.stated), likelihood(likelihood.stated, ErrorLaw(0.1))]
+    )
     one = work(*RUNS["sonar clutter"][:2])
     recorded = clutter_tracking.simulated_plots(one.case)(3, 1).rows(0)
     made["clutter plots"] = np.stack([np.nan_to_num(recorded[name]) for name in ("t_s", "range_m", "bearing_rad")])

@@ -35,7 +35,8 @@ from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
 from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
 from radarsim.recordings.target_speed import impossible_column_speed
 from radarsim.recordings.tracking_result import TrackingResult
-from radarsim.studies.recording_interface import CORRELATION, MANOEUVRES, OUTLIERS, Likelihood, TurnError
+from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, ErrorLaw
+from radarsim.studies.recording_interface import Likelihood, TurnError
 
 FALSE_FINDING_LEVEL = 0.05  # of a false finding
 MAX_FINDINGS = 3
@@ -118,7 +119,7 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
         return Advice(comparison, [], used_rows, folding, None if folding else scale)
     likelihood = likelihoods[comparison.most_columns]
     findings = [_with_turn_error(case, likelihood, finding) for finding in find_errors(likelihood, progress)]
-    start_errors = find_outlier_rows(likelihood, np.asarray(likelihood.stated), 0.0)
+    start_errors = find_outlier_rows(likelihood, np.asarray(likelihood.stated))
     named_rows = {row for finding in findings for row in finding.rows}
     start_errors = tuple(row for row in start_errors if row not in named_rows)
     return Advice(comparison, findings, used_rows, start_errors=start_errors)
@@ -173,7 +174,8 @@ def _rows_of_outliers(likelihood: Likelihood, found: Mapping[str, float]) -> tup
     """The rows that are outliers, for the values of keys and explanations found."""
     stated = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([found.get(key, value) for key, value in stated])
-    return find_outlier_rows(likelihood, values, found[OUTLIERS], correlation=found.get(CORRELATION, 0.0))
+    law = ErrorLaw(outliers=found[OUTLIERS], correlation=found.get(CORRELATION, 0.0))
+    return find_outlier_rows(likelihood, values, law)
 
 
 def _is_distinguished_from_zero(

@@ -35,15 +35,8 @@ from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sampl
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
 from radarsim.recordings.track_rows import split_by_track
-from radarsim.studies.recording_interface import (
-    CORRELATION,
-    MANOEUVRES,
-    NEAR,
-    NEAR_PART,
-    OUTLIERS,
-    USUAL_NEAR_WIDTH,
-    Likelihood,
-)
+from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
+from radarsim.studies.recording_interface import Likelihood
 
 FITTED_EXPLANATIONS = (OUTLIERS, CORRELATION)  # for which a fit can allow
 SECOND_FIT_COST = 1.5  # evaluations of a fit that allows for more, in those of the plain one
@@ -126,32 +119,16 @@ class CorrelatedLikelihood:
         self.least = np.append(likelihood.least, ZERO_CORRELATION_TIME * likelihood.usual_s)
         self.explains = tuple(name for name in likelihood.explains if name not in (CORRELATION, MANOEUVRES))
 
-    def __call__(
-        self,
-        values: np.ndarray,
-        outliers: float = 0.0,
-        bias: float = 0.0,
-        correlation: float = 0.0,
-        manoeuvres: float = 0.0,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-    ) -> float:
-        """The logarithm of the likelihood; `correlation` is that of the last of the values (n,), whatever is given."""
-        return self.likelihood(values[:-1], outliers, bias, self._correlation(values), manoeuvres, near, near_width)
+    def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
+        """The logarithm of the likelihood; the correlation is that of the last of the values (n,), whatever the law."""
+        return self.likelihood(values[:-1], self._correlated(values, law))
 
-    def soundness(
-        self,
-        values: np.ndarray,
-        outliers: float,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-        correlation: float = 0.0,
-    ) -> Sequence[Mapping[str, np.ndarray]]:
+    def soundness(self, values: np.ndarray, law: ErrorLaw) -> Sequence[Mapping[str, np.ndarray]]:
         """As the likelihood's, with the correlation of the last of the values."""
-        return self.likelihood.soundness(values[:-1], outliers, near, near_width, self._correlation(values))
+        return self.likelihood.soundness(values[:-1], self._correlated(values, law))
 
-    def _correlation(self, values: np.ndarray) -> float:
-        return math.exp(-self.usual_s / values[-1]) if values[-1] else 0.0
+    def _correlated(self, values: np.ndarray, law: ErrorLaw) -> ErrorLaw:
+        return replace(law, correlation=math.exp(-self.usual_s / values[-1]) if values[-1] else 0.0)
 
     def by_number(self, values: np.ndarray) -> Mapping[str, float]:
         """The same for the keys alone, without correlation."""
@@ -326,20 +303,20 @@ def fit_keys(
         search.raise_zero_keys()
     if search.top <= IMPOSSIBLE_LOG_LIKELIHOOD:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
-    outliers = search.outliers(search.best)
-    share = outliers.get(OUTLIERS)
-    if share is not None and share * (1 - outliers[NEAR]) > MAX_PLAUSIBLE_OUTLIERS:
-        raise ConfigError(f"robust: {100 * share:.0f} % of the plots would have to be outliers: their errors follow "
-                          "another law (few different values?); fit without it")  # fmt: skip
+    law = search.law(search.best)
+    if law.outliers * (1 - law.near) > MAX_PLAUSIBLE_OUTLIERS:
+        raise ConfigError(
+            f"robust: {100 * law.outliers:.0f} % of the plots would have to be outliers: their errors follow another "
+            "law (few different values?); fit without it"
+        )
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
-    stated = likelihood(np.array(likelihood.stated), 0.0)
-    gain = search.top - stated
+    gain = search.top - likelihood(np.array(likelihood.stated))
     return Fit(
         likelihood.filter,
         likelihood.tracks,
         likelihood.rows,
         keys,
-        share,
+        law.outliers if robust else None,
         gain,
         _find_further_explanation(search, likelihood),
         outlier_rows=_outlier_rows(search, likelihood),
@@ -349,22 +326,17 @@ def fit_keys(
 def _outlier_rows(search: "LikelihoodSearch", likelihood: Likelihood) -> tuple[OutlierRow, ...]:
     """The numbers that are probably outliers at the maximum, and the gross errors before the start of a track."""
     values = search.to_values(search.best)[: len(likelihood.keys)]
-    return find_outlier_rows(likelihood, values, **({OUTLIERS: 0.0} | search.outliers(search.best)))
+    return find_outlier_rows(likelihood, values, search.law(search.best))
 
 
 def find_outlier_rows(
-    likelihood: Likelihood,
-    values: np.ndarray,
-    outliers: float,
-    near: float = NEAR_PART,
-    near_width: float = USUAL_NEAR_WIDTH,
-    correlation: float = 0.0,
+    likelihood: Likelihood, values: np.ndarray, law: ErrorLaw = STATED_ERRORS
 ) -> tuple[OutlierRow, ...]:
-    """The numbers that are probably outliers for values of the keys and explanations; none where the likelihood knows
-    no outliers."""
+    """The numbers that are probably outliers for values of the keys and a law of errors; none where the likelihood
+    knows no outliers."""
     if OUTLIERS not in likelihood.explains:
         return ()
-    tracks = likelihood.soundness(values, outliers, near, near_width, correlation)
+    tracks = likelihood.soundness(values, law)
     return tuple(
         OutlierRow(number, float(track["t_s"][row]), name)
         for number, track in enumerate(tracks)

@@ -7,16 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from radarsim.studies.recording_interface import (
-    BIAS,
-    CORRELATION,
-    EXPLANATIONS,
-    MANOEUVRES,
-    NEAR,
-    NEAR_WIDTH,
-    OUTLIERS,
-    Likelihood,
-)
+from radarsim.studies.error_law import BIAS, CORRELATION, EXPLANATIONS, MANOEUVRES, NEAR, NEAR_WIDTH, OUTLIERS, ErrorLaw
+from radarsim.studies.recording_interface import Likelihood
 
 ROUGH_ACCURACY = 0.01  # relative accuracy, of a key and of the likelihood, to which explanations are compared
 MIN_LOG_FACTOR, MAX_LOG_FACTOR = np.log(1e-4), np.log(1e4)  # of a key's factor
@@ -57,17 +49,18 @@ class CountedLikelihood:
         self.likelihood, self.progress, self.count, self.expected = likelihood, progress, count, expected
         self.keys, self.stated = likelihood.keys, likelihood.stated
 
-    def __call__(self, values: np.ndarray, explanations: Mapping[str, float]) -> float:
+    def __call__(self, values: np.ndarray, law: ErrorLaw) -> float:
         self.count += 1
         self.progress(self.count, self.expected and max(self.expected, self.count))
-        return self.likelihood(values, **explanations)
+        return self.likelihood(values, law)
 
 
 def log_likelihood(likelihood: CountedLikelihood, changes: Mapping[str, float]) -> float:
     """The log-likelihood with some keys changed and some explanations applied."""
     configured = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changes.get(key, value) for key, value in configured])
-    result = likelihood(values, {name: changes[name] for name in (*EXPLANATIONS, NEAR, NEAR_WIDTH) if name in changes})
+    fields = {name: changes[name] for name in (*EXPLANATIONS, NEAR, NEAR_WIDTH) if name in changes}
+    result = likelihood(values, ErrorLaw(**fields))
     return result if np.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
 
 

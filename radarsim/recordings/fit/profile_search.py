@@ -18,7 +18,8 @@ from radarsim.recordings.fit.likelihood_slice import (
     starting_values,
 )
 from radarsim.recordings.fit.newton_steps import FIRST_STEP, TOLERANCE, Curvature, polish_maximum
-from radarsim.studies.recording_interface import NEAR, NEAR_PART, NEAR_WIDTH, OUTLIERS, Likelihood
+from radarsim.studies.error_law import NEAR, NEAR_WIDTH, OUTLIERS, ErrorLaw
+from radarsim.studies.recording_interface import Likelihood
 
 # likelihood evaluations of a key to the maximum and to an end; of an explanation
 MAXIMUM_EVALUATIONS = 130
@@ -163,20 +164,23 @@ class LikelihoodSearch:
         return np.concatenate([keys, shares, [width]])
 
     def outliers(self, point: np.ndarray) -> dict[str, float]:
-        """The share of outliers, the part of them that is near and the width of these, as a likelihood takes them;
-        empty if not allowed for."""
+        """The share of outliers, the part of them that is near and the width of these; empty if not allowed for."""
         if not self.robust:
             return {}
         near, far, width = self.to_values(point)[-3:].tolist()
-        part = near / (near + far) if near + far else NEAR_PART
+        part = near / (near + far) if near + far else ErrorLaw.near
         return {OUTLIERS: near + far, NEAR: part, NEAR_WIDTH: width}
+
+    def law(self, point: np.ndarray) -> ErrorLaw:
+        """The law of errors at a point."""
+        return ErrorLaw(**self.outliers(point))
 
     def _log_likelihood(self, point: np.ndarray) -> float:
         values = self.to_values(point)
         self.evaluations += 1
         self.progress(self.evaluations, self._expected_evaluations())
         count = len(self.likelihood.stated)
-        result = self.likelihood(values[:count], **self.outliers(point))
+        result = self.likelihood(values[:count], self.law(point))
         return result if math.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
 
     def _expected_evaluations(self) -> int:

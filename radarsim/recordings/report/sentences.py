@@ -25,7 +25,8 @@ from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.report.output_labels import labelled_line
 from radarsim.report.wording import number, significant_digits
 from radarsim.report.wording import unit as unit_of
-from radarsim.studies.recording_interface import BIAS, CORRELATION, MANOEUVRES, OUTLIERS, TurnError
+from radarsim.studies.error_law import BIAS, CORRELATION, MANOEUVRES, OUTLIERS
+from radarsim.studies.recording_interface import TurnError
 
 MAX_RATIO_POWER = 6  # a larger power of ten of a ratio of likelihoods says no more than that one model is wrong
 EQUAL_FILTERS_GAIN = 1e-6  # difference of the log-likelihood below which two filters are the same

@@ -11,15 +11,9 @@ from radarsim.studies.ambiguous_doppler.fold_resolver import FoldResolver
 from radarsim.studies.ambiguous_doppler.followers import list_limits, packed_motion, prior_covariance
 from radarsim.studies.ambiguous_doppler.kernels import recorded_rows
 from radarsim.studies.ambiguous_doppler.tracking import MEASURED, plot_rows
+from radarsim.studies.error_law import BIAS, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
-from radarsim.studies.recording_interface import (
-    BIAS,
-    NEAR_PART,
-    OUTLIERS,
-    USUAL_NEAR_WIDTH,
-    outlier_shares,
-    usual_interval_s,
-)
+from radarsim.studies.recording_interface import usual_interval_s
 
 START_RANGES = 3  # of a track, among which gross errors are left out
 MIN_SIGMA_RATIO, MIN_VARIANCE_RATIO = 1e-4, 1e-6  # to the configured values: smaller ones count as zero
@@ -68,27 +62,27 @@ class PlotLikelihood:
             row[3] = folds.span
         return _Problem(f, q, rows[:, 1:])
 
-    def _track_scores(self, values: np.ndarray, shares: np.ndarray, bias: float) -> list[np.ndarray]:
+    def _track_scores(self, values: np.ndarray, law: ErrorLaw) -> list[np.ndarray]:
         """For each track the log-densities of its ranges and velocities, and their probabilities to be no outliers
         (2, n, 2); empty if a row cannot be taken."""
-        sigma = np.ones(2)
+        sigma, shares = np.ones(2), law.shares()
         sigma[: self.observes] = values[: self.observes]
         reach = (1 if self.options.hypotheses == 1 else 2) if self.member.doppler == "folded" else 0
         prior, result = np.array(prior_covariance(self.member, self.spec)), []
         for problem in self.problems:
             scores = np.empty((2, len(problem.rows), 2))
-            rows = self._velocities(problem.rows, bias * sigma[1])
+            rows = self._velocities(problem.rows, law.bias * sigma[1])
             present = np.isfinite(rows[:, :2])
             arguments = np.where(np.isfinite(rows), rows, 0.0), present, prior, sigma**2, float(values[-1])
-            hypotheses, law = (reach, *list_limits(self.options)), (shares, self.span, start_factor(shares))
-            if not recorded_rows.log_likelihood(problem.F, problem.Q, *arguments, *hypotheses, *law, *scores):
+            hypotheses, outliers = (reach, *list_limits(self.options)), (shares, self.span, start_factor(shares))
+            if not recorded_rows.log_likelihood(problem.F, problem.Q, *arguments, *hypotheses, *outliers, *scores):
                 return []
             result.append(scores)
         return result
 
-    def _scores(self, values: np.ndarray, shares: np.ndarray, bias: float = 0.0) -> np.ndarray:
+    def _scores(self, values: np.ndarray, law: ErrorLaw) -> np.ndarray:
         """Log likelihoods (2,) of range and velocity over all tracks; minus infinity if a row cannot be taken."""
-        scores, total = self._track_scores(values, shares, bias), np.zeros(2)
+        scores, total = self._track_scores(values, law), np.zeros(2)
         for score, _ in scores:
             total += score.sum(axis=0)
         return total if scores else np.full(2, -np.inf)
@@ -106,35 +100,19 @@ class PlotLikelihood:
                 shifted[i, 1] = folds.remainder(shifted[i, 1])
         return shifted
 
-    def __call__(
-        self,
-        values: np.ndarray,
-        outliers: float = 0.0,
-        bias: float = 0.0,
-        correlation: float = 0.0,
-        manoeuvres: float = 0.0,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-    ) -> float:
+    def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The log likelihood. bias: of the velocity, in units of its σ; correlation and manoeuvres are ignored."""
-        return float(self._scores(values, outlier_shares(outliers, near, near_width), bias).sum())
+        return float(self._scores(values, law).sum())
 
-    def soundness(
-        self,
-        values: np.ndarray,
-        outliers: float,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-        correlation: float = 0.0,
-    ) -> list[dict[str, np.ndarray]]:
+    def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""
-        scores = self._track_scores(values, outlier_shares(outliers, near, near_width), 0.0)
+        scores = self._track_scores(values, law)
         judged = [(i, np.arange(len(part)), part[:, : self.observes]) for i, (_, part) in enumerate(scores)]
         return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The log likelihoods of range and velocity."""
-        total = self._scores(values, np.zeros(4))
+        total = self._scores(values, STATED_ERRORS)
         return {name: float(score) for name, score in zip(self.columns, total, strict=False)}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH
-from radarsim.kernels.likelihood import WIDTH as NEAR_WIDTH
+from radarsim.studies.error_law import OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
 from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Filter, Keys
@@ -17,7 +17,7 @@ from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.study import banks
 from radarsim.studies.multimodel.tracking import lane_rows, sigmas
-from radarsim.studies.recording_interface import NEAR_PART, OUTLIERS, USUAL_NEAR_WIDTH, outlier_shares, usual_interval_s
+from radarsim.studies.recording_interface import usual_interval_s
 
 MIN_VALUE_RATIO = 1e-4  # to a key's configured value: smaller values count as zero
 
@@ -62,7 +62,7 @@ class PlotLikelihood:
         self.probabilities = model_bank.stationary(model_bank.transition_matrix(self.options.transition))
 
     def _track_scores(
-        self, values: np.ndarray, merge: str, shares: np.ndarray
+        self, values: np.ndarray, merge: str, law: ErrorLaw
     ) -> list[tuple["_Problem", np.ndarray, np.ndarray]]:
         """For each track the log-densities (n,) of its later plots, and their probabilities to be no outliers, for
         given values of the keys and a merging rule."""
@@ -76,7 +76,7 @@ class PlotLikelihood:
         design, numbers = filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
         z, R, is_valid = local_plots(sensor, self.measured)
         plots, result = np.concatenate([z, R, is_valid[:, None]], axis=1), []
-        widths = self._widths(R, float(shares[NEAR_WIDTH]))
+        widths, shares = self._widths(R, law.near_width), law.shares()
         for problem in self.problems:
             work, state = work_arrays()
             start = plots[problem.start_rows]
@@ -107,33 +107,17 @@ class PlotLikelihood:
         result[:, 1], result[:, 2 : 2 + FAR_COUNT] = near_width**2, far
         return result
 
-    def __call__(
-        self,
-        values: np.ndarray,
-        outliers: float = 0.0,
-        bias: float = 0.0,
-        correlation: float = 0.0,
-        manoeuvres: float = 0.0,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-    ) -> float:
+    def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The log likelihood; of the explanations only outliers are part of the model."""
-        return self._total(values, "moment", outlier_shares(outliers, near, near_width))
+        return self._total(values, "moment", law)
 
-    def _total(self, values: np.ndarray, merge: str, shares: np.ndarray) -> float:
+    def _total(self, values: np.ndarray, merge: str, law: ErrorLaw) -> float:
         """The log likelihood of all tracks."""
-        return sum(float(score.sum()) for _, score, _ in self._track_scores(values, merge, shares))
+        return sum(float(score.sum()) for _, score, _ in self._track_scores(values, merge, law))
 
-    def soundness(
-        self,
-        values: np.ndarray,
-        outliers: float,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-        correlation: float = 0.0,
-    ) -> list[dict[str, np.ndarray]]:
+    def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each plot that it is no outlier, for all its numbers the same."""
-        scores = self._track_scores(values, "moment", outlier_shares(outliers, near, near_width))
+        scores = self._track_scores(values, "moment", law)
         judged = [
             (problem.track, problem.later_rows, np.repeat(soundness[:, None], 3, axis=1))
             for problem, _, soundness in scores
@@ -142,7 +126,7 @@ class PlotLikelihood:
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The log likelihood of the plots, with the filter's own merging rule."""
-        return {"plot": self._total(values, self.options.merge, np.zeros(4))}
+        return {"plot": self._total(values, self.options.merge, STATED_ERRORS)}
 
 
 class _Problem(NamedTuple):

@@ -10,18 +10,13 @@ from radarsim.config.experiment import Case
 from radarsim.kernels.kalman_algebra import unpack
 from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
 from radarsim.physics.motion import transition
+from radarsim.studies.error_law import EXPLANATIONS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
 from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filter_design import noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import recorded_rows
 from radarsim.studies.range_doppler.tracking import MEASURED, START_RANGES, configured_variances
-from radarsim.studies.recording_interface import (
-    EXPLANATIONS,
-    NEAR_PART,
-    USUAL_NEAR_WIDTH,
-    outlier_shares,
-    usual_interval_s,
-)
+from radarsim.studies.recording_interface import usual_interval_s
 
 MIN_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 WIDE_VELOCITY_MPS, WIDE_ACCELERATION_MPS2 = 3e4, 3e3  # standard deviations before the first plot: nothing is known
@@ -76,18 +71,17 @@ class PlotLikelihood:
         H = np.tile(observation(self.observes), (len(t), 1, 1))
         return _Problem(track, rows, F, Q, H, np.where(present, z, 0.0), z[0, 0], present, settled, dt / self.usual_s)
 
-    def _score(
-        self, problem: "_Problem", values: np.ndarray, shares: np.ndarray, bias: float = 0.0, correlation: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _score(self, problem: "_Problem", values: np.ndarray, law: ErrorLaw) -> tuple[np.ndarray, np.ndarray]:
         """The log-densities (n, m) of a track's numbers, and their probabilities to be no outliers."""
+        shares, correlation = law.shares(), law.correlation
         variances, manoeuvre = np.square(values[: self.observes]), float(values[self.observes])
         x, P = np.zeros(3), np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
         P[0, 0] *= start_factor(shares)
         x[0] = problem.start
         score, soundness, spread = (*np.empty((2, *problem.z.shape)), np.tile(variances, (len(problem.z), 1)))
         offset = np.zeros(self.observes)
-        offset[1:] = bias * values[1 : self.observes]
-        z = problem.z - offset if bias else problem.z
+        offset[1:] = law.bias * values[1 : self.observes]
+        z = problem.z - offset if law.bias else problem.z
         model, scale, white = (x, P, problem.F, problem.Q, problem.H), manoeuvre, 1.0
         if correlation:
             error_covariance = np.zeros((3, self.observes))  # it is where the first plot is, and errs by its error
@@ -98,49 +92,26 @@ class PlotLikelihood:
         log_likelihood(*model, z, spread, problem.present, scale, shares, self.span, white, score, soundness)
         return score, soundness
 
-    def _scores(
-        self, values: np.ndarray, shares: np.ndarray, bias: float = 0.0, correlation: float = 0.0
-    ) -> np.ndarray:
+    def _scores(self, values: np.ndarray, law: ErrorLaw) -> np.ndarray:
         """Sums over all tracks for each number that counts; the first plots, which find the state, are left out."""
         total = np.zeros(self.observes)
         for problem in self.problems:
-            score, _ = self._score(problem, values, shares, bias, correlation)
+            score, _ = self._score(problem, values, law)
             total += score[problem.settled :].sum(axis=0)
         return total
 
-    def __call__(
-        self,
-        values: np.ndarray,
-        outliers: float = 0.0,
-        bias: float = 0.0,
-        correlation: float = 0.0,
-        manoeuvres: float = 0.0,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-    ) -> float:
+    def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The logarithm of the likelihood; bias: of the velocity, in its σ."""
-        shares = outlier_shares(outliers, near, near_width, manoeuvres)
-        return float(self._scores(values, shares, bias, correlation).sum())
+        return float(self._scores(values, law).sum())
 
-    def soundness(
-        self,
-        values: np.ndarray,
-        outliers: float,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-        correlation: float = 0.0,
-    ) -> list[dict[str, np.ndarray]]:
+    def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; zero of gross errors before the start."""
-        shares = outlier_shares(outliers, near, near_width)
-        scored = [
-            (problem.track, problem.rows, self._score(problem, values, shares, 0.0, correlation)[1])
-            for problem in self.problems
-        ]
+        scored = [(problem.track, problem.rows, self._score(problem, values, law)[1]) for problem in self.problems]
         return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, scored)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of range and velocity."""
-        total = self._scores(values, np.zeros(4))
+        total = self._scores(values, STATED_ERRORS)
         return {name: float(part) for name, part in zip(self.columns, total, strict=True)}
 
 

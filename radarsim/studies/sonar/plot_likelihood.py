@@ -8,16 +8,9 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
 from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
-from radarsim.studies.recording_interface import (
-    CORRELATION,
-    MANOEUVRES,
-    NEAR_PART,
-    OUTLIERS,
-    USUAL_NEAR_WIDTH,
-    outlier_shares,
-    usual_interval_s,
-)
+from radarsim.studies.recording_interface import usual_interval_s
 from radarsim.studies.sonar import conversion
 from radarsim.studies.sonar.scene import lateral_scale, third_coordinate
 from radarsim.studies.sonar.tracking import BEARING, RANGE, THIRD_COLUMN_AND_KEY, unwrap_bearings
@@ -112,10 +105,11 @@ class PlotLikelihood:
         return positions, directions, variance
 
     def _track_score(
-        self, problem: "_TrackProblem", values: np.ndarray, shares: np.ndarray, correlation: float
+        self, problem: "_TrackProblem", values: np.ndarray, law: ErrorLaw
     ) -> tuple[np.ndarray, np.ndarray]:
         """The log-densities (n, C) of a track's numbers, and their probabilities to be no outliers."""
         sigma, C, size = values[: self.coordinates], self.coordinates, self.size
+        shares, correlation = law.shares(), law.correlation
         manoeuvre = float(values[C]) if len(values) > C else 0.0
         positions, directions, variance = self._numbers(problem, sigma)
         H = np.zeros((*directions.shape[:2], C * size))
@@ -141,38 +135,21 @@ class PlotLikelihood:
         log_likelihood(*model, z, variance, problem.is_used, scale, shares, self.span, white, score, soundness)
         return score, soundness
 
-    def _score(self, values: np.ndarray, shares: np.ndarray, correlation: float = 0.0) -> float:
+    def _score(self, values: np.ndarray, law: ErrorLaw) -> float:
         """The sum over all tracks; the first plots, which find the state, are left out."""
         return sum(
-            float(self._track_score(problem, values, shares, correlation)[0][problem.settled :].sum())
-            for problem in self.problems
+            float(self._track_score(problem, values, law)[0][problem.settled :].sum()) for problem in self.problems
         )
 
-    def __call__(
-        self,
-        values: np.ndarray,
-        outliers: float = 0.0,
-        bias: float = 0.0,
-        correlation: float = 0.0,
-        manoeuvres: float = 0.0,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-    ) -> float:
+    def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The logarithm of the likelihood; a bias is not part of the model."""
-        return self._score(values, outlier_shares(outliers, near, near_width, manoeuvres), correlation)
+        return self._score(values, law)
 
-    def soundness(
-        self,
-        values: np.ndarray,
-        outliers: float,
-        near: float = NEAR_PART,
-        near_width: float = USUAL_NEAR_WIDTH,
-        correlation: float = 0.0,
-    ) -> list[dict[str, np.ndarray]]:
+    def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; in x and y of range and bearing together."""
-        shares, judged = outlier_shares(outliers, near, near_width), []
+        judged = []
         for problem in self.problems:
-            soundness = self._track_score(problem, values, shares, correlation)[1]
+            soundness = self._track_score(problem, values, law)[1]
             if self.spec.frame != "polar":
                 soundness[:, :2] = soundness[:, :2].min(axis=1, keepdims=True)
             judged.append((problem.track, problem.rows, soundness))
@@ -180,7 +157,7 @@ class PlotLikelihood:
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The logarithm of the likelihood of complete plots: their numbers are not independent in every frame."""
-        return {"plot": self._score(values, np.zeros(4))}
+        return {"plot": self._score(values, STATED_ERRORS)}
 
 
 class _TrackProblem(NamedTuple):

@@ -6,6 +6,7 @@ from scipy.stats import norm
 
 from radarsim.api.load_experiments import load_all
 from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.range_doppler.plot_likelihood import WIDE_ACCELERATION_MPS2, WIDE_VELOCITY_MPS, PlotLikelihood
 from radarsim.studies.range_doppler.tracking import START_RANGES
 from tests.recordings.error_laws import error_laws
@@ -138,7 +139,8 @@ def twin(columns, values, shares, bias):
 )
 def test_outliers_and_bias_against_a_textbook_twin(shares, bias):
     columns, values = drawn(3, share=0.2), np.array([250.0, 15.0, 1e-3])
-    found = PlotLikelihood(case(), None, [columns])(values, sum(shares), bias, near=shares[0] / (sum(shares) or 1))
+    law = ErrorLaw(sum(shares), shares[0] / (sum(shares) or 1), bias=bias)
+    found = PlotLikelihood(case(), None, [columns])(values, law)
     assert found == pytest.approx(twin(columns, values, shares, bias), abs=precision(found, values))
 
 
