@@ -91,13 +91,14 @@ class NonFiniteError(RadarsimError):
 
 
 class Interruption(RadarsimError):
-    """A signal stopped the run; finished blocks are stored, and a further run continues."""
+    """A signal stopped the run; finished blocks are stored, and a further run continues. missing: what is not done."""
 
-    def __init__(self, signal_number: int, goes_on: bool = True):
+    def __init__(self, signal_number: int, goes_on: bool = True, missing: str = ""):
         name = {2: "Ctrl-C", 15: "SIGTERM"}.get(signal_number, f"signal {signal_number}")
-        super().__init__(f"stopped by {name}" + ("; run the same command again to continue" if goes_on else ""))
-        self.signal_number, self.goes_on = signal_number, goes_on
+        next_step = "run the same command again to continue" if goes_on else ""
+        super().__init__("; ".join(filter(None, (f"stopped by {name}", missing, next_step))))
+        self.signal_number, self.goes_on, self.missing = signal_number, goes_on, missing
         self.exit_code = 128 + signal_number
 
     def __reduce__(self) -> tuple[type[RadarsimError], tuple[object, ...]]:
-        return type(self), (self.signal_number, self.goes_on)
+        return type(self), (self.signal_number, self.goes_on, self.missing)

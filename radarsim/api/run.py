@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api import arguments
@@ -16,7 +17,7 @@ from radarsim.api.repeat_command import repeat_command
 from radarsim.api.replacement import check_replacement, larger_counts, stored_counts, with_counts
 from radarsim.api.run_errors import parse_span
 from radarsim.api.run_facts import run_facts
-from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, simulate
+from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, missing_pieces, simulate, works_by_identity
 from radarsim.api.stored_runs import config_filter_warnings, make_result
 from radarsim.api.writing_time import writing_seconds
 from radarsim.config.experiment import Experiment
@@ -165,7 +166,10 @@ def run_share(
 ) -> Shares:
     """Compute a share of every case, such as (2, 3) for the second of three, into the store under out. See `run`."""
     options = RunOptions(out, threads, stopping.AnyStop(stop, time_limit), executor)
-    shares = compute_shares(experiment, share, options, progress=progress)
+    works = dict(works_by_identity(experiment))
+    if stop is not None:
+        stop.missing = partial(missing_pieces, works, share, out)
+    shares = compute_shares(experiment.stem, works, share, options, progress=progress)
     if stop is not None:
         stop.raise_if_received()
     return shares

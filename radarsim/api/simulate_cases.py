@@ -63,7 +63,7 @@ class SimulatedCases:
 class Shares:
     """Result of computing share `number` of `of`, by case name; cases of one identity appear once.
 
-    pieces: the blocks of these cases in the share, of which some are missing after an early end."""
+    pieces: the blocks of all cases in the share, of which some are missing after an early end."""
 
     config: str
     number: int
@@ -76,7 +76,7 @@ class Shares:
     def unmet(self) -> list[str]:
         """Why the share is incomplete, and how much of it is missing."""
         reasons = [share.stopped for share in self.cases.values() if share.stopped]
-        missing = f"share {self.number} of {self.of}: {self.missing_pieces} of {self.pieces} pieces missing"
+        missing = missing_pieces_text((self.number, self.of), self.pieces, self.missing_pieces)
         return [f"{stopped}; {missing}" for stopped in dict.fromkeys(reasons)]
 
     @property
@@ -226,25 +226,41 @@ def _collect_case(
     return total, cell
 
 
+Works = Mapping[tuple[str, int], CaseWork]  # by identity and realisations, see `works_by_identity`
+
+
 def compute_shares(
-    experiment: Experiment, share: tuple[int, int], options: RunOptions, *, progress: Progress | None = None
+    stem: str, works: Works, share: tuple[int, int], options: RunOptions, *, progress: Progress | None = None
 ) -> Shares:
-    """Compute a share of every case, such as (2, 3) for the second of three, into the store under options.out.
+    """Compute a share of every work of a config, such as (2, 3) for the second of three, into the store under
+    options.out.
 
     Ends early on `options.stop`."""
     assert options.out is not None  # a share is only what it stores
-    works = dict(works_by_identity(experiment))
     weighted_progress = WeightedProgress(progress, {key: (work, -(-key[1] // share[1])) for key, work in works.items()})
     shares: dict[str, ShareResult] = {}
-    pieces, missing_pieces = 0, 0
     for key, work in works.items():
         share_result = _collector(work, options, weighted_progress.case_callback(key), compute_share)(key[1], share)
         shares[work.case.name] = share_result
-        pieces += -(-share_result.asked // work.block)
-        missing_pieces += -(-(share_result.asked - share_result.done) // work.block)
         if share_result.stopped:
             break
-    return Shares(experiment.stem, *share, shares, pieces, missing_pieces)
+    return Shares(stem, *share, shares, *_counted_pieces(works, share, options.out))
+
+
+def missing_pieces(works: Works, share: tuple[int, int], out: str | os.PathLike[str]) -> str:
+    """How much of a share of works is missing from a store, as a phrase."""
+    return missing_pieces_text(share, *_counted_pieces(works, share, out))
+
+
+def missing_pieces_text(share: tuple[int, int], pieces: int, missing: int) -> str:
+    """How many pieces of a share are missing, as a phrase."""
+    return f"share {share[0]} of {share[1]}: {missing} of {pieces} pieces missing"
+
+
+def _counted_pieces(works: Works, share: tuple[int, int], out: str | os.PathLike[str]) -> tuple[int, int]:
+    """The pieces of a share of works, and how many of them a store lacks."""
+    inventories = [take_inventory(work, realisations, out, share) for (_, realisations), work in works.items()]
+    return sum(stock.blocks for stock in inventories), sum(stock.missing_blocks for stock in inventories)
 
 
 def collected_results(simulated: SimulatedCases) -> list[CaseResult]:

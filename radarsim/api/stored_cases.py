@@ -27,6 +27,26 @@ def stored_experiment(record: Mapping, folder: Path) -> Experiment | None:
         return None
 
 
+def config_faults(record: Mapping, folder: Path) -> list[str]:
+    """In what config.yaml of a result of this version differs from its record, though its hash is recorded."""
+    if record.get("judged") or record.get("versions", {}).get("radarsim") != provenance.versions()["radarsim"]:
+        return []
+    path = folder / CONFIG_FILE
+    try:
+        text = stored_tables.read_content(path)
+        if text is None or hashlib.sha256(text).hexdigest() != record["outputs"].get(CONFIG_FILE):
+            return []  # which is a fault of an output
+        experiment = load(path)
+    except ConfigError:
+        return []  # as without the package of its study
+    if not provenance.is_same_config(record["resolved"], experiment.resolved):
+        return [f"{path}: is not the config of run.json"]
+    done = {name: (case["done"], case.get("seed")) for name, case in record["cases"].items() if case["done"]}
+    if done != {case.name: (case.realisations, case.seed) for case in experiment.cases if case.name in done}:
+        return [f"{path}: has other cases, realisations or seeds than run.json"]
+    return []
+
+
 def recomputable_experiment(record: Mapping, folder: Path) -> Experiment:
     """The experiment of a result with the realisations of each case that its tables hold. Where an earlier version
     wrote no config.yaml, its cases are as run.json resolved them. Raises ConfigError where it cannot be read."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from radarsim.cli import command_group, options
-from radarsim.errors import NotChecked, StoreError
+from radarsim.errors import Interruption, NotChecked, RadarsimError, StoreError
 from radarsim.language.translate import plural, tr
 
 if TYPE_CHECKING:
@@ -75,23 +75,39 @@ def refuse_options(archives: Sequence[str], values: Mapping[str, Any]) -> None:
 
 @contextmanager
 def loadable(sources: Sequence[str], trust_code: bool) -> "Iterator[list[tuple[str, Archive | None]]]":
-    """The sources of configs, with each archive unpacked: its results' folders, and the archive. Elsewhere None."""
+    """The sources of configs, with each archive unpacked: its results' folders, and the archive. Elsewhere None.
+
+    Results of archives that cannot be run are left out, and named at the end, by NotChecked unless there is another
+    error."""
     if not are_archives(sources):
         if trust_code:
             raise click.UsageError("--trust-code applies to a study.zip")
         yield [(source, None) for source in sources]
         return
     from radarsim.api.maintenance import check_archive
+    from radarsim.cli import console
 
     with ExitStack() as stack:
         results: list[tuple[str, Archive | None]] = []
+        not_run: list[str] = []
         for source in sources:
             archive, folder = stack.enter_context(check_archive.unpacked(source, trust_code))
-            for name, place in check_archive.runnable_results(archive, folder, trust_code):
+            runnable, lines = check_archive.runnable_results(archive, folder, trust_code)
+            not_run += lines
+            for name, place in runnable.items():
                 results.append((str(place), archive))
                 for file in archive.facts["results"][name]["code"]:
                     click.echo(f"note: runs code of {source}: results/{name}/{file}", err=True)
-        yield results
+        try:
+            yield results
+        except Interruption:
+            raise
+        except RadarsimError:
+            for line in not_run:
+                console.print_error_line(line)
+            raise
+        if not_run:
+            raise NotChecked(*not_run)
 
 
 def named_by_results(
@@ -132,6 +148,7 @@ def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: 
         console.print_field("SHA-256", checked.sha256)
         for inspection in checked.results.values():
             print_results.print_inspection(inspection)
+        console.print_line(f"{archive}: {print_results.recomputed_share(checked.results)}")
     if as_json:
         click.echo(json_output.text(documents))
     if faults:

@@ -264,9 +264,9 @@ def print_inspection(inspection: "Inspection") -> None:
     print_line(
         tr("{folder}: {outputs} and {pieces} checked", folder=str(inspection.folder), outputs=outputs, pieces=pieces)
     )
-    print_recomputed(inspection)
     for note in inspection.notes:
         print_line(tr("note: {words}", words=note))
+    print_recomputed(inspection)
     if inspection.faults:
         print_line(plural("{count} fault found", "{count} faults found", len(inspection.faults)))
     elif not inspection.not_checked:
@@ -286,6 +286,16 @@ def print_recomputed(inspection: "Inspection") -> None:
     if inspection.tables and not inspection.faults:
         count = plural("{count} table", "{count} tables", len(inspection.tables))
         print_line(tr("compared: {tables} made from the sums, equal to those stored", tables=count))
+
+
+def recomputed_share(inspections: "Mapping[str, Inspection]") -> str:
+    """How much of several results was computed again."""
+    done = sum(inspection.realisations for inspection in inspections.values())
+    total = sum(inspection.total for inspection in inspections.values())
+    percent = significant_share(done, total)
+    return tr(
+        "{done:,} of {total:,} realisations computed again ({percent} %)", done=done, total=total, percent=percent
+    )
 
 
 def significant_share(part: int, whole: int) -> str:

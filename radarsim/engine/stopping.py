@@ -63,7 +63,9 @@ class Signals:
 
     Python runs handlers between two bytecodes of the main thread, which may be in compiled code for long. So handlers
     do nothing here, and a separate thread waits for the numbers that the interpreter writes to a pipe. Where threads
-    are forbidden the handlers do it, with an alarm for the 1.5 s: delayed by compiled code."""
+    are forbidden the handlers do it, with an alarm for the 1.5 s: delayed by compiled code.
+
+    missing: says what a stopped run has not done, for the error."""
 
     grace_s = 1.0
     limit_s = 1.5
@@ -71,6 +73,7 @@ class Signals:
 
     def __init__(self) -> None:
         self.received_signal: int | None = None
+        self.missing: Callable[[], str] = str
 
     def __call__(self) -> str | None:
         return None if self.received_signal is None else f"signal {self.received_signal}"
@@ -78,7 +81,14 @@ class Signals:
     def raise_if_received(self) -> None:
         """Interrupted, if a signal came."""
         if self.received_signal is not None:
-            raise Interruption(self.received_signal)
+            raise self._interruption(self.received_signal)
+
+    def _interruption(self, number: int) -> Interruption:
+        """The error of a signal, with what is missing as far as that can be said."""
+        missing = ""
+        with contextlib.suppress(Exception):  # of a store that can no longer be read
+            missing = self.missing()
+        return Interruption(number, missing=missing)
 
     is_entered = False  # whether one is entered
 
@@ -119,10 +129,9 @@ class Signals:
         if self.received_signal is not None and (second := self._next(self.limit_s)) is not None:
             self._end(self.received_signal, second)
 
-    @staticmethod
-    def _end(first: int, second: int) -> NoReturn:
+    def _end(self, first: int, second: int) -> NoReturn:
         with contextlib.suppress(OSError):
-            os.write(2, f"{Interruption(first)}\n".encode())
+            os.write(2, f"{self._interruption(first)}\n".encode())
         os._exit(128 + (second or first))
 
     def _next(self, patience_s: float | None) -> int | None:

@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import radarsim
 from radarsim.api.archive import Archive, write_archive
 from radarsim.engine.store.block_file import decode
+from radarsim.report import provenance
 from tests.engine.test_damage import reforged
 from tests.program import command, csv_bytes, record
 
@@ -158,6 +160,116 @@ def test_a_forged_result_is_found(study, temporary, kind):
     assert words in told.stderr
     assert "intact" not in told.stdout
     assert str(temporary) not in told.output
+
+
+OTHER_SOURCES = "ab" * 16
+
+
+def with_sources_of_others(contents):
+    """The blocks of results under the name that other sources would give them, as an earlier version wrote them."""
+    for name in blocks_in(contents):
+        top, blocks, identity, file = name.split("/")
+        place = Path(tempfile.gettempdir()) / file
+        place.write_bytes(contents.pop(name))
+        reforged(place, identity=identity[:32] + OTHER_SOURCES)
+        contents[f"{top}/{blocks}/{identity[:32]}{OTHER_SOURCES}/{file}"] = place.read_bytes()
+        place.unlink()
+    for name in [name for name in contents if name.endswith("run.json")]:
+        recorded = json.loads(contents[name])
+        recorded["identities"] = {case: text[:32] + OTHER_SOURCES for case, text in recorded["identities"].items()}
+        contents[name] = json.dumps(recorded).encode()
+
+
+def with_record(contents, **changes):
+    """Another config.yaml for rls2, its hash recorded, and other entries in its record."""
+    recorded = json.loads(contents["results/rls2/run.json"]) | changes
+    recorded["outputs"]["config.yaml"] = hashlib.sha256(contents["results/rls2/config.yaml"]).hexdigest()
+    recorded["resolved_sha256"] = hashlib.sha256(provenance.to_json(recorded["resolved"])).hexdigest()
+    contents["results/rls2/run.json"] = json.dumps(recorded).encode()
+
+
+def forge_config(contents, old, new):
+    """Another config, its hash recorded."""
+    assert old in contents["results/rls2/config.yaml"]
+    contents["results/rls2/config.yaml"] = contents["results/rls2/config.yaml"].replace(old, new)
+    with_record(contents)
+
+
+def forge_everything(contents):
+    """Another config, and a record that has it too."""
+    forge_config(contents, b"sigma_range_m: 250", b"sigma_range_m: 240")
+    resolved = json.loads(contents["results/rls2/run.json"])["resolved"]
+    resolved["cases"][0]["radar"]["sigma_range_m"] = 240.0
+    with_record(contents, resolved=resolved)
+
+
+def forge_number(contents, count):
+    """So many realisations in config and record, without blocks."""
+    for name in blocks_in(contents):
+        del contents[name]
+    cases = json.loads(contents["results/rls2/run.json"])["cases"]
+    cases["rls2"]["done"] = count
+    forge_config(contents, f"realisations: {N}".encode(), f"realisations: {count}".encode())
+    with_record(contents, cases=cases)
+
+
+def test_blocks_of_other_sources_are_computed_from_the_config(study, temporary):
+    repacked(study, with_sources_of_others)
+    told = command("check", study).stdout
+    assert "note: rls2: the sources that compute have changed since its blocks were made" in told
+    assert f"computed again: rls2 from the config: {N:,} of {N:,} realisations (100 %)" in told
+    assert "compared: 6 tables made from the sums, equal to those stored" in told
+    assert told.splitlines()[-1] == f"{study}: {N:,} of {N:,} realisations computed again (100 %)"
+
+
+FORGED_CONFIGS = {
+    "its keys": (lambda contents: forge_config(contents, b"sigma_range_m: 250", b"sigma_range_m: 240"), "config.yaml"),
+    "its seed": (lambda contents: forge_config(contents, b"seed: 2017", b"seed: 2018"), "config.yaml"),
+    "all that names it": (forge_everything, "curves.csv: is not the table that its config gives: differs by"),
+}
+
+
+@pytest.mark.parametrize("kind", FORGED_CONFIGS)
+@pytest.mark.parametrize("alter_blocks", [lambda contents: None, with_sources_of_others])
+def test_a_config_that_was_altered_with_its_hash_is_found(study, kind, alter_blocks):
+    forge, words = FORGED_CONFIGS[kind]
+    repacked(study, alter_blocks)
+    repacked(study, forge)
+    assert f"{study}/results/rls2/{words}" in command("check", study, code=4).stderr
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "curves.csv", "report.html", "consistency.csv"])
+def test_any_file_that_is_not_as_recorded_is_a_fault_of_folder_and_archive(study, out, name):
+    def alter(contents):
+        contents[f"results/rls2/{name}"] += b" "
+
+    with (out / "rls2" / name).open("ab") as file:
+        file.write(b" ")
+    repacked(study, alter)
+    altered = f"{name}: altered since it was written\n"
+    for words in (["doctor", out / "rls2"], ["doctor", out / "rls2", "--recompute", 1], ["check", study]):
+        assert altered in command(*words, code=4).stderr
+
+
+def test_a_forged_number_of_realisations_does_not_run_for_ever(study):
+    repacked(study, lambda contents: forge_number(contents, 10**12))
+    told = command("check", study, code=3)
+    assert "rls2: not computed again: 1,000,000,000,000 realisations are more than is computed here" in told.stderr
+    assert told.stdout.splitlines()[-1].endswith(f"0 of {10**12:,} realisations computed again (0 %)")
+
+
+def test_results_of_other_versions_may_have_other_columns(study):
+    def alter(contents):
+        forge_number(contents, N)
+        with_record(contents, versions={"radarsim": "0.2.0"})
+        table = contents["results/rls2/gains.csv"] = contents["results/rls2/gains.csv"].replace(b"gain_lo", b"low")
+        outputs = json.loads(contents["results/rls2/run.json"])["outputs"]
+        outputs["gains.csv"] = hashlib.sha256(table).hexdigest()
+        with_record(contents, outputs=outputs)
+
+    repacked(study, alter)
+    reason = f"it has other rows or columns: radarsim 0.2.0 made it, this is {radarsim.__version__}"
+    assert f"gains.csv could not be compared: {reason}" in command("check", study, code=3).stderr
 
 
 STRANGE = {
@@ -312,7 +424,7 @@ def test_code_is_packed_on_request_and_run_by_those_who_trust_it(own, temporary,
     mark.unlink()
     told = command("check", "s.zip", code=3).stderr
     assert "nothing could be recomputed: that runs code of its author: my_filter.py:follow; read it, then give" in told
-    assert "--trust-code" in command("run", "s.zip", code=2).stderr
+    assert "--trust-code" in command("run", "s.zip", code=3).stderr
     assert not mark.exists()
     assert "RADARSIM_NO_CODE" not in os.environ
     told = command("check", "s.zip", "--trust-code").stdout
@@ -322,6 +434,32 @@ def test_code_is_packed_on_request_and_run_by_those_who_trust_it(own, temporary,
     assert "note: runs code of s.zip: results/mine/my_filter.py" in told.stderr
     assert "the same bytes as in s.zip" in told.stdout
     assert "--trust-code applies to a study.zip" in command("run", "rls2", "--trust-code", code=2).stderr
+
+
+def test_results_that_cannot_be_run_do_not_keep_the_others_from_it(own, tmp_path):
+    command("run", "rls2", "-n", 500, "--no-figures", "--quiet")
+    command("pack", "results", "-o", "s.zip", "--code")
+    told = command("run", "s.zip", "--no-figures", "--out", "again", code=3)
+    assert "compared  rls2: 6 tables, the same bytes as in s.zip" in told.stdout
+    reason = "that runs code of its author: my_filter.py:follow; read it, then give --trust-code"
+    assert told.stderr == f"s.zip: mine: not run: {reason}\n"
+    assert [path.name for path in Path("again").iterdir() if path.is_dir()] == [".blocks", "rls2"]
+    told = command("check", "s.zip", code=3)
+    assert "compared: 6 tables" in told.stdout
+    assert told.stderr == f"s.zip: mine: nothing could be recomputed: {reason}\n"
+
+
+def test_a_result_that_cannot_be_read_is_named_and_the_others_run(own, out, tmp_path):
+    command("pack", out, "-o", "s.zip")
+
+    def alter(contents):
+        forge_config(contents, b"study: range_doppler", b"study: of_a_package")
+
+    repacked("s.zip", alter)
+    told = command("run", "s.zip", "--no-figures", "--out", "again", code=3)
+    assert "compared  rls1: 6 tables" in told.stdout
+    assert told.stderr.startswith("s.zip: rls2: not run: s.zip/results/rls2/config.yaml:")
+    assert "of_a_package" in told.stderr
 
 
 def test_without_its_code_a_result_is_checked_as_far_as_it_goes(own, tmp_path, monkeypatch):
@@ -351,7 +489,7 @@ def test_a_judged_result_says_what_it_lacks(tmp_path, monkeypatch):
     assert "the estimates of its judged filter mine are not in it" in told
     lack = "nothing could be recomputed: s.zip/results/rls2_mine: a result does not contain the estimates"
     assert lack in command("check", "s.zip", code=3).stderr
-    assert "holds no estimates of its judged filter mine" in command("run", "s.zip", code=2).stderr
+    assert "holds no estimates of its judged filter mine" in command("run", "s.zip", code=3).stderr
 
 
 def test_a_directory_of_results_is_packed_as_a_whole(out, tmp_path):

@@ -1,6 +1,7 @@
 """Precision, time limits, shares, clusters and JSON, from the command's outside."""
 
 import json
+import pickle
 import re
 import shutil
 from types import SimpleNamespace
@@ -14,9 +15,10 @@ from radarsim.api import progress, result_content, writing_time
 from radarsim.api.case_results import case_result
 from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import load
+from radarsim.api.run import run_share
 from radarsim.engine import stopping
 from radarsim.engine.collect import collect
-from radarsim.errors import TargetUnmet
+from radarsim.errors import Interruption, TargetUnmet
 from tests.program import command, csv_bytes, record
 from tests.tolerances import assert_rounded
 
@@ -294,6 +296,20 @@ def test_a_share_that_was_interrupted_is_named_as_it_was_asked_for(shares, tmp_p
     assert "share" not in command(*ask).stdout
     asked = "12,288 of 32,768 stored; share 2 of 3: 5 of 8 pieces missing, realisations 45,056 to 65,535\n"
     assert asked in command(*ask, "--shard", "2/3").stdout
+
+
+def test_a_share_that_a_signal_ends_names_the_pieces_that_are_missing(tmp_path):
+    """Of all cases, also of those that it did not come to."""
+    stop, experiment = stopping.Signals(), load({"include": ["rls1", "rls2"]}, ["realisations=1e5"])
+    stop.received_signal = 2
+    for missing in (26, 13):  # before the second time the share of rls2 is computed
+        with pytest.raises(Interruption) as caught:
+            run_share(experiment, (2, 2), out=tmp_path, threads=0, stop=stop)
+        assert str(caught.value) == (
+            f"stopped by Ctrl-C; share 2 of 2: {missing} of 26 pieces missing; run the same command again to continue"
+        )
+        assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+        command("run", "rls2", "-n", "1e5", "--shard", "2/2", "--out", tmp_path, "-q")
 
 
 @pytest.mark.slow

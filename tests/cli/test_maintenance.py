@@ -183,10 +183,12 @@ def test_blocks_that_another_user_may_have_written_are_named_by_doctor_and_repor
     assert lack in command("report", "rls2", "--out", out, code=2).stderr
 
 
-def test_blocks_of_other_sources_cannot_be_computed_again(out, monkeypatch):
+def test_instead_of_blocks_of_other_sources_the_config_is_computed_again(out, monkeypatch):
     monkeypatch.setattr(case_work.CaseWork, "identity", "ab12")
     command("doctor", out / "rls2")
-    assert "the sources that compute have changed" in command("doctor", out / "rls2", "--recompute", 1, code=3).stderr
+    told = command("doctor", out / "rls2", "--recompute", 1).stdout
+    assert "the sources that compute have changed since its blocks were made: computed again from the config" in told
+    assert "computed again: rls2 from the config" in told
 
 
 NO_BLOCKS = "tables agree with their record; nothing could be recomputed: no blocks are stored"
@@ -224,9 +226,9 @@ def test_a_forged_table_with_a_right_digest_is_found_by_recomputing(out, tmp_pat
     rewritten(out / "rls2" / "run.json", lambda record: record["outputs"].update({"curves.csv": digest}))
     command("doctor", out / "rls2")
     copy = shutil.copytree(out / "rls2", tmp_path / "copy" / "rls2")
-    for folder in (out / "rls2", copy):
+    for folder, table in ((out / "rls2", "the table of these sums"), (copy, "the table that its config gives")):
         told = command("doctor", folder, "--recompute", 1, code=4).stderr
-        assert f"{folder / 'curves.csv'}: is not the table of these sums: differs by 1.0e-03 of σ" in told
+        assert f"{folder / 'curves.csv'}: is not {table}: differs by 1.0e-03 of σ" in told
 
 
 def altered(tables, column, change):

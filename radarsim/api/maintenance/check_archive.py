@@ -9,11 +9,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from radarsim.api.archive import BLOCKS_FOLDER, Archive
+from radarsim.api.configs import load
 from radarsim.api.maintenance.compare_tables import differs
 from radarsim.api.maintenance.doctor import inspect_result
 from radarsim.api.maintenance.inspection import Inspection
 from radarsim.api.maintenance.pack import README, RECORD, RESULTS
 from radarsim.api.maintenance.packed_code import code_names
+from radarsim.api.maintenance.recompute import WorkBudget
 from radarsim.api.replacement import RUNS_TABLE, runs_option
 from radarsim.api.stored_tables import read_content, read_record
 from radarsim.config.experiment import Experiment
@@ -48,14 +50,15 @@ def check_archive(
     Code of user filters in it is run only with trust_code. Raises ConfigError for what is no archive of results,
     StoreError for a damaged one."""
     with unpacked(path, trust_code) as (archive, folder):
-        inspections = {}
+        inspections, budget = {}, WorkBudget()
         for name, facts in archive.facts["results"].items():
             place = folder / RESULTS / name
             code_places = code_names(read_record(place) or {})
             refused = bool(code_places) and not trust_code
-            inspections[name] = inspect_result(place, 0 if refused else recompute, progress)
+            inspections[name] = inspect_result(place, 0 if refused else recompute, progress, budget)
             if refused and recompute:
-                inspections[name].not_checked = [_untrusted(code_places, facts["code"])]
+                reason = _untrusted(code_places, facts["code"])
+                inspections[name].not_checked = [f"nothing could be recomputed: {reason}"]
             _name_archive(inspections[name], str(folder), str(archive.path))
         return CheckedArchive(archive.path, archive.sha256, len(archive.names), inspections)
 
@@ -129,33 +132,45 @@ def unpacked(path: str | os.PathLike[str], trust_code: bool) -> Iterator[tuple[A
                 raise type(error)(*(line.replace(str(folder), str(path)) for line in error.lines)) from error
 
 
-def runnable_results(archive: Archive, folder: Path, trust_code: bool) -> list[tuple[str, Path]]:
-    """The results in an unpacked archive, by name, with their folders. Raises ConfigError for those that cannot be run:
-    of judged estimates, or of code which nobody trusts."""
-    places = {name: folder / RESULTS / name for name in archive.facts["results"]}
-    faults = []
-    for name, place in places.items():
-        record = read_record(place) or {}
-        if judged := record.get("judged"):
-            faults.append(f"{archive.path}: {name}: holds no estimates of its judged filter {', '.join(judged)}")
-        code_places = code_names(record)
-        if code_places and not trust_code:
-            reason = _untrusted(code_places, archive.facts["results"][name]["code"])
-            faults.append(f"{archive.path}: {name}: {reason.replace('recomputed', 'run')}")
-    if faults:
-        raise ConfigError(*faults)
-    return [*places.items()]
+def runnable_results(archive: Archive, folder: Path, trust_code: bool) -> tuple[dict[str, Path], list[str]]:
+    """The folders of the results in an unpacked archive that can be run, by name; and a line for each other result, of
+    judged estimates, of code which nobody trusts, or of a config that cannot be read, as without the package of its
+    study."""
+    runnable: dict[str, Path] = {}
+    not_run = []
+    for name in archive.facts["results"]:
+        place = folder / RESULTS / name
+        if reason := _reason_not_to_run(archive, name, place, trust_code):
+            not_run.append(f"{archive.path}: {name}: not run: {reason}")
+        else:
+            runnable[name] = place
+    return runnable, not_run
+
+
+def _reason_not_to_run(archive: Archive, name: str, place: Path, trust_code: bool) -> str:
+    """Why a result in an archive cannot be run; empty where it can."""
+    record = read_record(place) or {}
+    if judged := record.get("judged"):
+        return f"holds no estimates of its judged filter {', '.join(judged)}"
+    code_places = code_names(record)
+    if code_places and not trust_code:
+        return _untrusted(code_places, archive.facts["results"][name]["code"])
+    try:
+        load(place)
+    except ConfigError as error:
+        return error.lines[0].replace(str(place), f"{archive.path}/{RESULTS}/{name}")
+    return ""
 
 
 def _untrusted(code_places: Sequence[str], packed: Sequence[str]) -> str:
-    """Why nothing is computed again where code that nobody trusts would have to run."""
+    """Why a result is not computed where code that nobody trusts would have to run, and what to do."""
     names = ", ".join(code_places)
     if not packed:
         return (
-            f"nothing could be recomputed: its filters are code that is not in the archive: {names}; put it into the "
-            "working directory, and give --trust-code"
+            f"its filters are code that is not in the archive: {names}; put it into the working directory, "
+            "and give --trust-code"
         )
-    return f"nothing could be recomputed: that runs code of its author: {names}; read it, then give --trust-code"
+    return f"that runs code of its author: {names}; read it, then give --trust-code"
 
 
 def _check_names(archive: Archive) -> None:

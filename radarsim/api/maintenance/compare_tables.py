@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from radarsim.api.maintenance.self_test import FIRST_NUMBER, distances, tolerance
 
+OTHER_SHAPE = "has other"  # begins what is said of a table with other columns or rows
 ROUNDING = 1e-6  # of the largest number of a column; differences of large sums lose half of their digits
 NOTE_COLUMNS = ("note",)  # appear at a threshold, which rounding may cross
 
@@ -21,12 +22,12 @@ def differs(study: str, table: str, stored: bytes, computed: bytes, free_columns
         try:
             sampled, exact = distances(table, computed, stored)
         except (KeyError, ValueError):
-            return "has other columns"
+            return f"{OTHER_SHAPE} columns"
         allowed = tolerance(study)
         if sampled <= allowed.sampled and exact <= allowed.exact:
             return None
         if math.isinf(sampled):
-            return "has other rows or columns"
+            return f"{OTHER_SHAPE} rows or columns"
         return f"differs by {max(sampled, exact):.1e} of σ"
     return _column_difference(_columns(stored, free_columns), _columns(computed, free_columns))
 
@@ -46,13 +47,13 @@ def _column_difference(
 ) -> str | None:
     """The first column in which two tables differ, as a phrase."""
     if stored is None or computed is None or [*stored] != [*computed]:
-        return "has other columns"
+        return f"{OTHER_SHAPE} columns"
     for name, column in stored.items():
         cells = computed[name]
         if column == cells:
             continue
         if len(column) != len(cells):
-            return "has other rows"
+            return f"{OTHER_SHAPE} rows"
         try:
             pairs = [(float(a), float(b)) for a, b in zip(column, cells, strict=True) if a != b]
             scale = max(abs(float(cell)) for cell in cells if cell)

@@ -12,8 +12,8 @@ from typing import Any
 
 from radarsim.api.case_work import CaseWork
 from radarsim.api.maintenance.inspection import Inspection
-from radarsim.api.maintenance.recompute import Progress, recompute_result
-from radarsim.api.stored_cases import recomputable_experiment, stored_case, stored_experiment
+from radarsim.api.maintenance.recompute import Progress, WorkBudget, recompute_result
+from radarsim.api.stored_cases import config_faults, recomputable_experiment, stored_case, stored_experiment
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores, instruction_set, machine_facts
 from radarsim.engine.store.audit import Audit, audit_blocks
@@ -55,32 +55,42 @@ def cluster() -> str:
         return "Dask is not installed; `pip install 'radarsim[cluster]'` adds --workers and --scheduler"
 
 
-def inspect_result(folder: str | os.PathLike[str], recompute: int = 0, progress: Progress | None = None) -> Inspection:
+def inspect_result(
+    folder: str | os.PathLike[str],
+    recompute: int = 0,
+    progress: Progress | None = None,
+    budget: WorkBudget | None = None,
+) -> Inspection:
     """Check a folder of results against its run.json, and all stored blocks of its cases; compute some of it again.
 
     recompute is the number of stored pieces to compute again for each case, the smallest first; if above 0, cases
-    without blocks are computed from the config, and the tables are made from the sums and compared. progress(done,
-    total) counts the realisations. What could not be checked is in `not_checked`; blocks that other sources made are
-    noted. Raises ConfigError where the folder holds no results, or code of another user would have to run."""
+    without blocks, or with those of other sources, are computed from the config, and the tables are made from the sums
+    and compared; no more than a budget, by default minutes. progress(done, total) counts the realisations. What could
+    not be checked is in `not_checked`. Raises ConfigError where the folder holds no results, or code of another user
+    would have to run."""
     inspection = Inspection(Path(folder))
     blocks = blocks_folder(inspection.folder)
     record = checked_record(inspection)
     if _digest(record["resolved"]) != record["resolved_sha256"]:
         inspection.faults.append(f"{inspection.folder / 'run.json'}: damaged: the config in it is not the one that ran")
     inspection.total = sum(case["done"] for case in record["cases"].values())
-    experiment = _experiment(inspection, record) if recompute else None
+    inspection.faults += config_faults(record, inspection.folder)
+    experiment = _experiment(inspection, record) if recompute and not inspection.faults else None
     recorded = experiment or stored_experiment(record, inspection.folder)
     audits = {}
     for name, stored_identity in record["identities"].items():
         case = stored_case(record, name, recorded)
         if experiment is None and case is not None and any(member.written for member in case.user_filters):
             case = None  # of which code would run
-        audit = _audit_case(inspection, record, name, blocks / stored_identity, case)
+        audit = _audit_case(inspection, record, name, blocks / stored_identity, case, experiment is not None)
         if audit is not None:
             audits[name] = audit
     if experiment is not None:
-        recompute_result(inspection, record, experiment, audits, recompute, blocks.parent, progress)
-    elif not recompute and (absent := [name for name in record["identities"] if name not in audits]):
+        budget = WorkBudget() if budget is None else budget
+        recompute_result(inspection, record, experiment, audits, recompute, blocks.parent, budget, progress)
+    elif not (recompute or inspection.faults) and (
+        absent := [name for name in record["identities"] if name not in audits]
+    ):
         further_cases = f" and {len(absent) - 1} other cases" if len(absent) > 1 else ""
         cases = "" if len(absent) == len(record["identities"]) else f" of {absent[0]}{further_cases}"
         inspection.not_checked.append(f"nothing{cases} could be recomputed: no blocks are stored")
@@ -101,10 +111,10 @@ def _experiment(inspection: Inspection, record: Mapping[str, Any]) -> Experiment
 
 
 def _audit_case(
-    inspection: Inspection, record: Mapping[str, Any], name: str, store: Path, case: Case | None
+    inspection: Inspection, record: Mapping[str, Any], name: str, store: Path, case: Case | None, recompute: bool
 ) -> Audit | None:
-    """The audit of a case's stored blocks; None where there are none."""
-    inspection.notes += _notes_on_sources(store, name, case)
+    """The audit of a case's stored blocks; None where there are none. recompute: whether some follow."""
+    inspection.notes += _notes_on_sources(store, name, case, recompute)
     if not is_directory(store):
         return None
     audit = audit_blocks(store, int(record["cases"][name]["done"]))
@@ -114,11 +124,11 @@ def _audit_case(
     return audit
 
 
-def _notes_on_sources(store: Path, name: str, case: Case | None) -> list[str]:
+def _notes_on_sources(store: Path, name: str, case: Case | None, recompute: bool) -> list[str]:
     """Notes on blocks of a case, or on further blocks of it, that other sources than these made."""
     present = store if case is None else store.with_name(CaseWork(case).identity)
     notes = []
-    if is_other_source(present, store):
+    if not recompute and is_other_source(present, store):  # else what is done about it is said
         notes.append(f"{store}: blocks of {name} were made by sources that have changed since: a run computes anew")
     stale = [path.name for path in other_sources(store) if path != present]
     if stale:

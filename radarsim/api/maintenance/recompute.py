@@ -9,12 +9,12 @@ import numpy as np
 
 from radarsim.api import configs
 from radarsim.api.case_work import CaseWork
-from radarsim.api.maintenance.compare_tables import differs
+from radarsim.api.maintenance.compare_tables import OTHER_SHAPE, differs
 from radarsim.api.maintenance.inspection import Inspection
 from radarsim.api.maintenance.self_test import tolerance
 from radarsim.api.result_content import case_tables
 from radarsim.api.simulate_cases import SimulatedCases, collected_results
-from radarsim.config.experiment import Experiment
+from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.blocks import Node, Partial, simulate_piece
 from radarsim.engine.collect import collect, read_stored
 from radarsim.engine.machine import platform_name
@@ -25,6 +25,7 @@ from radarsim.extensions import extensions
 from radarsim.report import atomic_files, csv_text, provenance
 
 TOLERANCE_FACTOR = 10  # for a power p ≤ 4 of an error, and heavy tails in it
+MAX_RECOMPUTED_SCANS = 10**9  # realisations times scans of all that is computed again: minutes, whatever a record says
 Progress = Callable[[int, int], None]
 
 
@@ -55,6 +56,21 @@ class Counter:
             self._progress(self.done, self._total)
 
 
+class WorkBudget:
+    """What may be computed again, in realisations times scans: a record may name any number of realisations."""
+
+    def __init__(self, scans: int = MAX_RECOMPUTED_SCANS):
+        self.left = scans
+
+    def take(self, work: CaseWork, realisations: int) -> bool:
+        """Whether so many realisations of a work are within what is left, which then has less."""
+        scans = realisations * len(work.plan.axes.k)
+        if scans > self.left:
+            return False
+        self.left -= scans
+        return True
+
+
 def recompute_result(
     inspection: Inspection,
     record: Mapping[str, Any],
@@ -62,33 +78,39 @@ def recompute_result(
     audits: Mapping[str, Audit],
     max_pieces: int,
     out: Path,
+    budget: WorkBudget,
     progress: Progress | None = None,
 ) -> None:
     """Compute again up to max_pieces stored pieces of each audited case, the smallest first, and all of the cases
-    without blocks; then the tables from the sums, and compare everything. Nothing is written.
+    without blocks or with those of other sources; then the tables from the sums, and compare everything. Nothing is
+    written, and no more computed than the budget has.
 
     experiment: of the record; out: the directory of its blocks. Faults, notes and what could not be computed again are
     added to the inspection."""
     cases = {case.name: case for case in experiment.cases if case.realisations}
     works = {name: CaseWork(case) for name, case in cases.items()}
     changed = [name for name, audit in audits.items() if name in works and works[name].identity != audit.path.name]
-    missing = [name for name in works if name not in audits]
-    chosen = {
-        name: _smallest_pieces(audits[name], works[name].block, cases[name].realisations, max_pieces)
-        for name in works
-        if name in audits and name not in changed
-    }
-    total = sum(piece.realisations(works[name].block)[1] for name, pieces in chosen.items() for piece in pieces)
-    counter = Counter(progress, total + sum(cases[name].realisations for name in missing))
-    for name, pieces in chosen.items():
-        _recompute_pieces(inspection, audits[name], works[name], pieces, counter)
     if changed:
-        inspection.not_checked.append(_changed_sentence(changed, record))
-    if inspection.faults or changed:
+        inspection.notes.append(_changed_sentence(changed, record))
+    usable = {name: audit for name, audit in audits.items() if name in works and name not in changed}
+    chosen = {
+        name: _affordable_pieces(usable[name], works[name], max_pieces, budget) for name in works if name in usable
+    }
+    too_large = [name for name, pieces in chosen.items() if max_pieces and usable[name].nodes() and not pieces]
+    without_blocks = [name for name in works if name not in usable]
+    unaffordable = [name for name in without_blocks if not budget.take(works[name], cases[name].realisations)]
+    total = sum(piece.realisations(works[name].block)[1] for name, pieces in chosen.items() for piece in pieces)
+    total += sum(cases[name].realisations for name in without_blocks if name not in unaffordable)
+    counter = Counter(progress, total)
+    for name, pieces in chosen.items():
+        _recompute_pieces(inspection, usable[name], works[name], pieces, counter)
+    if too_large or unaffordable:
+        inspection.not_checked.append(_too_much_sentence(too_large + unaffordable, cases))
+    if inspection.faults or unaffordable:
         return
     simulated = SimulatedCases()
     for name, case in cases.items():
-        sums = read_stored(works[name], case.realisations, out) if name in audits else None
+        sums = read_stored(works[name], case.realisations, out) if name in usable else None
         if sums is None:
             sums = collect(works[name], case.realisations, progress=partial(_add_difference, counter, [0]))
             inspection.from_config.append(name)
@@ -103,14 +125,34 @@ def _add_difference(counter: Counter, last: list[int], done: int, *_: int) -> No
     last[0] = done
 
 
-def _changed_sentence(names: list[str], record: Mapping[str, Any]) -> str:
+def _changed_sentence(names: Sequence[str], record: Mapping[str, Any]) -> str:
     """That cases were made by other sources, and of which version."""
-    before, now = record.get("versions", {}).get("radarsim"), provenance.versions()["radarsim"]
-    versions = f" (radarsim {before} made it, this is {now})" if before != now else ""
+    versions = f" ({_versions_sentence(record)})" if _versions_sentence(record) else ""
     return (
-        f"{', '.join(names)}: cannot be computed again: the sources that compute have changed since{versions}; "
-        "all that is stored is intact; `radarsim run` computes all of it anew"
+        f"{', '.join(names)}: the sources that compute have changed since its blocks were made{versions}: "
+        "computed again from the config instead"
     )
+
+
+def _versions_sentence(record: Mapping[str, Any]) -> str:
+    """Which version made a result, and which this is; empty where they are the same."""
+    before, now = record.get("versions", {}).get("radarsim"), provenance.versions()["radarsim"]
+    return f"radarsim {before} made it, this is {now}" if before != now else ""
+
+
+def _too_much_sentence(names: Sequence[str], cases: Mapping[str, Case]) -> str:
+    """That cases are larger than what is computed again here."""
+    largest = max(cases[name].realisations for name in names)
+    return (
+        f"{', '.join(names)}: not computed again: {largest:,} realisations are more than is computed here, "
+        f"{MAX_RECOMPUTED_SCANS:.0e} realisations times scans; `radarsim run` computes them"
+    )
+
+
+def _affordable_pieces(audit: Audit, work: CaseWork, max_pieces: int, budget: WorkBudget) -> list[Node | Partial]:
+    """Of the smallest pieces those that are within a budget."""
+    pieces = _smallest_pieces(audit, work.block, work.case.realisations, max_pieces)
+    return [piece for piece in pieces if budget.take(work, piece.realisations(work.block)[1])]
 
 
 def _smallest_pieces(audit: Audit, block: int, done: int, max_pieces: int) -> list[Node | Partial]:
@@ -190,7 +232,11 @@ def _compare_tables(
         stored, computed = atomic_files.read(path), csv_text.to_csv(table)
         inspection.tables.append(path.name)
         if difference := differs(experiment.study, name, stored, computed, free_columns.get(name, ())):
-            inspection.faults.append(f"{path}: is not the table of these sums: {difference}")
+            if difference.startswith(OTHER_SHAPE) and (versions := _versions_sentence(record)):
+                inspection.not_checked.append(f"{path.name} could not be compared: it {difference}: {versions}")
+                continue
+            origin = "that its config gives" if inspection.from_config else "of these sums"
+            inspection.faults.append(f"{path}: is not the table {origin}: {difference}")
         elif stored != computed and name not in free_columns:
             to_rounding.append(path.name)
     if to_rounding:

@@ -38,8 +38,9 @@ def take_inventory(
     pieces, block = set() if store is None else Store(store, work).pieces(), work.block
     first, stop, partial = share_of(realisations, block, part)
     requested, full = (stop - first) * block + partial, realisations // block
+    part_blocks = stop - first + (partial > 0)
     if Total(realisations) in pieces:
-        return Inventory(requested, requested, (), None, has_loose_blocks=False)
+        return Inventory(requested, requested, (), None, has_loose_blocks=False, part=part, blocks=part_blocks)
     nodes = maximal_nodes([piece for piece in pieces if isinstance(piece, Node)], full)
     runs, blocks = gaps(nodes, stop, first), full + (realisations % block > 0)
     if partial and Partial(full, partial) not in pieces:
@@ -49,7 +50,6 @@ def take_inventory(
     beyond_gap = bool(runs) and any(node.first >= runs[0][1] for node in nodes)
     loose = beyond_gap or (stored > 0 and not any(isinstance(piece, Total) for piece in pieces))
     shares = missing_shares(runs, blocks) if loose and part == (1, 1) else None
-    part_blocks = stop - first + (partial > 0)
     return Inventory(
         requested, stored, missing, shares, loose, part, part_blocks, sum(end - begin for begin, end in runs)
     )
