@@ -141,7 +141,7 @@ def in_inventory() -> Iterator[tuple[str, str, str]]:
     """What `radarsim list` says of configs, scenarios, studies and filters."""
     for _, _, rows in inventory():
         for row in rows:
-            yield row[-1], "", "radarsim/api/stored_tables.py"
+            yield row[-1], "", "radarsim/api/inventory.py"
 
 
 def in_scenarios() -> Iterator[tuple[str, str, str]]:

@@ -1,18 +1,19 @@
 """`radarsim compare`: stored results on common axes, with their differences; simulates nothing."""
 
 import os
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.api import arguments, stored_tables
+from radarsim.api import arguments
 from radarsim.api.configs import load
 from radarsim.api.display import Displayable
 from radarsim.api.repeat_command import RESULTS, command
 from radarsim.api.result import Result
 from radarsim.api.result_content import captions, config_names
+from radarsim.api.result_folder import find_result
 from radarsim.api.stored_cases import cases_of_result
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.identity import digest, identity_keys, world_keys
@@ -28,6 +29,7 @@ from radarsim.report.comparison.pairs import Side
 from radarsim.report.drawing.model import Figure, reworded
 from radarsim.report.drawing.page_figure import DrawnFigure
 from radarsim.report.quantities import COMMON, FLOORS, Quantity
+from radarsim.report.stored_tables import no_result
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -41,13 +43,14 @@ FOLDER = "compare"
 class ComparedRun:
     """A result: its name, its folder, its run.json and, if known, the config that describes it.
 
-    made: the tables of a result that is not stored."""
+    read_table: gives a table by its name, None where there is none."""
 
     label: str
     folder: Path
     record: dict[str, Any]
+    read_table: "Callable[[str], pd.DataFrame | None]" = field(repr=False)
     experiment: Experiment | None = None
-    tables: "Mapping[str, pd.DataFrame] | None" = None
+    stored: bool = True
 
     @cached_property
     def cases(self) -> dict[str, Case]:
@@ -219,32 +222,32 @@ def _run_of_result(result: Result) -> ComparedRun:
         "outputs": {},
     }
     record["cases"] = {case.name: {"done": case.count} for case in result.cases}
-    return ComparedRun(experiment.stem, Path(experiment.stem), record, tables=result.tables)
+    return ComparedRun(experiment.stem, Path(experiment.stem), record, result.tables.get, stored=False)
 
 
 def _run_in_folder(path: Path) -> ComparedRun | None:
     """The result in a folder; None where the path is no folder. Raises ConfigError for a folder without a result."""
-    record = stored_tables.read_record(path)
-    if record is None:
+    result = find_result(path)
+    if result is None:
         if path.is_dir() and path.name != str(path):
-            raise ConfigError(f"{path}: must be a config or the folder of a result: there is no run.json in it")
+            raise ConfigError(no_result(path))
         return None
-    return ComparedRun(str(record.get("config", path.name)), path, record)
+    return ComparedRun(str(result.record["config"]), path, dict(result.record), result.files.table)
 
 
 def _stored_run(source: str | os.PathLike[str], out: Path) -> ComparedRun:
     experiment = load(source)
     folder = out / experiment.stem
-    record = stored_tables.read_record(folder)
-    if record is None:
+    result = find_result(folder)
+    if result is None:
         raise ConfigError(f"{experiment.stem}: no result in {folder}; `{command(experiment, (), out)}` computes it")
-    return ComparedRun(experiment.stem, folder, record, experiment)
+    return ComparedRun(experiment.stem, folder, dict(result.record), result.files.table, experiment)
 
 
 def _with_distinct_names(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
     """The runs with distinct names: to equal names their folder is added, or a number where they have none."""
     names = [run.label for run in runs]
-    longer_names = [run.label if run.tables is not None else f"{run.label} in {run.folder.parent}" for run in runs]
+    longer_names = [f"{run.label} in {run.folder.parent}" if run.stored else run.label for run in runs]
     longer_names = [
         f"{name} ({longer_names[: n + 1].count(name)})" if longer_names.count(name) > 1 else name
         for n, name in enumerate(longer_names)
@@ -259,11 +262,8 @@ def _sides(run: ComparedRun) -> list[Side]:
     """The cases that a result has, with their rows."""
     quantities = _measured_quantities(str(run.record.get("study")))
     table_names = {quantity.table for quantity in quantities}
-    outputs = run.record["outputs"]
-    read_table = (
-        run.tables.get if run.tables is not None else partial(stored_tables.read_table, run.folder, outputs=outputs)
-    )
-    tables = {name: rows for name in sorted(table_names) if (rows := read_table(name)) is not None}
+    tables_read = ((name, run.read_table(name)) for name in sorted(table_names))
+    tables = {name: rows for name, rows in tables_read if rows is not None and "case" in rows}
     sides = []
     for name, case_record in run.record["cases"].items():
         case_rows = {key: rows[rows["case"] == name] for key, rows in tables.items()}

@@ -3,7 +3,6 @@
 A result of the same settings and seed is extended; of fewer realisations, those that are stored are shown. Anything
 else in its place must be asked for by `replace`."""
 
-import csv
 import os
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,7 +10,7 @@ from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Any
 
-from radarsim.api import configs, stored_tables
+from radarsim.api import configs
 from radarsim.api.case_work import CaseWork
 from radarsim.api.repeat_command import out_option
 from radarsim.config.experiment import Experiment
@@ -19,11 +18,10 @@ from radarsim.config.yaml_text import one_line_yaml
 from radarsim.engine.store.inventory import take_inventory
 from radarsim.errors import ConfigError, RadarsimError, StoreError, argument
 from radarsim.language.translate import plural, tr
-from radarsim.report import provenance
+from radarsim.report import provenance, stored_tables
 
 MAX_NAMED_KEYS = 3  # in a message
 MAX_VALUE_CHARACTERS = 40
-RUNS_TABLE = "runs"  # the table of `run --runs`, which no config asks for
 Path_ = str | os.PathLike[str]
 
 
@@ -86,34 +84,17 @@ def stored_counts(experiment: Experiment, out: Path_) -> dict[str, int]:
     return {} if record is None else _counts(record)
 
 
-def lost_runs_note(experiment: Experiment, out: Path_) -> str:
-    """A sentence on the table of runs that the folder of an experiment holds, and that a run without it removes; empty
-    where there is none."""
-    content = stored_tables.read_content(Path(out) / experiment.stem / f"{RUNS_TABLE}.csv")
-    if content is None or _record(experiment, out) is None:
-        return ""
-    values = {"config": experiment.stem, "table": f"{RUNS_TABLE}.csv", "option": runs_option(content)}
-    return tr("{config}: {table} is removed; `radarsim run` with `{option}` writes it again", **values)
-
-
-def runs_option(content: bytes) -> str:
-    """The option that makes a table of runs, given its content."""
-    rows = csv.DictReader(content.decode("utf-8", "replace").splitlines())
-    spans = {f"{row.get('first_k')}:{row.get('last_k')}" for row in rows}
-    return f"--runs {spans.pop()}" if len(spans) == 1 else "--runs all"
-
-
 def _counts(record: Mapping[str, Any]) -> dict[str, int]:
     """The realisations of each case that a record says are done."""
-    return {name: int(case["done"]) for name, case in record["cases"].items()}
+    return {name: case["done"] for name, case in record["cases"].items()}
 
 
 def _record(experiment: Experiment, out: Path_) -> dict[str, Any] | None:
     """The record of the result in the folder of an experiment; None where there is none that can be read."""
     try:
-        record = stored_tables.read_record(Path(out) / experiment.stem)
+        record = stored_tables.find_record(Path(out) / experiment.stem)
         return record if record is None or _counts(record) else None
-    except (StoreError, LookupError, TypeError, ValueError):
+    except StoreError:
         return None  # what cannot be read cannot be lost
 
 

@@ -1,27 +1,22 @@
 """A stored result by its folder alone: run.json, the config that it was computed from, and its tables."""
 
 import os
-from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from radarsim.api import stored_tables
 from radarsim.api.stored_cases import cases_of_result, stored_experiment
 from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.find_files import is_stem
 from radarsim.errors import ConfigError
-
-if TYPE_CHECKING:
-    import pandas as pd
+from radarsim.report.stored_tables import RECORD, StoredFiles, find_files, is_table, no_result
 
 
 class ResultFolder:
-    """The folder of a result and its record, the content of run.json."""
+    """A result as its folder holds it: `files` are its record, tables and config, all of one run."""
 
-    def __init__(self, folder: Path, record: Mapping[str, Any]):
-        self.folder, self.record = folder, record
+    def __init__(self, files: StoredFiles):
+        self.files, self.folder, self.record = files, files.folder, files.record
 
     @cached_property
     def experiment(self) -> Experiment | None:
@@ -35,30 +30,14 @@ class ResultFolder:
 
     @property
     def config(self) -> str:
-        """The text of config.yaml; empty where there is none."""
-        return (stored_tables.read_content(self.folder / CONFIG_FILE) or b"").decode("utf-8", "replace")
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """The realisations of each case."""
-        return {name: int(case["done"]) for name, case in self.record["cases"].items()}
-
-    @property
-    def table_names(self) -> tuple[str, ...]:
-        """The names of the tables; a data file of the config is none."""
-        others = self.record.get("data_files", ())
-        names = (name for name in self.record["outputs"] if name.endswith(".csv") and "/" not in name)
-        return tuple(name.removesuffix(".csv") for name in names if name not in others)
-
-    def table(self, name: str) -> "pd.DataFrame | None":
-        """A table; None where the result has none of this name. Raises StoreError where it was altered."""
-        return stored_tables.read_table(self.folder, name, self.record["outputs"], whole_numbers=True)
+        """The text of config.yaml; empty where there is none that the run wrote."""
+        return self.files.contents.get(CONFIG_FILE, b"").decode("utf-8", "replace")
 
 
 def find_result(path: str | os.PathLike[str]) -> ResultFolder | None:
     """The result in a folder; None where there is no run.json. Raises StoreError where that is damaged."""
-    record = stored_tables.read_record(Path(path))
-    return None if record is None else ResultFolder(Path(path), record)
+    files = find_files(Path(path), lambda name: is_table(name) or name == CONFIG_FILE)
+    return None if files is None else ResultFolder(files)
 
 
 def result_places(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> list[Path]:
@@ -72,5 +51,7 @@ def result_of(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> Re
     for folder in result_places(source, out):
         if (found := find_result(folder)) is not None:
             return found
-    places = ", nor in ".join(map(str, result_places(source, out)))
-    raise ConfigError(f"{os.fspath(source)}: no result: there is no run.json in {places}")
+    places = result_places(source, out)
+    if len(places) == 1:
+        raise ConfigError(no_result(places[0]))
+    raise ConfigError(f"{os.fspath(source)}: no result: there is no {RECORD} in {', nor in '.join(map(str, places))}")

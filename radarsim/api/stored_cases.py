@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from radarsim.api import configs, stored_tables
+from radarsim.api import configs
 from radarsim.api.configs import load
 from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError, RadarsimError
-from radarsim.report import provenance
+from radarsim.report import provenance, stored_tables
 
 LABEL_KEYS = ("case", "swept")  # of a resolved case: no keys of a config
 
@@ -105,5 +105,5 @@ def stored_cases(out: Path) -> list[tuple[str, Case]]:
     """The cases of all results in a directory with their names there, as far as they read as configs. Raises StoreError
     for a damaged run.json."""
     folders = [path.parent for path in sorted(out.glob("*/run.json"))]
-    records = [(folder, stored_tables.read_record(folder)) for folder in folders]
+    records = [(folder, stored_tables.find_record(folder)) for folder in folders]
     return [pair for folder, record in records if record for pair in cases_of_result(record, folder)]

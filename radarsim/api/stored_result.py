@@ -41,13 +41,13 @@ class TableResult(Result):
 
     def __init__(self, stored: ResultFolder):
         experiment = stored.experiment or _experiment_of_record(stored)
-        cases: Any = [StoredCase(name, count) for name, count in stored.counts.items()]
+        cases: Any = [StoredCase(name, count) for name, count in stored.files.counts.items()]
         super().__init__(experiment, cases, {**stored.record, "warnings": list(stored.record.get("warnings", ()))})
         self.stored = stored
 
     @cached_property
     def _tables(self) -> "dict[str, pd.DataFrame]":
-        tables = {name: self.stored.table(name) for name in self.stored.table_names}
+        tables = {name: self.stored.files.table(name) for name in self.stored.files.table_names}
         return {name: table for name, table in tables.items() if table is not None}
 
     @property
@@ -125,7 +125,7 @@ def read_result(stored: ResultFolder) -> Result:
     experiment, folder = stored.experiment, Path(os.path.abspath(stored.folder))
     if experiment is None or stored.record.get("judged") or experiment.stem != folder.name:
         return TableResult(stored)
-    counted = replacement.with_counts(experiment, stored.counts)
+    counted = replacement.with_counts(experiment, stored.files.counts)
     try:
         has_blocks = all(
             replacement.has_blocks(CaseWork(case), case.realisations, folder.parent)
@@ -141,5 +141,5 @@ def _experiment_of_record(stored: ResultFolder) -> Experiment:
     """The experiment of a result without a config that reads: its cases as far as run.json tells them."""
     record = stored.record
     cases = tuple(stored.cases.values())
-    name, study, count = str(record.get("config")), str(record.get("study")), max([*stored.counts.values(), 0])
+    name, study, count = str(record.get("config")), str(record.get("study")), max([*stored.files.counts.values(), 0])
     return Experiment(name, study, None, cases, count, int(record["seed"]))

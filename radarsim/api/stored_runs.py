@@ -1,6 +1,5 @@
 """A result made again from stored blocks, and what is missing for it."""
 
-import json
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,9 +19,9 @@ from radarsim.engine.blocks import Total
 from radarsim.engine.collect import read_stored
 from radarsim.engine.store.inventory import Inventory, take_inventory
 from radarsim.engine.store.store import Store
-from radarsim.errors import ConfigError, StoreError
+from radarsim.errors import ConfigError
 from radarsim.language.translate import join_names, shorten_names, tr
-from radarsim.report import atomic_files
+from radarsim.report.stored_tables import find_record
 from radarsim.studies import registry
 
 if TYPE_CHECKING:
@@ -165,16 +164,9 @@ def make_result(experiment: Experiment, simulated: SimulatedCases, facts: dict[s
 
 def with_stored_realisations(experiment: Experiment, out: Path) -> Experiment:
     """The experiment with each case's realisations as in the run.json under `out`, if there is one."""
-    try:
-        done = json.loads(atomic_files.read(out / experiment.stem / "run.json"))["cases"]
-        numbers = {name: int(case["done"]) for name, case in done.items()}
-    except FileNotFoundError:
+    record = find_record(out / experiment.stem)
+    if record is None:
         return experiment
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        reason = getattr(error, "strerror", None) or "damaged"
-        raise StoreError(
-            f"{out / experiment.stem / 'run.json'}: cannot be read: {reason}; `radarsim run` makes it again, "
-            "and so does `radarsim report` with -n"
-        ) from error
+    numbers = {name: case["done"] for name, case in record["cases"].items()}
     cases = tuple(replace(case, realisations=numbers.get(case.name, case.realisations)) for case in experiment.cases)
     return replace(experiment, cases=cases, realisations=max(case.realisations for case in cases))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api import configs
+from radarsim.api.earlier_outputs import earlier_outputs, remaking_options
 from radarsim.api.result_config import config_files
 from radarsim.api.result_content import (
     captions,
@@ -36,12 +37,14 @@ if TYPE_CHECKING:
 class WrittenFiles:
     """Output of `write_files`: the folder, its files by their path in it, the tables, and the sentences of the answer.
 
-    removed: files of an earlier run that this one did not write. seconds: of drawing, and of writing with the report.
+    files: with those of an earlier run that stay. removed: those that do not; remaking_options: of the command, which
+    write them again. seconds: of drawing, and of writing with the report.
     answer_warnings: warnings on the intervals that the answer rests on."""
 
     folder: Path
     files: tuple[str, ...]
     removed: tuple[str, ...]
+    remaking_options: tuple[str, ...]
     tables: Mapping[str, "pd.DataFrame"] = field(repr=False)
     answer: tuple[str, ...]
     seconds: Mapping[str, float]
@@ -65,9 +68,9 @@ def write_files(
     """Write all outputs of an experiment into folder; each file completely or not at all.
 
     run: the facts of the run for run.json, see provenance.record; tables_by_name: the tables, if at hand; formats: of
-    the figures' files; width_mm overrides their width. Outputs of an earlier run that this one does not write (figures
-    without `draw`) are removed, so that nothing stale remains. Where figures or sentences of a package's study fail,
-    only the tables are written."""
+    the figures' files; width_mm overrides their width. Outputs of an earlier run that this one does not write are
+    removed, so that nothing stale remains, except figures and the table of runs where the earlier run has the same
+    numbers. Where figures or sentences of a package's study fail, only the tables are written."""
     from radarsim.report import page, page_sentences
 
     if tables_by_name is None:
@@ -104,27 +107,37 @@ def write_files(
         **run,
         "warnings": [*run.get("warnings", ()), *answer.warnings, *undeclared_figures(case_study, figures_by_name)],
     }
-    record = provenance.record(experiment, results, run, contents, answer.texts, machine_facts())
-    report = page.report_page(
-        experiment,
-        tables_by_name,
-        drawings,
-        record,
-        answer.texts,
-        question,
-        inputs=case_study.inputs(results),
-        cost=case_study.cost(tables.without_user_filters(tables_by_name, results), run),
-        agreement=exact_check.agreement_table(tables_by_name["curves"]) if case_study.exact_errors else None,
-        drawn_from=case_study.drawn_from(),
-        config_text=kept_config.get(CONFIG_FILE, b"").decode(),
-    )
-    contents["report.html"] = report.encode()
-    contents["run.json"] = provenance.to_json(provenance.with_output(record, "report.html", contents["report.html"]))
-    removed = sorted(set(provenance.outputs(folder)) - set(contents))
-    atomic_files.replace_all(folder, contents, stale=provenance.outputs)
-    seconds = {"drawing": draw_end - draw_start, "writing": time.perf_counter() - draw_end}
+    with atomic_files.folder_lock(folder):
+        record = provenance.record(experiment, results, run, contents, answer.texts, machine_facts())
+        earlier = earlier_outputs(folder, record)
+        record["outputs"] = dict(sorted({**earlier.lasting, **record["outputs"]}.items()))
+        report = page.report_page(
+            experiment,
+            tables_by_name,
+            drawings,
+            record,
+            answer.texts,
+            question,
+            inputs=case_study.inputs(results),
+            cost=case_study.cost(tables.without_user_filters(tables_by_name, results), run),
+            agreement=exact_check.agreement_table(tables_by_name["curves"]) if case_study.exact_errors else None,
+            drawn_from=case_study.drawn_from(),
+            config_text=kept_config.get(CONFIG_FILE, b"").decode(),
+        )
+        contents["report.html"] = report.encode()
+        record = provenance.with_output(record, "report.html", contents["report.html"])
+        contents["run.json"] = provenance.to_json(record)
+        removed = sorted({*earlier.removable} - {*contents})
+        atomic_files.replace_all(folder, contents, stale=lambda folder: removed)
     return WrittenFiles(
-        folder, tuple(sorted(contents)), tuple(removed), tables_by_name, answer.texts, seconds, answer.warnings
+        folder=folder,
+        files=tuple(sorted({*contents, *earlier.lasting})),
+        removed=tuple(removed),
+        remaking_options=remaking_options(removed, earlier.runs_table),
+        tables=tables_by_name,
+        answer=answer.texts,
+        seconds={"drawing": draw_end - draw_start, "writing": time.perf_counter() - draw_end},
+        answer_warnings=answer.warnings,
     )
 
 

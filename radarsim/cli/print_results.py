@@ -62,7 +62,9 @@ def print_result(result: "Result") -> None:
     print_field("report", str(written.folder / "report.html"))
     if written.removed:
         removed_names = shorten_names(written.removed, 3)
-        print_field("removed", tr("left by an earlier run, not written by this one: {names}", names=removed_names))
+        words = tr("left by an earlier run, not written by this one: {names}", names=removed_names)
+        options = join_names([f"`{option}`" for option in written.remaking_options])
+        print_field("removed", tr("{words}; with {options} again", words=words, options=options) if options else words)
     print_warnings(result.warnings)
 
 

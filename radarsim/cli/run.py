@@ -108,7 +108,7 @@ def run(
         loaded = hand_over.named_by_results(loaded, sources, out)
         if not (shard or replace):
             ends_early = precision is not None or decide
-            check_replacements(loaded, out, quiet, ends_early, makes_runs_table=runs is not None)
+            check_replacements(loaded, out, quiet, ends_early)
         if not trust_code:
             _print_user_code(loaded, quiet)
         if scheduler and not quiet and (line := executor.scheduler_warning(scheduler)):
@@ -127,9 +127,7 @@ def run(
             hand_over.compare_with_archives(loaded, sources, out, quiet or as_json)
 
 
-def check_replacements(
-    loaded: "list[Experiment]", out: str, quiet: bool, ends_early: bool = False, makes_runs_table: bool = False
-) -> None:
+def check_replacements(loaded: "list[Experiment]", out: str, quiet: bool, ends_early: bool = False) -> None:
     """Check before any runs that none replaces tables of something else, and say where stored realisations are shown
     in place of fewer, or a table of runs is removed. ends_early: whether a run may end before its number of
     realisations. Raises ConfigError."""
@@ -144,9 +142,8 @@ def check_replacements(
         except ConfigError as error:
             faults += error.lines
             continue
-        notes = [replacement.larger_counts_note(experiment, larger, out)] if larger else []
-        notes += [] if makes_runs_table else [replacement.lost_runs_note(experiment, out)]
-        for note in () if quiet else filter(None, notes):
+        if larger and not quiet:
+            note = replacement.larger_counts_note(experiment, larger, out)
             console.print_error_line(tr("note: {words}", words=note))
     if faults:
         raise ConfigError(*faults)

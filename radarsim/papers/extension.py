@@ -115,7 +115,7 @@ class PapersExtension(Extension):
     def index_entry(self, folder: Path) -> IndexEntry | None:
         from radarsim.papers import report_section
 
-        return report_section.index_entry(folder / f"{CLAIMS}.csv")
+        return report_section.index_entry(folder)
 
     def result_document(self, result: "Result") -> dict[str, Any]:
         from radarsim.papers import result_claims

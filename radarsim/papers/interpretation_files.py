@@ -16,6 +16,7 @@ from radarsim.papers.stored_verdicts import CLASSES, TABLE, stored_claims, store
 from radarsim.papers.verdict_classes import CLASS_FILE_COLUMNS, verdict_class
 from radarsim.papers.verdicts_by_interpretation import InterpretationVerdict, verdict_columns, verdict_rows
 from radarsim.report import atomic_files, provenance
+from radarsim.report.stored_tables import find_record
 
 
 def write_files(verdicts: InterpretationVerdicts, figures: bool, forecast: TimedProgress) -> tuple[str, ...]:
@@ -59,10 +60,12 @@ def outdated_configs(verdicts: InterpretationVerdicts) -> tuple[str, ...]:
     judged = {claim.claim.id: claim for claim in verdicts.claims if claim.outcome}
     stems = []
     for config in dict.fromkeys(claim.claim.config for claim in judged.values()):
-        if not provenance.holds_results_of(verdicts.folder.parent / config, configs.load(config)):
-            continue
+        folder = verdicts.folder.parent / config
         with suppress(StoreError):  # `radarsim claims` reports a damaged one
-            for row in stored_claims(verdicts.folder.parent / config / "claims.csv") or ():
+            record = find_record(folder)
+            if record is None or not provenance.is_same_config(record["resolved"], configs.load(config).resolved):
+                continue
+            for row in stored_claims(folder) or ():
                 outcome = judged[row["claim"]].outcome if row["claim"] in judged else None
                 if outcome and row["class"] not in (NOT_JUDGED, outcome.kind):
                     stems.append(config)

@@ -114,7 +114,7 @@ def claims(
     stems = dict.fromkeys(
         [*(experiment.stem for experiment in experiments), *(config_of[claim] for claim in requested)]
     )
-    stored = {stem: rows for stem in stems if (rows := stored_claims(Path(out) / stem / "claims.csv")) is not None}
+    stored = {stem: rows for stem in stems if (rows := stored_claims(Path(out) / stem)) is not None}
     rows = [row for experiment in experiments for row in _experiment_rows(experiment, papers, stored)]
     listed = {(row["claim"], row["config"]) for row in rows}
     requested_rows = [row for row in claim_rows(papers, stored) if row["claim"] in requested]

@@ -1,12 +1,11 @@
 """The claims in a result's page, and in the index of results."""
 
-import csv
-import io
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from radarsim.errors import StoreError
 from radarsim.extensions import IndexEntry, ReportSection
 from radarsim.language.translate import term, tr
 from radarsim.papers.claim_rows import (
@@ -18,9 +17,11 @@ from radarsim.papers.claim_rows import (
 )
 from radarsim.papers.claims_table import TABLES_READ
 from radarsim.papers.reasons import translate_reason
+from radarsim.papers.stored_verdicts import FILE, recorded_claims
 from radarsim.papers.study_claims import interpretations_of
 from radarsim.papers.verdict_classes import rows_in_words
-from radarsim.report import atomic_files, page_tables, render_page, typeset
+from radarsim.report import page_tables, render_page, typeset
+from radarsim.report.stored_tables import TableKind, read_rows
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 MAX_LINKED_FIGURES = 3  # from one claim
 HEADING = term("claims")  # of the index's column
+INDEX_TABLE = TableKind("table of claims", ("claim", "paper", "class"))  # of any version
 MARKED_CLASSES = ("confirmed", "refuted")
 
 TablesRead = Sequence[tuple[str, str]]  # tables, with the component that was read or nothing
@@ -101,15 +103,18 @@ def linked_figures(tables_read: TablesRead, sources: Mapping[str, Sequence[str]]
     return list(dict.fromkeys(figures))[:MAX_LINKED_FIGURES]
 
 
-def index_entry(path: Path) -> IndexEntry | None:
-    """From a table of claims: how many are of which class in words and as styled marks, and the paper of the first."""
+def index_entry(folder: Path) -> IndexEntry | None:
+    """From a result's claims: how many are of which class in words and as styled marks, and the paper of the first."""
     try:
-        rows = list(csv.DictReader(io.StringIO(atomic_files.read(path).decode("utf-8"), newline="")))
+        content = recorded_claims(folder)
+        if content is None:
+            return None
+        rows = read_rows(folder / FILE, content, INDEX_TABLE, dict)
         looks = [_css_class(parts[0]["class"]) for parts in group_by_claim(rows)]
         marks = {look: looks.count(look) for look in (*MARKED_CLASSES, "unclear") if look in looks}
         paper = rows[0]["paper"].partition(",")[0] if rows else ""
         return IndexEntry(tr(HEADING), classes_in_words(rows), marks, paper)
-    except (OSError, ValueError, LookupError, csv.Error):
+    except (StoreError, LookupError):
         return None
 
 

@@ -3,25 +3,21 @@
 classes.csv beside this module has the classes of the shipped configs, copied by `make interpretations-pages`; a claim
 judged in a directory of results takes its class from there."""
 
-import hashlib
-import json
-import time
 from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from radarsim.api import stored_tables
-from radarsim.api.stored_tables import HOW_TO_REMAKE
 from radarsim.errors import StoreError
 from radarsim.papers.claim import PaperClaims
 from radarsim.papers.claims_table import COLUMNS, NUMBER_COLUMNS
 from radarsim.papers.interpretations import PaperInterpretations
 from radarsim.papers.verdict_classes import CLASS_FILE_COLUMNS, KnownClasses, VerdictClass, declaration_digest
+from radarsim.report.stored_tables import HOW_TO_REMAKE, RECORD, TableKind, find_files, read_content, read_rows
 
 Row = TypeVar("Row")
 
-MAX_ATTEMPTS, PAUSE_S = 5, 0.1  # at a table that fits no record: another run may be writing both at this moment
+FILE = "claims.csv"
 TABLE = Path("interpretations", "interpretations.csv")
 CLASSES = Path("interpretations", "classes.csv")
 REQUIRED_COLUMNS = {"claim", "interpretation", "kind", "outcome"}
@@ -30,38 +26,28 @@ OLD_FILES = {  # names in results of earlier versions, read where the new file i
     CLASSES: Path("readings", "classes.csv"),
 }
 OLD_COLUMNS = {"reading": "interpretation"}
+CLAIMS_TABLE = TableKind("table of claims", COLUMNS, OLD_COLUMNS)
 SHIPPED_CLASSES = Path(__file__).with_name("classes.csv")
 
 
-def stored_claims(path: Path) -> list[dict[str, Any]] | None:
-    """The rows of a stored claims.csv, numbers as such; None if there is none. Raises StoreError where it cannot be
-    read, is no such table, or differs from the record in run.json."""
-    for attempt in range(1, MAX_ATTEMPTS + 1):
-        text = stored_tables.read_content(path)
-        if text is None:
-            return None
-        recorded = _recorded_digest(path)
-        if recorded is None or hashlib.sha256(text).hexdigest() == recorded:
-            return stored_tables.read_rows(
-                path, text, COLUMNS, _with_numbers, f"table of claims; {HOW_TO_REMAKE}", OLD_COLUMNS
-            )
-        if attempt < MAX_ATTEMPTS:
-            time.sleep(PAUSE_S)
-    raise StoreError(f"{path}: altered since it was written; {HOW_TO_REMAKE}")
+def stored_claims(folder: Path) -> list[dict[str, Any]] | None:
+    """The rows of the claims.csv of a result, numbers as such; None if it has none. Raises StoreError where it is not
+    as recorded in run.json, or no such table."""
+    content = recorded_claims(folder)
+    return None if content is None else read_rows(folder / FILE, content, CLAIMS_TABLE, _with_numbers)
+
+
+def recorded_claims(folder: Path) -> bytes | None:
+    """The claims.csv of a result; None if it has none. Raises StoreError where it is not as recorded in run.json."""
+    files = find_files(folder, lambda name: name == FILE)
+    content = None if files is None else files.content(FILE)
+    if content is None and (folder / FILE).exists():
+        raise StoreError(f"{folder / FILE}: no {RECORD} beside it names it; {HOW_TO_REMAKE}")
+    return content
 
 
 def _with_numbers(row: dict[str, Any]) -> dict[str, Any]:
     return row | {name: float(row[name]) if row[name] else "" for name in NUMBER_COLUMNS}
-
-
-def _recorded_digest(path: Path) -> str | None:
-    """The SHA-256 of the file in run.json beside it; None where there is no run.json or it does not name the file."""
-    record = path.with_name("run.json")
-    text = stored_tables.read_content(record)
-    try:
-        return None if text is None else json.loads(text)["outputs"].get(path.name)
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise StoreError(f"{record}: is no record of a run; {HOW_TO_REMAKE}") from error
 
 
 def stored_interpretations(out: Path) -> list[dict[str, Any]]:
@@ -104,6 +90,7 @@ def _existing_file(out: Path, file: Path) -> Path:
 
 
 def _rows(path: Path, columns: set[str], convert: Callable[[dict[str, Any]], Row]) -> list[Row]:
-    text = stored_tables.read_content(path)
-    kind = "table of interpretations; remove it, `radarsim interpretations` makes it again"
-    return [] if text is None else stored_tables.read_rows(path, text, columns, convert, kind, OLD_COLUMNS)
+    content = read_content(path)
+    remedy = "remove it, `radarsim interpretations` makes it again"
+    kind = TableKind("table of interpretations", columns, OLD_COLUMNS, remedy)
+    return [] if content is None else read_rows(path, content, kind, convert)

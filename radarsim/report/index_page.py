@@ -1,16 +1,17 @@
 """results/index.html: all runs of a folder by group, newest first, each with its answer in one line."""
 
-import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from radarsim.errors import StoreError
 from radarsim.extensions import extensions
 from radarsim.report import atomic_files, provenance
 from radarsim.report.page_sentences import headline
 from radarsim.report.render_page import render_page
+from radarsim.report.stored_tables import find_record
 
 INDEX_NAME = "index.html"
 
@@ -32,7 +33,9 @@ def write_index(out: Path) -> None:
 def _index_row(path: Path) -> dict | None:
     """A row of the index, from a run.json and what extensions say of its folder; None where run.json cannot be read."""
     try:
-        record = json.loads(atomic_files.read(path))
+        record = find_record(path.parent)
+        if record is None:
+            return None
         answer = [str(line) for line in record["answer"]]
         row = {
             "name": path.parent.name,
@@ -42,7 +45,7 @@ def _index_row(path: Path) -> dict | None:
             "realisations": provenance.span(sorted({int(case["done"]) for case in record["cases"].values()})),
             "finished": _finish_time(record, path),
         }
-    except (OSError, ArithmeticError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (StoreError, ArithmeticError, ValueError, LookupError, TypeError):
         return None
     entries = (extension.index_entry(path.parent) for extension in extensions())
     return row | {"entry": next((entry for entry in entries if entry is not None), None)}

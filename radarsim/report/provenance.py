@@ -91,11 +91,6 @@ def outputs(folder: Path, name: str = "run.json") -> list[str]:
     return [path for path in earlier_outputs if isinstance(path, str)] if isinstance(earlier_outputs, dict) else []
 
 
-def holds_results_of(folder: Path, experiment: Experiment) -> bool:
-    """Whether a folder holds the results of an experiment, with any seed and number of realisations."""
-    return is_same_config(earlier_record(folder).get("resolved"), experiment.resolved)
-
-
 def is_same_config(resolved: object, other_resolved: object) -> bool:
     """Whether two resolved configs have the same cases, with any seed and number of realisations."""
     return _comparable(resolved) == _comparable(other_resolved)

@@ -69,9 +69,34 @@ def test_a_table_of_runs_is_not_removed_in_silence(out):
     again = ("run", "rls2", "-n", 4000, "--no-figures", "--out", out)
     assert command(*again, "--runs", "3:10").stderr == ""
     assert command(*again, "--runs", "3:10").stderr == ""
-    note = "note: rls2: runs.csv is removed; `radarsim run` with `--runs 3:10` writes it again\n"
-    assert command(*again).stderr == note
+    assert "removed" not in command(*again).stdout
+    assert (out / "rls2" / "runs.csv").exists()
+    removed = command(*again, "-n", 5000).stdout
+    assert "left by an earlier run, not written by this one: runs.csv; with `--runs 3:10` again" in removed
     assert not (out / "rls2" / "runs.csv").exists()
+
+
+def test_figures_of_the_same_numbers_stay_and_others_are_named(out):
+    figures, select = out / "rls2" / "figures", ("--set", "figures=[sigma_r]")
+
+    def run(*options):
+        """Run with one figure; what is printed, and the files of figures."""
+        text = command("run", "rls2", "--out", out, *options).stdout
+        command("doctor", out / "rls2")
+        return text, {path.name for path in figures.glob("*")}
+
+    _, files = run("-n", 4000, *select, "--format", "pdf")
+    assert files == {"sigma_r.pdf", "captions.md"}
+    for options in ((*select, "--format", "svg"), ("--no-figures",), ("--set", "figures=[gain_r]")):
+        text, now = run("-n", 4000, *options)
+        assert "removed" not in text
+        assert now >= files
+        files = now
+    assert files == {"sigma_r.pdf", "sigma_r.svg", "gain_r.svg", "captions.md"}
+    text, now = run("-n", 5000, *select, "--format", "svg")
+    removed = "figures/gain_r.svg and figures/sigma_r.pdf; with `--format pdf` and `--format svg` again"
+    assert removed in " ".join(text.split())
+    assert now == {"sigma_r.svg", "captions.md"}
 
 
 def radarsim_config(folder, sigma_range_m):

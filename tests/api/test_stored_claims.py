@@ -8,15 +8,19 @@ import pytest
 
 from radarsim.api import run, stored_runs
 from radarsim.errors import StoreError
-from radarsim.papers import list_claims, stored_verdicts
+from radarsim.papers import list_claims
 from radarsim.papers.study_claims import paper_claims
+from radarsim.report import stored_tables
 from tests.program import command
+
+HASH = "[0-9a-f]{12}…"
+ALTERED = rf"claims\.csv: altered since it was written: SHA-256 {HASH}, run\.json has {HASH}; `radarsim report`"
 
 
 @pytest.fixture
 def out(tmp_path, monkeypatch):
     """A directory with a result of rls2 whose table of claims is recorded."""
-    monkeypatch.setattr(stored_verdicts, "PAUSE_S", 0.0)
+    monkeypatch.setattr(stored_tables, "PAUSE_S", 0.0)
     run.run("rls2", realisations=2000, out=tmp_path, figures=False)
     return tmp_path
 
@@ -29,16 +33,16 @@ def test_an_altered_verdict_is_refused_and_report_mends_it(out):
     for altered in (whole.replace(rows[0]["verdict"], "as we like it"), whole.replace(rows[0]["claim"], "P9.99"), ""):
         assert altered != whole
         table.write_text(altered)
-        with pytest.raises(StoreError, match=r"rls2/claims\.csv: altered since it was written; `radarsim report`"):
+        with pytest.raises(StoreError, match=ALTERED):
             list_claims.claims("rls2", out=out)
     stored_runs.stored_result("rls2", out=out).write(out, figures=False)
     assert list_claims.claims("rls2", out=out).rows == rows
 
 
-def test_without_a_record_the_table_is_taken_as_it_is(out):
-    rows = list_claims.claims("rls2", out=out).rows
+def test_a_table_that_no_record_names_is_refused(out):
     (out / "rls2" / "run.json").unlink()
-    assert list_claims.claims("rls2", out=out).rows == rows
+    with pytest.raises(StoreError, match=r"claims\.csv: no run\.json beside it names it"):
+        list_claims.claims("rls2", out=out)
 
 
 def test_a_table_and_its_record_that_are_just_being_written_are_waited_for(out, monkeypatch):
@@ -50,7 +54,7 @@ def test_a_table_and_its_record_that_are_just_being_written_are_waited_for(out, 
         facts["outputs"]["claims.csv"] = hashlib.sha256(table.read_bytes()).hexdigest()
         record.write_text(json.dumps(facts))
 
-    monkeypatch.setattr(stored_verdicts.time, "sleep", written)
+    monkeypatch.setattr(stored_tables.time, "sleep", written)
     assert list_claims.claims("rls2", out=out).rows[0]["verdict"] == "refuted"
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from radarsim.api import case_work
-from radarsim.api.maintenance import doctor, self_test
+from radarsim.api.maintenance import self_test
+from radarsim.report import stored_tables
 from tests.engine.test_audit import damage
 from tests.engine.test_damage import reforged
 from tests.program import command, csv_bytes, record
@@ -29,7 +30,7 @@ def made(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def no_waiting(monkeypatch):
     """Outputs that look altered are looked at again without the pause for a run beside us."""
-    monkeypatch.setattr(doctor, "ATTEMPT_INTERVAL_S", 0)
+    monkeypatch.setattr(stored_tables, "PAUSE_S", 0)
 
 
 @pytest.fixture
@@ -102,6 +103,10 @@ def rewritten(path, alter):
     path.write_text(json.dumps(record))
 
 
+NO_RECORD = "run.json: is no record of a run: "
+ALTERED_CONFIG = "run.json: damaged: the config in it is not the one that ran"
+
+
 def nested(levels):
     """Lists in lists: read by json.loads, too deep for json.dumps with an indent."""
     return [nested(levels - 1)] if levels else []
@@ -111,25 +116,21 @@ def nested(levels):
     ("spoil", "code", "words"),
     [
         (lambda path: path.unlink(), 2, "no run.json in it"),
-        (lambda path: path.write_text("{"), 4, "run.json: damaged"),
-        (lambda path: path.write_text("[]"), 4, "run.json: damaged"),
-        (lambda path: path.write_text("[" * 100_000), 4, "run.json: damaged"),
-        (lambda path: path.write_text(re.sub('"rls2": "[0-9a-f]+"', '"rls2": "../x"', path.read_text())), 4, "damaged"),
-        (lambda path: path.write_text(path.read_text().replace('"r+Vr"', '"r+vr"')), 4, "run.json: damaged"),
-        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=[[[]]])), 4, "run.json: damaged"),
-        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=[{}])), 4, "run.json: damaged"),
-        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=None)), 4, "run.json: damaged"),
-        (lambda path: rewritten(path, lambda record: record["resolved"].update(odd="\ud800")), 4, "run.json: damaged"),
-        (lambda path: rewritten(path, lambda record: record["resolved"].update(odd=math.nan)), 4, "run.json: damaged"),
-        (
-            lambda path: rewritten(path, lambda record: record["resolved"].update(odd=nested(400))),
-            4,
-            "run.json: damaged",
-        ),
+        (lambda path: path.write_text("{"), 4, NO_RECORD),
+        (lambda path: path.write_text("[]"), 4, NO_RECORD),
+        (lambda path: path.write_text("[" * 100_000), 4, NO_RECORD),
+        (lambda path: path.write_text(re.sub('"rls2": "[0-9a-f]+"', '"rls2": "../x"', path.read_text())), 4, NO_RECORD),
+        (lambda path: path.write_text(path.read_text().replace('"r+Vr"', '"r+vr"')), 4, ALTERED_CONFIG),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=[[[]]])), 4, ALTERED_CONFIG),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=[{}])), 4, ALTERED_CONFIG),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(cases=None)), 4, ALTERED_CONFIG),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(odd="\ud800")), 4, NO_RECORD),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(odd=math.nan)), 4, NO_RECORD),
+        (lambda path: rewritten(path, lambda record: record["resolved"].update(odd=nested(400))), 4, ALTERED_CONFIG),
         (
             lambda path: path.write_text(path.read_text().replace('"curves.csv"', '"../../etc"')),
             4,
-            "outside the folder",
+            "`outputs` must lie in the folder",
         ),
     ],
 )
@@ -167,7 +168,7 @@ def test_outputs_that_a_run_is_writing_are_looked_at_again(out, monkeypatch):
     whole = path.read_bytes()
     path.write_bytes(whole + b"\n")
     looks = iter([lambda: None, lambda: path.write_bytes(whole)])
-    monkeypatch.setattr(doctor.time, "sleep", lambda seconds: next(looks)())
+    monkeypatch.setattr(stored_tables.time, "sleep", lambda seconds: next(looks)())
     assert "all intact" in command("doctor", out / "rls2").stdout
 
 

@@ -208,7 +208,7 @@ def test_the_command_that_computes_what_is_missing_is_whole(tmp_path):
 def test_a_spoiled_table_of_claims_is_told(tmp_path):
     (tmp_path / "rls2").mkdir()
     (tmp_path / "rls2" / "claims.csv").write_text("garbage\n")
-    assert "is no table of claims" in command("claims", "rls2", "--out", tmp_path, code=4).stderr
+    assert "no run.json beside it names it" in command("claims", "rls2", "--out", tmp_path, code=4).stderr
 
 
 def process(*arguments, **options):

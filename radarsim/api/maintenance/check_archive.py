@@ -10,19 +10,19 @@ from pathlib import Path
 
 from radarsim.api.archive import BLOCKS_FOLDER, Archive
 from radarsim.api.configs import load
+from radarsim.api.earlier_outputs import RUNS_FILE, runs_option
 from radarsim.api.maintenance.compare_tables import differs
 from radarsim.api.maintenance.doctor import inspect_result
 from radarsim.api.maintenance.inspection import Inspection
 from radarsim.api.maintenance.pack import README, RECORD, RESULTS
 from radarsim.api.maintenance.packed_code import code_names
 from radarsim.api.maintenance.recompute import WorkBudget
-from radarsim.api.replacement import RUNS_TABLE, runs_option
-from radarsim.api.stored_tables import read_content, read_record
 from radarsim.config.experiment import Experiment
 from radarsim.config.find_files import is_stem
 from radarsim.engine.store.block_file import piece_named
 from radarsim.errors import ConfigError, RadarsimError, StoreError
 from radarsim.extensions import extensions
+from radarsim.report.stored_tables import find_record, read_content
 from radarsim.user_code.errors import code_allowed
 
 RECOMPUTED_PIECES = 2  # of each case
@@ -53,7 +53,7 @@ def check_archive(
         inspections, budget = {}, WorkBudget()
         for name, facts in archive.facts["results"].items():
             place = folder / RESULTS / name
-            code_places = code_names(read_record(place) or {})
+            code_places = code_names(find_record(place) or {})
             refused = bool(code_places) and not trust_code
             inspections[name] = inspect_result(place, 0 if refused else recompute, progress, budget)
             if refused and recompute:
@@ -65,7 +65,7 @@ def check_archive(
 
 def has_its_counts(archive: Archive, experiment: Experiment, folder: Path) -> bool:
     """Whether the tables in a folder are of as many realisations as those of a result in an archive."""
-    record = read_record(folder) or {"cases": {}}
+    record = find_record(folder) or {"cases": {}}
     packed = archive.facts["results"][experiment.stem].get("cases", {})
     return {name: case["done"] for name, case in record["cases"].items()} == {
         name: case.get("realisations") for name, case in packed.items()
@@ -86,7 +86,7 @@ def differences(archive: Archive, experiment: Experiment, folder: Path) -> tuple
             continue
         stored, computed = archive.read(name), read_content(folder / table)
         stem = table.removesuffix(".csv")
-        if computed is None and stem == RUNS_TABLE:
+        if computed is None and table == RUNS_FILE:
             continue  # see `missing_runs_option`
         difference = (
             "was not written"
@@ -102,8 +102,8 @@ def differences(archive: Archive, experiment: Experiment, folder: Path) -> tuple
 
 def missing_runs_option(archive: Archive, experiment: Experiment, folder: Path) -> str:
     """The option that also makes the table of runs, which a result in an archive has and a folder lacks; else empty."""
-    name = f"{RESULTS}/{experiment.stem}/{RUNS_TABLE}.csv"
-    if name not in archive.names or (folder / f"{RUNS_TABLE}.csv").exists():
+    name = f"{RESULTS}/{experiment.stem}/{RUNS_FILE}"
+    if name not in archive.names or (folder / RUNS_FILE).exists():
         return ""
     return runs_option(archive.read(name))
 
@@ -149,7 +149,7 @@ def runnable_results(archive: Archive, folder: Path, trust_code: bool) -> tuple[
 
 def _reason_not_to_run(archive: Archive, name: str, place: Path, trust_code: bool) -> str:
     """Why a result in an archive cannot be run; empty where it can."""
-    record = read_record(place) or {}
+    record = find_record(place) or {}
     if judged := record.get("judged"):
         return f"holds no estimates of its judged filter {', '.join(judged)}"
     code_places = code_names(record)
@@ -206,7 +206,7 @@ def _check_outputs(archive: Archive, folder: Path) -> None:
     """Raise ConfigError where a result holds files that its record does not name."""
     for result in archive.facts["results"]:
         place = f"{RESULTS}/{result}/"
-        record = read_record(folder / place)
+        record = find_record(folder / place)
         if record is None:
             raise ConfigError(f"{archive.path}: {place}{RECORD} is missing")
         code = archive.facts["results"][result].get("code", ())

@@ -1,11 +1,8 @@
 """`radarsim doctor`: the machine, and the stored blocks and files of a result."""
 
 import hashlib
-import json
 import os
-import re
 import shutil
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -19,11 +16,10 @@ from radarsim.engine.machine import available_cores, instruction_set, machine_fa
 from radarsim.engine.store.audit import Audit, audit_blocks
 from radarsim.engine.store.block_file import is_directory
 from radarsim.engine.store.store import is_other_source, other_sources
-from radarsim.errors import ConfigError, StoreError
-from radarsim.report import atomic_files, provenance
+from radarsim.errors import ConfigError
+from radarsim.report import provenance
+from radarsim.report.stored_tables import find_files, no_result
 from radarsim.system.private_files import foreign_owner
-
-MAX_ATTEMPTS, ATTEMPT_INTERVAL_S = 4, 0.25
 
 
 def machine() -> dict[str, str]:
@@ -154,38 +150,15 @@ def blocks_folder(folder: Path) -> Path:
 
 
 def checked_record(inspection: Inspection) -> dict[str, Any]:
-    """The record, with its outputs checked; tried several times, since another run may be writing."""
-    for attempt in range(MAX_ATTEMPTS):
-        time.sleep(ATTEMPT_INTERVAL_S if attempt else 0)
-        record, inspection.outputs, inspection.faults = _read_record(inspection.folder), 0, []
-        _check_outputs(inspection, record["outputs"])
-        if not inspection.faults:
-            break
-    return record
-
-
-def _read_record(folder: Path) -> dict[str, Any]:
-    """The run.json of a folder, checked to be the record of a run."""
-    path, blocks = folder / "run.json", blocks_folder(folder)
-    hint = f"; `radarsim check CONFIG --out {blocks.parent}` says what is stored there" if is_directory(blocks) else ""
-    try:
-        record: dict[str, Any] = json.loads(atomic_files.read(path))
-        for key, kind in (("outputs", dict), ("identities", dict), ("cases", dict), ("resolved", dict)):
-            if not isinstance(record[key], kind):
-                raise ValueError(f"{key} is no table")
-        record["resolved_sha256"], record["study"]
-        for name, recorded in record["identities"].items():
-            if not isinstance(record["cases"][name]["done"], int) or not re.fullmatch("[0-9a-f]{2,128}", recorded):
-                raise ValueError(f"identity or realisations of {name} are invalid")
-    except (FileNotFoundError, NotADirectoryError) as error:
-        if folder.suffix.lower() == ".zip":
-            hint = f"; `radarsim check {folder}` verifies an archive"
-        raise ConfigError(f"{folder}: no run.json in it, so it is no folder of results{hint}") from error
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise StoreError(f"{path}: damaged, not a record of a run; `radarsim run` writes it again") from error
-    return record
+    """The record of the result in a folder, with its outputs checked."""
+    folder = inspection.folder
+    files = find_files(folder, lambda name: True)
+    if files is None:
+        blocks = blocks_folder(folder)
+        hint = f"; `radarsim check CONFIG --out {blocks.parent}` says what is stored there"
+        raise ConfigError(no_result(folder) + (hint if is_directory(blocks) else ""))
+    inspection.outputs, inspection.faults = len(files.contents), [*files.faults.values()]
+    return dict(files.record)
 
 
 def _digest(value: object) -> str | None:
@@ -196,22 +169,3 @@ def _digest(value: object) -> str | None:
         return hashlib.sha256(to_json(value)).hexdigest()
     except (ValueError, RecursionError):
         return None
-
-
-def _check_outputs(inspection: Inspection, outputs: dict[str, str]) -> None:
-    """Compare the output files of a record with their digests, and add the faults to the inspection."""
-    for name, digest in outputs.items():
-        path = inspection.folder / name
-        if Path(name).is_absolute() or ".." in Path(name).parts:
-            inspection.faults.append(f"{inspection.folder / 'run.json'}: damaged: an output outside the folder: {name}")
-            continue
-        try:
-            data = atomic_files.read(path)
-        except FileNotFoundError:
-            inspection.faults.append(f"{path}: missing")
-        except OSError as error:
-            inspection.faults.append(f"{path}: cannot be read: {error.strerror}")
-        else:
-            inspection.outputs += 1
-            if hashlib.sha256(data).hexdigest() != digest:
-                inspection.faults.append(f"{path}: altered since it was written")
