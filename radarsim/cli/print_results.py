@@ -64,7 +64,9 @@ def print_result(result: "Result") -> None:
         removed_names = shorten_names(written.removed, 3)
         words = tr("left by an earlier run, not written by this one: {names}", names=removed_names)
         options = join_names([f"`{option}`" for option in written.remaking_options])
-        print_field("removed", tr("{words}; with {options} again", words=words, options=options) if options else words)
+        print_field(
+            "removed", tr("{words}; to have them again: {options}", words=words, options=options) if options else words
+        )
     print_warnings(result.warnings)
 
 

@@ -72,7 +72,7 @@ def test_a_table_of_runs_is_not_removed_in_silence(out):
     assert "removed" not in command(*again).stdout
     assert (out / "rls2" / "runs.csv").exists()
     removed = command(*again, "-n", 5000).stdout
-    assert "left by an earlier run, not written by this one: runs.csv; with `--runs 3:10` again" in removed
+    assert "left by an earlier run, not written by this one: runs.csv; to have them again: `--runs 3:10`" in removed
     assert not (out / "rls2" / "runs.csv").exists()
 
 
@@ -94,7 +94,7 @@ def test_figures_of_the_same_numbers_stay_and_others_are_named(out):
         files = now
     assert files == {"sigma_r.pdf", "sigma_r.svg", "gain_r.svg", "captions.md"}
     text, now = run("-n", 5000, *select, "--format", "svg")
-    removed = "figures/gain_r.svg and figures/sigma_r.pdf; with `--format pdf` and `--format svg` again"
+    removed = "figures/gain_r.svg and figures/sigma_r.pdf; to have them again: `--format pdf` and `--format svg`"
     assert removed in " ".join(text.split())
     assert now == {"sigma_r.svg", "captions.md"}
 
