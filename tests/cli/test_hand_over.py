@@ -246,9 +246,10 @@ def test_any_file_that_is_not_as_recorded_is_a_fault_of_folder_and_archive(study
     with (out / "rls2" / name).open("ab") as file:
         file.write(b" ")
     repacked(study, alter)
-    altered = f"{name}: altered since it was written\n"
     for words in (["doctor", out / "rls2"], ["doctor", out / "rls2", "--recompute", 1], ["check", study]):
-        assert altered in command(*words, code=4).stderr
+        told = command(*words, code=4).stderr
+        assert f"{name}: altered since it was written: SHA-256" in told
+        assert ("makes it again" in told) == (words[0] == "doctor")
 
 
 def test_a_forged_number_of_realisations_does_not_run_for_ever(study):
@@ -319,7 +320,7 @@ def test_what_cannot_be_packed_is_said(out, tmp_path):
     before = (out / "rls2" / "run.json").read_bytes()
     shutil.copytree(out / "rls2", out / "copy")
     for results, archive, code, reason in (
-        (["none"], "s.zip", 2, "no run.json in it"),
+        (["none"], "s.zip", 2, "there is no such folder"),
         (["rls2", "copy"], "s.zip", 2, "is called rls2, too"),
         (["rls2"], "s.tar", 2, "must end with .zip"),
         (["rls2"], "no/s.zip", 4, "s.zip: cannot be written: No such file or directory"),

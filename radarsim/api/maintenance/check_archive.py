@@ -22,7 +22,7 @@ from radarsim.config.find_files import is_stem
 from radarsim.engine.store.block_file import piece_named
 from radarsim.errors import ConfigError, RadarsimError, StoreError
 from radarsim.extensions import extensions
-from radarsim.report.stored_tables import find_record, read_content
+from radarsim.report.stored_tables import HOW_TO_REMAKE, find_record, read_content
 from radarsim.user_code.errors import code_allowed
 
 RECOMPUTED_PIECES = 2  # of each case
@@ -217,9 +217,10 @@ def _check_outputs(archive: Archive, folder: Path) -> None:
 
 
 def _name_archive(inspection: Inspection, folder: str, archive: str) -> None:
-    """Name the archive in place of the temporary folder in all findings."""
+    """Name the archive in place of the temporary folder in all findings, without remedies for a folder."""
     inspection.folder = Path(str(inspection.folder).replace(folder, archive))
     for field in fields(inspection):
         texts = getattr(inspection, field.name)
         if isinstance(texts, list):
-            setattr(inspection, field.name, [text.replace(folder, archive) for text in texts])
+            renamed = [text.replace(folder, archive).removesuffix(f"; {HOW_TO_REMAKE}") for text in texts]
+            setattr(inspection, field.name, renamed)
