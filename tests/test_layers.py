@@ -181,7 +181,7 @@ ROLES = {
         (*DISPLAYED, "answer", "chart", "floor", "recorded_plots", "tracking"),
     ),
 }
-ROLE_BY_LAST_WORD = {"keys": "config", "figure": "figures", "figures": "figures"}  # `sensor_keys`, `sigma_figure`
+ROLE_BY_LAST_WORD = {"answer": "answer", "keys": "config", "figure": "figures", "figures": "figures"}  # `gain_answer`
 ROLE_BY_NAME = {  # modules whose names do not say their role
     "components": "figures",
     "doppler_gain": "chart",
@@ -189,6 +189,7 @@ ROLE_BY_NAME = {  # modules whose names do not say their role
     "intervals": "tables",
     "one_burst": "study",
     "radar_on_chart": "study",
+    "stage_ranking": "figures",
     "turn_errors": "recorded_plots",
 }
 STUDIES_WITH_PARTS = {"studies.sonar"}  # these modules choose among the parts of a study

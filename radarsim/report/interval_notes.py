@@ -7,8 +7,8 @@ missing at one scan show at another. Gains have a further rule, because both fil
 except in a few realisations. A study that knows more about its rare errors (wrong folds, lost bursts) brings its own
 notes.
 
-A row with an exact value has no note: that value is better, whatever the interval. Measured coverage of rows with and
-without notes is in docs/trust.md."""
+A row with an exact value has no note by these rules: that value is better, whatever the interval. Measured coverage of
+rows with and without notes is in docs/trust.md."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -93,8 +93,8 @@ def _with_notes(
             by_rules = notes_where(
                 (by_rules == "") & _alike(table, tables_by_name["curves"], paired), ALIKE_FILTERS, by_rules
             )
+        by_rules = np.where(is_exact(table) & exact, "", by_rules)
         notes = np.where(by_rules == "", notes, by_rules)
-        notes = np.where(is_exact(table) & exact, "", notes)
     return table.assign(note=notes) if any(notes) else table
 
 

@@ -167,6 +167,31 @@ def quantile(looks: Values) -> Values:
     return np.vectorize(lambda n: NormalDist().inv_cdf(1 - 0.025 / n), otypes=[float])(np.maximum(looks, 1))
 
 
+def simultaneous_sizes(estimate: Estimate, looks: Values) -> Estimate:
+    """Positive numbers with intervals of which so many all hold in 95 % of runs; those given hold one by one.
+
+    For an extreme that was chosen among `looks` of them. Each end moves away in proportion on a logarithmic scale."""
+    factor = quantile(looks) / Z95
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = (estimate.value * np.divide(end, estimate.value) ** factor for end in estimate[1:])
+    return Estimate(estimate.value, low, high)
+
+
+def simultaneous_gains(estimate: Estimate, looks: Values) -> Estimate:
+    """`simultaneous_sizes` of gains in per cent, by the ratio of σ that a gain is."""
+    ratio = simultaneous_sizes(Estimate(*(100 - np.asarray(end, float) for end in estimate)), looks)
+    return Estimate(estimate.value, 100 - ratio.lo, 100 - ratio.hi)
+
+
+def simultaneous_shares(estimate: Estimate, looks: Values) -> Estimate:
+    """`simultaneous_sizes` of shares: Wilson's interval of the same number of yes-or-no trials at a larger quantile."""
+    p, half = np.asarray(estimate.value, float), np.subtract(estimate.hi, estimate.lo) / 2
+    linear, quadratic = 2 * half**2 - p * (1 - p), 0.25 - half**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_trial = (np.hypot(linear, 2 * half * np.sqrt(quadratic)) + linear) / (2 * quadratic)  # z² over the trials
+        return _wilson(p, Z95**2 / (per_trial * np.square(quantile(looks) / Z95)))
+
+
 def normalised_bounds(freedom: Values, looks: Values = 1) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of the mean normalised error squared (NEES, NIS per component) of a consistent filter.
 

@@ -114,7 +114,7 @@ def test_a_twin_gains_nothing_and_its_intervals_hold_it(judged):
     assert (gains["gain_lo"] < 0).all()
     assert (gains["gain_hi"] > 0).all()
     assert (gains["gain_percent"].abs() < 100 * TWIN).all()
-    assert "cannot be distinguished from r+Vr" in judged.answer[0]
+    assert "mine is equal to r+Vr" in judged.answer[0]
 
 
 def test_gains_are_against_every_filter_and_paired(judged, plain):
@@ -373,7 +373,7 @@ def test_failures_are_counted_and_sigma_is_of_the_others(estimates):
     assert result.answer[0].startswith("mine fails in 3.33 % [")
     how = page_sentences.headline(result.answer).split("), and in the others ")[1]
     assert how.startswith(
-        "mine cannot be distinguished from r+Vr, the config's best in r at 140 s: gain 0 % [−0.001, 0.001]"
+        "mine is equal to r+Vr, the config's best in r at 140 s, identical in all 290 realisations: a difference in "
     )
     mine = of(result.curves, filter="mine")
     assert set(mine["n"]) == {290}
@@ -611,11 +611,11 @@ def test_the_command_judges_a_file(estimates, tmp_path, monkeypatch):
     np.savez("mine.npz", estimates=estimates)
     done = CliRunner().invoke(main, ["judge", "rls2", "mine.npz", "--name", "mine", "--no-figures"])
     assert done.exit_code == 0, done.output
-    assert done.output.startswith("mine cannot be distinguished from r+Vr")
+    assert done.output.startswith("mine is equal to r+Vr")
     record = json.loads((tmp_path / "results/rls2_mine/run.json").read_text())
     assert record["command"] == "radarsim judge rls2 mine.npz --name mine"
     assert len(record["judged"]["mine"]) == 64
-    assert "mine cannot be distinguished from" in (tmp_path / "results/rls2_mine/report.html").read_text()
+    assert "mine is equal to" in (tmp_path / "results/rls2_mine/report.html").read_text()
     again = CliRunner().invoke(main, ["judge", "rls2", "mine.npz", "-n", "301"])
     assert again.exit_code == 2
     assert not (tmp_path / "results/.blocks").exists()

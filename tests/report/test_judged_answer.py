@@ -24,14 +24,31 @@ def judged(target, **options):
 
 def test_an_equal_filter_has_the_exact_number_and_no_other():
     first, floor, *_ = (str(sentence) for sentence in judged(twin).answer)
-    assert re.search(r"its σ is 154\.7 m \[154\.7, 154\.7\], that of r\+Vr 154\.7 m exactly", first)
-    assert re.search(r"mine is 5\.18 % \[5\.1\d, 5\.\d+\] above it, r\+Vr 5\.18 %", floor)
+    assert re.search(r"mine is equal to r\+Vr, .*, identical in all 1,000 realisations: .* fewer than 0\.3 % ", first)
+    assert first.endswith("; the σ of both is 154.7 m (exact).")
+    assert floor.endswith(": above it is r+Vr 5.18 % (exact), and mine as far.")
 
 
-def test_a_filter_that_errs_otherwise_keeps_the_measured_number():
+def test_sigma_and_gain_of_one_sentence_agree():
+    """Of a filter that errs otherwise, and of one that gives no number where its error is largest."""
     result = judged(lambda plots: plots["range_m"])
-    row = result.curves.query("filter == 'mine' and component == 'r'").iloc[-1]
-    assert f"its σ is {row['sigma']:.4g} m [{row['sigma_lo']:.4g}, {row['sigma_hi']:.4g}]" in result.answer[0]
+    gain = result.gains.query("baseline == 'r+Vr' and component == 'r'").iloc[-1]["gain_percent"]
+    exact = result.curves.query("filter == 'r+Vr' and component == 'r'").iloc[-1]["exact_sigma"]
+    assert f"its σ is {exact * (1 - gain / 100):.4g} m [" in result.answer[0]
+    assert f"that of r+Vr {exact:.4g} m (exact)." in result.answer[0]
+
+    def failing(plots):
+        x = twin(plots)
+        far = np.abs(x[..., 0] - twin_truth[: len(x)])
+        x[far[:, -1] > 300] = np.nan
+        return x
+
+    twin_truth = radarsim.plots("rls2", n=1000).truth[..., 0]
+    result = judged(failing)
+    found = re.search(r"its σ is (\S+) m \[.*\], that of r\+Vr in the same realisations (\S+) m\.", result.answer[0])
+    assert found
+    assert found[1] == found[2]
+    assert "147.1 m; above it is r+Vr 5.18 % (exact). mine, which has an estimate in other" in result.answer[1]
 
 
 def test_a_loss_in_another_component_is_in_the_first_sentence():
@@ -41,7 +58,7 @@ def test_a_loss_in_another_component_is_in_the_first_sentence():
         return x
 
     first = judged(rough_velocity).answer[0]
-    assert "cannot be distinguished from r+Vr" in first
+    assert "is equal to r+Vr" in first
     assert ", but worse than r+Vr in Vr there: gain −" in first
     assert "but worse" not in judged(twin).answer[0]
 
@@ -82,9 +99,10 @@ def test_a_filter_is_judged_at_the_worst_point_of_the_studys_own_answer(point):
         for k in (2, 3)
     ]
     axes = SimpleNamespace(components=(("x", "m"), ("y", "m")), filters=("best",), answer_at=None, answer_points=point)
+    axes.dependent = ()
     result = SimpleNamespace(name="a", axes=axes, user_filters=SimpleNamespace(axes=axes))
     worst = answer._worst_comparison(result, "mine", pd.DataFrame(rows), {"curves": pd.DataFrame(curves)})
-    row = worst.gain_against("best")
+    row = worst.row_against("best")
     assert (row["component"], row["k"]) == (("x", 3) if len(point) > 1 else ("y", 2))
 
 

@@ -11,10 +11,11 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, shorten_names, term, tr
-from radarsim.report import key_labels, sentences, wording
+from radarsim.report import compared_value, gain_sentences, key_labels, sentences, wording
 from radarsim.report import tables as common
+from radarsim.report.compared_value import ComparedValue
+from radarsim.report.quantities import GAIN
 from radarsim.report.sentences import Sentence
-from radarsim.report.statistics import Estimate
 from radarsim.report.user_filters.tables import IMPROPER, REASONS, TablesByName, user_filter_cases
 
 if TYPE_CHECKING:
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
 
 
 TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
-GAIN = ("gain_percent", "gain_lo", "gain_hi")
-SIGMA = ("sigma", "sigma_lo", "sigma_hi")
-NARROWER = 2.0  # times: a σ from a paired ratio is told in place of the measured one where it is so much narrower
 MATERIAL_LOSS = 1.0  # per cent: a smaller one in another component is not told in the first sentence
 NEGLIGIBLE = 1e-3  # of the largest σ of a filter's component over time: what is below is known, not estimated
 DEPENDENCES = {  # why a filter has no intervals, after "as"
@@ -64,30 +62,43 @@ class _Comparison:
     unit: str
     gains: "pd.DataFrame"  # against every other filter
     sigma: "pd.Series[Any]"  # of `curves`: the user filter's
-    exact_sigmas: Mapping[str, float]  # of the config's filters for which it is known
-    best_sigma: "pd.Series[Any]"  # of `curves`: that of the config's best filter
-    rivals: Mapping[str, float]  # the config's best filter, then its best tuned one, if any; their σ, exact first
+    rivals: Mapping[str, "pd.Series[Any]"]  # of `curves`: the best filter, then the best tuned one
     dependence: str  # why the user filter has no intervals; empty where it has
 
     @property
     def best(self) -> str:
         return next(iter(self.rivals))
 
-    def gain_against(self, baseline: str) -> "pd.Series[Any]":
+    @property
+    def best_sigma(self) -> ComparedValue:
+        return compared_value.row_value(self.rivals[self.best])
+
+    @property
+    def has_same_realisations(self) -> bool:
+        """Whether the user filter has an estimate in as many realisations as the config's best filter."""
+        return bool(self.sigma["n"] == self.rivals[self.best]["n"])
+
+    @property
+    def is_equal(self) -> bool:
+        """Whether it has the same errors as the config's best filter, wherever both have an estimate."""
+        return gain_sentences.is_equal(self.gain_against(self.best))
+
+    def row_against(self, baseline: str) -> "pd.Series[Any]":
         return self.gains[self.gains["baseline"] == baseline].iloc[0]
 
+    def gain_against(self, baseline: str) -> ComparedValue:
+        return compared_value.row_value(self.row_against(baseline), GAIN)
+
+    def gain_text(self, baseline: str) -> str:
+        """The gain against a baseline with its interval, or what was not seen of equal filters."""
+        return gain_sentences.percent_text(self.gain_against(baseline), self.sigma["n"])
+
     @cached_property
-    def best_estimate(self) -> tuple[Estimate, tuple[sentences.MeasuredInterval, ...]]:
-        """σ of the user filter, with the interval that it rests on: the measured one or, where that is far wider, the
-        exact σ of another filter times the paired ratio of the two."""
-        estimate = Estimate(*(float(self.sigma[key]) for key in SIGMA))
-        intervals = sentences.intervals("curves", "sigma", self.sigma)
-        for baseline, exact_sigma in self.exact_sigmas.items():
-            row = self.gain_against(baseline)
-            paired = Estimate(*(exact_sigma * (1 - row[key] / 100) for key in (GAIN[0], *GAIN[:0:-1])))
-            if NARROWER * (paired.hi - paired.lo) < estimate.hi - estimate.lo:
-                estimate, intervals = paired, sentences.intervals("gains", "gain", row)
-        return estimate, intervals
+    def own_sigma(self) -> ComparedValue:
+        """σ of the user filter: beside an exact rival that times the paired ratio, else measured."""
+        if self.best_sigma.is_exact and self.has_same_realisations:
+            return compared_value.paired_sigma(self.best_sigma.value, self.row_against(self.best))
+        return compared_value.row_value(self.sigma)
 
 
 def _filter_sentences(result: CaseResult, name: str, prefix: str, tables_by_name: TablesByName) -> list[Sentence]:
@@ -142,7 +153,7 @@ def _worst_comparison(
     first = next(component for component, _ in result.axes.components if component in present)
     usable_points = [point for point in points if point[0] in present] or [(first, points[-1][1])]
     comparisons = [_compare(result, name, gains, tables_by_name, point) for point in usable_points]
-    return min(comparisons, key=lambda comparison: comparison.gain_against(comparison.best)["gain_percent"])
+    return min(comparisons, key=lambda comparison: comparison.row_against(comparison.best)["gain_percent"])
 
 
 def _compare(
@@ -154,18 +165,22 @@ def _compare(
     distance_s = (gains["t_s"] - min(t_s, gains["t_s"].max())).abs()
     gains = gains[gains["k"] == gains["k"][distance_s.idxmin()]]
     curves = common.select_rows(tables_by_name["curves"], case=result.name, component=component, k=gains["k"].iloc[0])
-    sigma = dict(zip(curves["filter"], common.exact_first(curves, "sigma", "exact_sigma"), strict=True))
-    baselines = [baseline for baseline in gains["baseline"] if baseline in result.axes.filters]
-    tuned = [baseline for baseline in baselines if baseline.endswith(TUNED)]
-    best = min((baseline for baseline in baselines if baseline not in tuned), key=lambda baseline: sigma[baseline])
-    rivals = [best, *sorted(tuned, key=lambda baseline: sigma[baseline])[:1]]
     rows = {row["filter"]: row for _, row in curves.iterrows()}
-    unit = key_labels.unit_label(unit)
-    exact = {row["filter"]: float(row["exact_sigma"]) for row in rows.values() if row["exact_sigma"] > 0}
-    exact = {baseline: exact[baseline] for baseline in baselines if baseline in exact}
+    baselines = [baseline for baseline in gains["baseline"] if baseline in result.axes.filters]
+    rank = _ranks(baselines, rows, gains)
+    tuned = [baseline for baseline in baselines if baseline.endswith(TUNED)]
+    best = min((baseline for baseline in baselines if baseline not in tuned), key=rank.__getitem__)
+    rivals = {rival: rows[rival] for rival in (best, *sorted(tuned, key=rank.__getitem__)[:1])}
     dependence = dict(user_filter_cases(result)[0].axes.dependent).get(name, "")
-    rival_sigmas = {rival: sigma[rival] for rival in rivals}
-    return _Comparison(name, unit, gains, rows[name], exact, rows[best], rival_sigmas, dependence)
+    return _Comparison(name, key_labels.unit_label(unit), gains, rows[name], rivals, dependence)
+
+
+def _ranks(baselines: Sequence[str], rows: Mapping[str, "pd.Series[Any]"], gains: "pd.DataFrame") -> dict[str, float]:
+    """By what the config's filters are ranked: exact σ where all have it, else how little is gained against them."""
+    exact = {baseline: float(rows[baseline]["exact_sigma"]) for baseline in baselines}
+    if not np.isnan(list(exact.values())).any():
+        return exact
+    return dict(zip(gains["baseline"], gains["gain_percent"], strict=True))
 
 
 def _losses(
@@ -173,7 +188,7 @@ def _losses(
 ) -> list[_Comparison]:
     """The other components in which a filter that is not worse at the point of the answer is surely worse than the
     config's best one, at the same scan."""
-    row = comparison.gain_against(comparison.best)
+    row = comparison.row_against(comparison.best)
     if not row["gain_hi"] >= 0:
         return []
     rows = gains[(gains["k"] == row["k"]) & (gains["component"] != row["component"])]
@@ -181,7 +196,7 @@ def _losses(
         _compare(result, comparison.name, rows, tables_by_name, (component, np.inf))
         for component in dict.fromkeys(rows["component"])
     ]
-    return [loss for loss in comparisons if loss.gain_against(loss.best)["gain_hi"] < -MATERIAL_LOSS]
+    return [loss for loss in comparisons if loss.gain_against(loss.best).estimate.hi < -MATERIAL_LOSS]
 
 
 def _training_clause(result: CaseResult, name: str, verdict: Sentence) -> Sentence:
@@ -215,112 +230,129 @@ def _verdict_sentence(comparison: _Comparison, losses: Sequence[_Comparison] = (
     best, *tuned = comparison.rivals
     clauses = [_against_best(comparison, best), *(_against_tuned(comparison, rival) for rival in tuned)]
     clauses += [_loss_clause(loss) for loss in losses]
-    estimate, intervals = comparison.best_estimate
-    sigma = wording.estimate(estimate, comparison.unit)
-    text = tr("its σ is {sigma}, {floor}.", sigma=sigma, floor=_best_sigma(comparison))
-    if np.isnan(comparison.best_sigma["exact_sigma"]):
-        intervals += sentences.intervals("curves", "sigma", comparison.best_sigma)
-    verdict = sentences.join("", clauses)
-    return sentences.compose(f"{verdict.text}; {text}", [verdict, Sentence(text, intervals)])
+    sigmas = _sigma_clause(comparison)
+    return sentences.compose(f"{sentences.join('', clauses).text}; {sigmas.text}", [*clauses, sigmas])
 
 
 def _against_best(comparison: _Comparison, best: str) -> Sentence:
-    row = comparison.gain_against(best)
+    row, gain = comparison.row_against(best), comparison.gain_against(best)
     fields = {
         "name": comparison.name,
         "best": best,
         "component": row["component"],
         "t": numeral(f"{row['t_s']:g}"),
-        "gain": _gain(row),
+        "gain": comparison.gain_text(best),
     }
-    if np.isnan(row["gain_lo"]):
+    if np.isnan(gain.estimate.lo):
         text = tr(
             "{name} cannot be judged against {best}, the config's best in {component} at {t} s, as {reason} and no "
             "interval holds: gain {gain}",
             **fields,
             reason=tr(DEPENDENCES[comparison.dependence or "others"]),
         )
-    elif row["gain_lo"] > 0:
+    elif comparison.is_equal:
+        text = tr("{name} is equal to {best}, the config's best in {component} at {t} s, {gain}", **fields)
+    elif gain.estimate.lo > 0:
         text = tr("{name} is better than {best}, the config's best in {component} at {t} s: gain {gain}", **fields)
-    elif row["gain_hi"] < 0:
+    elif gain.estimate.hi < 0:
         text = tr("{name} is worse than {best}, the config's best in {component} at {t} s: gain {gain}", **fields)
     else:
         text = tr(
             "{name} cannot be distinguished from {best}, the config's best in {component} at {t} s: gain {gain}",
             **fields,
         )
-    return Sentence(text, sentences.intervals("gains", "gain", row))
+    return Sentence(text, gain.intervals)
 
 
 def _loss_clause(comparison: _Comparison) -> Sentence:
-    row = comparison.gain_against(comparison.best)
+    row = comparison.row_against(comparison.best)
     text = tr(", but worse than {best} in {component} there: gain {gain}",
-              best=comparison.best, component=row["component"], gain=_gain(row))  # fmt: skip
+              best=comparison.best, component=row["component"], gain=comparison.gain_text(comparison.best))  # fmt: skip
     return Sentence(text, sentences.intervals("gains", "gain", row))
 
 
 def _against_tuned(comparison: _Comparison, rival: str) -> Sentence:
-    row = comparison.gain_against(rival)
-    fields = {"best": rival, "gain": _gain(row)}
-    if np.isnan(row["gain_lo"]):
+    gain, rival_sigma = comparison.gain_against(rival), compared_value.row_value(comparison.rivals[rival])
+    fields = {"best": rival, "gain": comparison.gain_text(rival)}
+    if np.isnan(gain.estimate.lo):
         text = tr(", nor against {best}: gain {gain}", **fields)
-    elif row["gain_lo"] > 0:
+    elif gain.estimate.lo > 0:
         text = tr(", and better than {best}: gain {gain}", **fields)
-    elif row["gain_hi"] < 0:
+    elif gain.estimate.hi < 0:
         text = tr(", and worse than {best}: gain {gain}", **fields)
+    elif gain_sentences.is_equal(gain):
+        text = tr(", and equal to {best}, {gain}", **fields)
     else:
         text = tr(", and cannot be distinguished from {best}: gain {gain}", **fields)
-    sigma = f"{wording.number(comparison.rivals[rival])} {comparison.unit}".rstrip()
-    return Sentence(text + tr(", whose σ is {sigma}", sigma=sigma), sentences.intervals("gains", "gain", row))
+    text += tr(", whose σ is {sigma}", sigma=rival_sigma.text(comparison.unit))
+    return Sentence(text, (*gain.intervals, *rival_sigma.intervals))
 
 
-def _best_sigma(comparison: _Comparison) -> str:
-    """σ of the config's best filter, exact where it is known exactly."""
-    row, unit = comparison.best_sigma, comparison.unit
-    if np.isnan(row["exact_sigma"]):
-        sigma = wording.estimate((row[key] for key in SIGMA), unit)
-        return tr("that of {best} {sigma}", best=comparison.best, sigma=sigma)
-    return tr(
-        "that of {best} {sigma} {unit} exactly",
-        best=comparison.best,
-        sigma=wording.number(row["exact_sigma"]),
-        unit=unit,
-    )
+def _sigma_clause(comparison: _Comparison) -> Sentence:
+    """σ of the user filter and of the config's best one, of the same realisations."""
+    own, best, unit = comparison.own_sigma, comparison.best_sigma, comparison.unit
+    if comparison.is_equal and comparison.has_same_realisations:
+        return Sentence(tr("the σ of both is {sigma}.", sigma=best.text(unit)), best.intervals)
+    fields = {"best": comparison.best, "sigma": own.text(unit)}
+    if comparison.has_same_realisations:
+        text = tr("its σ is {sigma}, that of {best} {rival}.", rival=best.text(unit), **fields)
+        return Sentence(text, (*own.intervals, *best.intervals))
+    of_both = own.value / (1 - comparison.gain_against(comparison.best).value / 100)
+    rival = f"{wording.number(of_both)} {unit}".rstrip()
+    text = tr("its σ is {sigma}, that of {best} in the same realisations {rival}.", rival=rival, **fields)
+    return Sentence(text, own.intervals)
 
 
 def _floor_sentence(comparison: _Comparison) -> list[Sentence]:
-    """How far the user filter, the config's best one, and the best tuned one are above the floor; none without one."""
+    """How far the user filter, the config's best one, and the best tuned one are above the floor; none without one.
+
+    A filter that fails is not compared with it: the floor is one of all realisations."""
     lowest = float(comparison.sigma["floor"])
     if np.isnan(lowest):
         return []
-    estimate, intervals = comparison.best_estimate
-    above = [round(100 * (number / lowest - 1), 9) for number in estimate]  # without the rounding of σ
-    is_below = above[0] < 0
-    distance = wording.estimate((-above[0], -above[2], -above[1]) if is_below else above, "%", ".3g")
-    rivals = [
-        f"{name} {wording.number(round(100 * (sigma / lowest - 1), 2), 3)} %"
-        for name, sigma in comparison.rivals.items()
+    own = comparison.own_sigma.mapped(lambda sigma: round(100 * (sigma / lowest - 1), 9))  # without the rounding of σ
+    rivals = {name: compared_value.row_value(row) for name, row in comparison.rivals.items()}
+    above = [
+        f"{name} {sigma.mapped(lambda sigma: round(100 * (sigma / lowest - 1), 2)).text('%', '.3g')}"
+        for name, sigma in rivals.items()
     ]
     is_of_unbiased = comparison.sigma["floor_kind"].startswith("CRB")
-    text = tr(
-        "The floor there, {kind}, is {floor}: {name} is {own} below it; above it is {others}."
-        if is_below
-        else "The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.",
-        kind=tr(UNBIASED if is_of_unbiased else ANY),
-        floor=f"{wording.number(lowest)} {comparison.unit}".rstrip(),
-        name=comparison.name,
-        own=distance,
-        others=join_names(rivals),
-    )
-    if estimate.hi < lowest and is_of_unbiased:
+    fields = {
+        "kind": tr(UNBIASED if is_of_unbiased else ANY),
+        "floor": f"{wording.number(lowest)} {comparison.unit}".rstrip(),
+        "name": comparison.name,
+        "others": join_names(above),
+    }
+    if not comparison.has_same_realisations:
+        text = tr(
+            "The floor there, {kind}, is {floor}; above it is {others}. {name}, which has an estimate in other "
+            "realisations, is not compared with it.",
+            **fields,
+        )
+        return [Sentence(text, sentences.intervals("curves", "sigma", comparison.sigma))]
+    if comparison.is_equal:
+        text = tr("The floor there, {kind}, is {floor}: above it is {others}, and {name} as far.", **fields)
+        return [Sentence(text, comparison.best_sigma.intervals)]
+    if own.value < 0:
+        below = own.mapped(lambda percent: -percent).text("%", ".3g")
+        text = tr(
+            "The floor there, {kind}, is {floor}: {name} is {own} below it; above it is {others}.", own=below, **fields
+        )
+    else:
+        text = tr(
+            "The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.",
+            own=own.text("%", ".3g"),
+            **fields,
+        )
+    if comparison.own_sigma.estimate.hi < lowest and is_of_unbiased:
         text += " " + tr("Below it is only what is biased, or knows more than these plots.")
-    elif estimate.hi < lowest:
+    elif comparison.own_sigma.estimate.hi < lowest:
         text += " " + tr(
             "Below it no estimator can be, biased or not, as it holds on the mean over all truths drawn: {name} "
             "knows more than these plots; was it trained on their truth?",
             name=comparison.name,
         )
-    return [Sentence(text, intervals)]
+    return [Sentence(text, comparison.own_sigma.intervals)]
 
 
 def _further_gains(comparison: _Comparison) -> list[Sentence]:
@@ -328,35 +360,38 @@ def _further_gains(comparison: _Comparison) -> list[Sentence]:
     rows = comparison.gains[comparison.gains["baseline"] != comparison.best]
     if not len(rows):
         return []
-    against = [f"{row['baseline']} {_gain(row)}" for _, row in rows.iterrows()]
+    against = [f"{baseline} {comparison.gain_text(baseline)}" for baseline in rows["baseline"]]
     text = tr("Further gains of {name} there: against {gains}.", name=comparison.name, gains=join_names(against))
     return [Sentence(text, sentences.intervals("gains", "gain", rows))]
 
 
 def _extreme_gains(gains: "pd.DataFrame", comparison: _Comparison) -> list[Sentence]:
     """The least and the largest gain against the config's best over all components and scans, if there are several."""
-    rows = gains[gains["baseline"] == comparison.best].sort_values("gain_percent")
+    rows = gains[gains["baseline"] == comparison.best]
     if len(rows) < 2:
         return []
-    extremes = rows.iloc[[0, -1]]
+    values = [compared_value.row_value(row, GAIN) for _, row in rows.iterrows()]
+    if all(map(gain_sentences.is_equal, values)):
+        text = tr("It is equal to {best} in all components and at all scans.", best=comparison.best)
+        return [Sentence(text)]
+    extremes = [compared_value.extreme(rows, GAIN, largest) for largest in (False, True)]
     smallest, largest = (
-        tr("{gain} ({component} at {t} s)", gain=_gain(row), component=row["component"], t=numeral(f"{row['t_s']:g}"))
-        for _, row in extremes.iterrows()
+        tr(
+            "{gain} ({component} at {t} s)",
+            gain=gain_sentences.percent_text(gain, comparison.sigma["n"]),
+            component=row["component"],
+            t=numeral(f"{row['t_s']:g}"),
+        )
+        for row, gain in extremes
     )
     text = tr(
-        "Over all components and scans its gain against {best} is from {least} to {most}.",
+        "Over all components and scans its gain against {best} is from {least} to {most}{chosen}.",
         best=comparison.best,
         least=smallest,
         most=largest,
+        chosen=extremes[0][1].choice_remark(),
     )
-    return [Sentence(text, sentences.intervals("gains", "gain", extremes))]
-
-
-def _gain(row: "pd.Series[Any]") -> str:
-    """A gain with its interval, to a thousandth of a per cent, its bounds outward: what is finer is rounding."""
-    value, low, high = (float(row[key]) for key in GAIN)
-    rounded = np.round(value, 3), np.floor(1e3 * low) / 1e3, np.ceil(1e3 * high) / 1e3
-    return wording.estimate((number + 0.0 for number in rounded), "%", ".3g")
+    return [Sentence(text, tuple(interval for _, gain in extremes for interval in gain.intervals))]
 
 
 def _nees_sentences(result: CaseResult, name: str, tables_by_name: TablesByName) -> Iterator[Sentence]:

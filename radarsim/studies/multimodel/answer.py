@@ -8,6 +8,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language.translate import plural, shorten_names, term, tr
 from radarsim.report import case_selection, key_labels, sentences, tables, wording
 from radarsim.report.sentences import Sentence
+from radarsim.studies.multimodel import stage_ranking
 from radarsim.studies.multimodel.tables import stage_bounds
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def answer_points(result: CaseResult) -> list[tuple[str, float]]:
 def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") -> list[Sentence]:
     """The filter whose σ of the height is nowhere far above the least of a stage, that stage, and the next filter.
 
-    Of filters that all cases have; nothing where there are not two."""
+    Of filters that all cases have; nothing where there are not two, or where noise decides which it is."""
     rows = stages[(stages["component"] == "y") & (stages["sigma"] > 0)]
     rows = rows[rows.groupby("filter")["case"].transform("nunique") == len(results)]
     if rows["filter"].nunique() < 2:
@@ -64,10 +65,17 @@ def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") 
     worst_stages = rows.loc[rows.groupby("filter", sort=False)["above"].idxmax()]
     worst_stages = worst_stages.sort_values("above", kind="stable")
     closest, second = worst_stages.iloc[0], worst_stages.iloc[1]
+    # The second is further from the best only if it is surely worse than the first where it is worst itself.
+    by_name = {result.name: result for result in results}
+    if (
+        not stage_ranking.paired_gain(by_name[second["case"]], second["stage"], closest["filter"], second["filter"]).lo
+        > 0
+    ):
+        return []
     fields = {"filter": closest["filter"], "second": second["filter"], "more": _percent(second["above"])}
     if not closest["above"]:
         text = tr("Least σ of the height in every stage: {filter}; next {second}, at most {more} above it.", **fields)
-        return [Sentence(text)]
+        return [Sentence(text, sentences.intervals("stages", "sigma", second))]
     best = lowest_rows[(lowest_rows["case"] == closest["case"]) & (lowest_rows["stage"] == closest["stage"])].iloc[0]
     text = tr(
         "Closest to the best filter of {every}: {filter}, σ of the height at most {percent} above the least "
@@ -97,10 +105,13 @@ def _percent(value: float) -> str:
 
 
 def _least_sigma(result: CaseResult, stages: "pd.DataFrame", component: str, quantity: str) -> Sentence:
-    """The filter of the least σ in each stage, with the interval."""
+    """The filter of the least σ in each stage, with the interval, and those that noise alone places behind it."""
     rows = tables.select_rows(stages, case=result.name, component=component)
     best = rows.loc[rows.groupby("stage", sort=False)["sigma"].idxmin()]
-    clauses = [f"{tr(str(row['stage']))}: {row['filter']}, {_sigma(row)}" for _, row in best.iterrows()]
+    clauses = [
+        f"{tr(str(row['stage']))}: {stage_ranking.least_filters(result, rows, row)}, {_sigma(row)}"
+        for _, row in best.iterrows()
+    ]
     text = tr("Least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(clauses))
     return Sentence(case_selection.after_swept_values(result, text), sentences.intervals("stages", "sigma", best))
 

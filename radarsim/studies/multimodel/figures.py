@@ -25,6 +25,7 @@ from radarsim.report import (
 )
 from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
+from radarsim.studies.multimodel import stage_ranking
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -393,12 +394,17 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
         y = Axis(key_labels.sigma_axis_label("$y$", "m"), "log")
         cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     points = [mark for mark in cost_panels[-1].marks if isinstance(mark, Line)]
-    min_operations, best = min(float(point.x[0]) for point in points), min(points, key=lambda point: float(point.y[0]))
+    min_operations = min(float(point.x[0]) for point in points)
     cheapest = join_names([point.label for point in points if float(point.x[0]) == min_operations])
+    last_rows = rows[rows["stage"] == rows["stage"].iloc[-1]]
+    best = last_rows.loc[last_rows["sigma"].idxmin()]
     headline = tr(
         "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
         **{"cheap": cheapest, "count": min_operations, "stage": cost_panels[-1].title},
-        **{"good": best.label, "sigma": wording.number(float(best.y[0]), 3)},
+        **{
+            "good": key_labels.escape_dollars(stage_ranking.least_filters(result, rows, best)),
+            "sigma": wording.number(float(best["sigma"]), 3),
+        },
     )
     cost_panels = _with_legend(cost_panels, result, dash=None)
     caption = headline + tr(

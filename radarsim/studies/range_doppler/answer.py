@@ -1,33 +1,26 @@
 """What the report of P1's experiments asks and answers, in sentences."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from radarsim.config.experiment import Case, Experiment
-from radarsim.language.numerals import numeral
+from radarsim.config.experiment import Experiment
 from radarsim.language.translate import join_names, plural, term, tr
-from radarsim.report import case_selection, key_labels, sentences, tables, wording
-from radarsim.report.quantities import RADIAL
+from radarsim.report import case_selection, compared_value, key_labels, sentences, tables
+from radarsim.report.quantities import SIGMA
 from radarsim.report.sentences import Sentence
-from radarsim.studies.range_doppler import best_variance
+from radarsim.studies.range_doppler import best_variance, gain_answer
 from radarsim.studies.range_doppler.config import FOLDED_STUDY, Best, can_fold, configured_variance
-from radarsim.studies.range_doppler.study import prepare
-from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps, steady_sigma
+from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model, span_mps
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
 TablesByName = Mapping[str, "pd.DataFrame"]
-LONG_RUN_MARGIN = 1.0  # per cent: a gain further than this from that of the long run has not settled
-MIN_LOSS = 1.0  # per cent: from this loss on a case's worst gain is in the answer
 FIRST_COUNTED_SCAN = 3  # from which on errors count when a D_M is the best on a manoeuvring target
 MAX_CASES = 4  # with a broken model, or with a D_M that was looked for, each with a sentence of its own
-MIN_EXACT_GAIN = 0.05  # per cent: what is not nil to one decimal
-FACTOR_LOSS = 100.0  # per cent of loss from which it is given as a factor
-SIGMA = ("sigma", "sigma_lo", "sigma_hi")
 CRITERION_TEXTS = {
     "worst": term("{error} is least at its worst from scan {k} on"),
     "mean": term("{error} is least on average from scan {k} on"),
@@ -52,7 +45,7 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
     Of cases that nothing is swept in, where there are such; with the greatest loss of any case at any scan. Further:
     the best D_M where several are tried, first where nothing but D_M is swept, and the worst error where a target
     breaks the model; the D_M that was looked for; and whether the radar's velocities are folded."""
-    gains = _gain_sentences(results, tables_by_name)
+    gains = gain_answer.answer_gains(results, tables_by_name)
     best = [*_best_variances(results, tables_by_name), *_best_variances_of_broken(results, tables_by_name)]
     return [
         *([*best, *gains] if _sweeps_variance_only(results) else [*gains, *best]),
@@ -65,235 +58,6 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
 def _sweeps_variance_only(results: Sequence[Result]) -> bool:
     """Whether every case is one of a sweep over the manoeuvre variance."""
     return all("manoeuvre_variance" in dict(result.swept_values) for result in results)
-
-
-def _gain_sentences(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """A sentence on the gains in each component; of an experiment with a single filter one on its σ."""
-    unswept_results = case_selection.unswept_cases(results)
-    unswept_gains = tables_by_name["gains"]
-    unswept_gains = unswept_gains[unswept_gains["case"].isin([result.name for result in unswept_results])]
-    gains, all_gains = (tables.group_by(rows, "component") for rows in (unswept_gains, tables_by_name["gains"]))
-    labels = {result.name: key_labels.plain_case_label(result) for result in results}
-    gain_sentences = [
-        _gain_sentence(unswept_results, gains[(component.name,)], all_gains[(component.name,)], component.words, labels)
-        for component in RADIAL
-        if (component.name,) in gains
-    ]
-    return gain_sentences or [_sigma_sentence(results[0], tables_by_name["curves"])]
-
-
-def _gain_sentence(
-    results: Sequence[Result],
-    gains: "pd.DataFrame",
-    all_gains: "pd.DataFrame",
-    quantity: str,
-    labels: Mapping[str, str],
-) -> Sentence:
-    """The gain in one quantity at the last scan, or at the last common time.
-
-    gains: of the cases in the sentence; all_gains: of all cases, among which the greatest loss is looked for."""
-    compared, time_text = _rows_compared(gains)
-    baseline = _than_baseline(results)
-    has_several_filters = gains["filter"].nunique() > 1
-    if len(compared) > 1:
-        lowest, highest = (
-            compared.iloc[int(pick(compared["gain_percent"].to_numpy()))] for pick in (np.argmin, np.argmax)
-        )
-        clauses = [
-            _range_of_gains(compared, lowest, highest, time_text, quantity, baseline, labels, has_several_filters)
-        ]
-        long_run = [
-            f"{gain} ({_case_label(row, labels, has_several_filters)})"
-            for row in (lowest, highest)
-            if (gain := _long_run_gain(results, row))
-        ]
-        clauses += [*_long_run_clause(join_names(long_run)), *_worst_loss(all_gains, lowest, labels)]
-    else:
-        final = compared.iloc[0]
-        best = gains.iloc[int(_deciding_values(gains).argmax())]
-        text = tr(
-            "{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}",
-            quantity=_capitalised(quantity),
-            t_s=final["t_s"],
-            gain=_gain_text(final),
-            base=baseline,
-        )
-        clauses = [Sentence(text, _gain_interval(final)), *_long_run_clause(_long_run_gain(results, final))]
-        if best["k"] != final["k"]:
-            text = tr("at best {gain}, at {t_s:g} s", gain=_gain_text(best), t_s=best["t_s"])
-            clauses.append(Sentence(text, _gain_interval(best)))
-        clauses += _worst_loss(all_gains, final, labels)
-    sentence = sentences.join("; ", clauses)
-    return sentence.with_text(f"{sentence.text}.")
-
-
-def _rows_compared(gains: "pd.DataFrame") -> "tuple[pd.DataFrame, str]":
-    """The rows at which cases are compared, one for each case and filter, and when that is, in words.
-
-    The last scan, where all cases end together; else the last time that all of them have in common."""
-    final = gains.loc[gains.groupby(["case", "filter"], sort=False)["k"].idxmax()]
-    earliest, latest = final["t_s"].min(), final["t_s"].max()
-    if earliest == latest:
-        return final, tr("at {t_s:g} s", t_s=earliest)
-    times = [set(np.round(rows["t_s"], 6)) for rows in tables.group_by(gains, "case", "filter").values()]
-    shared_times = set.intersection(*times) - {0.0}
-    if not shared_times:
-        return final, tr("at the last scan (after {early:g} to {late:g} s)", early=earliest, late=latest)
-    time = max(shared_times)
-    time_text = tr("at {t_s:g} s, the last time that all have in common,", t_s=time)
-    return gains[np.round(gains["t_s"], 6) == time], time_text
-
-
-def _range_of_gains(
-    compared: "pd.DataFrame",
-    lowest: "pd.Series[Any]",
-    highest: "pd.Series[Any]",
-    time_text: str,
-    quantity: str,
-    baseline: str,
-    labels: Mapping[str, str],
-    has_several_filters: bool,
-) -> Sentence:
-    """The least and the largest of several gains, and whether they differ significantly."""
-    fields = {
-        "quantity": _capitalised(quantity),
-        "when": time_text,
-        "base": baseline,
-        "least": _gain_text(lowest),
-        "low": _case_label(lowest, labels, has_several_filters),
-        "most": _gain_text(highest),
-        "high": _case_label(highest, labels, has_several_filters),
-    }
-    if compared["gain_lo"].max() <= compared["gain_hi"].min():
-        text = tr(
-            "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), not significantly different from "
-            "each other, {base}",
-            **fields,
-        )
-    else:
-        text = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}", **fields)
-    return Sentence(text, _gain_interval(lowest, highest))
-
-
-def _long_run_clause(gains: str) -> list[Sentence]:
-    """The clause on gains of the long run, which are exact, where there are such."""
-    return [Sentence(tr("not settled: {gains} in the long run", gains=gains))] if gains else []
-
-
-def _long_run_gain(results: Sequence[Result], row: "pd.Series[Any]") -> str:
-    """The exact gain in the long run, in words; empty where the gain in `row` has settled, or its limit is unknown.
-
-    Where plots may be missed, both are those of the same radar without misses."""
-    result = next(result for result in results if result.name == row["case"])
-    radar = result.spec.radar.model_copy(update={"detection_probability": 1.0})
-    if not follows_the_model(result) or not radar.as_the_papers:
-        return ""
-    axes = result.axes
-    if not axes.plain:
-        spec = result.spec.model_copy(update={"radar": radar})
-        axes = prepare(Case(result.name, key_labels.config_stem(result), result.study, spec, (), 1, 1)).axes
-
-    filter_index = axes.filters.index(row["filter"])
-    component_index = [name for name, _ in axes.components].index(row["component"])
-    sigma, baseline_sigma = steady_sigma(axes, filter_index), steady_sigma(axes, axes.baseline)
-    if sigma is None or baseline_sigma is None:
-        return ""
-    limit = 100 * (1 - float(sigma[component_index] / baseline_sigma[component_index]))
-    gain_now = axes.exact_gains[filter_index, row["k"] - 1, component_index]
-    if not abs(gain_now - limit) > LONG_RUN_MARGIN:  # also where the gain is not a number
-        return ""
-
-    percent = f"{numeral(f'{abs(limit):.1f}')} %"
-    text = tr("{percent} lower", percent=percent) if limit > 0 else tr("{percent} higher", percent=percent)
-    return text if result.axes.plain else tr("{gain} with every plot", gain=text)
-
-
-def _worst_loss(all_gains: "pd.DataFrame", sentence_row: "pd.Series[Any]", labels: Mapping[str, str]) -> list[Sentence]:
-    """The greatest of the significant losses, unless there is none or it is the gain already given."""
-    losses = all_gains[_deciding_values(all_gains, "gain_hi") < -MIN_LOSS]
-    if not len(losses):
-        return []
-    worst = losses.iloc[int(_deciding_values(losses).argmin())]
-    if worst.name == sentence_row.name:
-        return []
-    has_several_filters = all_gains["filter"].nunique() > 1
-    fields = {"gain": _gain_text(worst), "t_s": worst["t_s"]}
-    if has_several_filters or all_gains["case"].nunique() > 1:
-        label = _case_label(worst, labels, has_several_filters)
-        text = tr("at worst {gain}, at {t_s:g} s, with {who}", who=label, **fields)
-    else:
-        text = tr("at worst {gain}, at {t_s:g} s", **fields)
-    return [Sentence(text, _gain_interval(worst))]
-
-
-def _deciding_values(gains: "pd.DataFrame", column: str = "gain_percent") -> np.ndarray:
-    """The gains (rows,), or a bound of their intervals, by which they are compared: exact ones first."""
-    return tables.exact_first(gains, column, "exact_percent")
-
-
-def _than_baseline(results: Sequence[Result]) -> str:
-    """The clause on what the gains are relative to: `range alone` if only the baseline filter observes no more."""
-    baselines = [result.spec.filters[result.axes.baseline] for result in results]
-    variances = {variance for variance in map(configured_variance, baselines) if isinstance(variance, float)}
-    range_filters = [f.name for result in results for f in result.spec.filters if f.observes == ("range",)]
-    if all(f.observes == ("range",) for f in baselines) and len(range_filters) == len(baselines):
-        if len(variances) > 1:
-            return tr("than with range alone at the same D_M")
-        return tr("than with range alone")
-    if len({f.name for f in baselines}) == 1:
-        return tr("than with filter '{filter}'", filter=baselines[0].name)
-    return tr("than with the baseline filter")
-
-
-def _gain_interval(*rows: "pd.Series[Any]") -> tuple[sentences.MeasuredInterval, ...]:
-    return sentences.intervals("gains", "gain", *rows)
-
-
-def _gain_text(row: "pd.Series[Any]") -> str:
-    """A gain in words: lower, higher, or not significantly either; where the sample cannot tell, the exact one."""
-    value, low, high = (round(float(row[name]), 1) + 0.0 for name in ("gain_percent", "gain_lo", "gain_hi"))
-    if value == low == high == 0:
-        return tr("less than 0.1 % lower or higher")
-    is_significant = not row["gain_lo"] <= 0 <= row["gain_hi"]
-    exact = float(row.get("exact_percent", np.nan))
-    if not is_significant and abs(exact) >= MIN_EXACT_GAIN:
-        message = term("exactly {percent} lower") if exact > 0 else term("exactly {percent} higher")
-        return tr(message, percent=f"{numeral(f'{abs(exact):.1f}')} %")
-    if not is_significant:
-        return tr("not significantly lower or higher (gain {gain})", gain=_percent(value, low, high))
-    if value < -FACTOR_LOSS:
-        factor = wording.estimate((1 - value / 100, 1 - high / 100, 1 - low / 100), form=".3g")
-        return tr("higher by a factor of {factor}", factor=factor)
-    if value < 0:
-        return tr("{percent} higher", percent=_percent(0.0 - value, 0.0 - high, 0.0 - low))
-    return tr("{percent} lower", percent=_percent(value, low, high))
-
-
-def _percent(value: float, low: float, high: float) -> str:
-    return wording.estimate((value, low, high), "%", ".1f")
-
-
-def _case_label(row: "pd.Series[Any]", labels: Mapping[str, str], has_several_filters: bool) -> str:
-    return labels[row["case"]] + (f", {row['filter']}" if has_several_filters else "")
-
-
-def _capitalised(quantity: str) -> str:
-    """The name of a quantity as a sentence begins with it."""
-    name = tr(quantity)
-    return name[:1].upper() + name[1:]
-
-
-def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> Sentence:
-    """σ of the range at the end, for experiments without a second filter."""
-    row = tables.select_rows(curves, case=result.name, component="r").iloc[-1]
-    text = tr(
-        "{case}, {filter}: σ of the range at {t_s:g} s is {sigma}.",
-        case=key_labels.plain_case_label(result),
-        filter=row["filter"],
-        t_s=row["t_s"],
-        sigma=wording.estimate((row[key] for key in SIGMA), tr("m")),
-    )
-    return Sentence(text, sentences.intervals("curves", "sigma", row))
 
 
 def _best_variances(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
@@ -459,17 +223,17 @@ def _broken_model_sentences(results: Sequence[Result], tables_by_name: TablesByN
 
 def _worst_errors(rows: "pd.DataFrame", filter_name: str) -> Sentence:
     """The largest σ and the largest bias of a filter over the scans, as a clause."""
-    worst, largest_bias = (
-        rows.iloc[int(np.abs(tables.exact_first(rows, name, f"exact_{name}")).argmax())] for name in ("sigma", "bias")
-    )
+    worst, sigma = compared_value.extreme(rows, SIGMA)
+    bias = tables.exact_first(rows, "bias", "exact_bias")
+    largest_bias = int(np.abs(bias).argmax())
     text = tr(
         "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias:.4g} m at {bias_t_s:g} s",
-        sigma=wording.estimate((worst[key] for key in SIGMA), tr("m")),
+        sigma=sigma.text(tr("m")) + sigma.choice_remark(),
         t_s=worst["t_s"],
-        bias=largest_bias["bias"],
-        bias_t_s=largest_bias["t_s"],
+        bias=bias[largest_bias],
+        bias_t_s=rows["t_s"].iloc[largest_bias],
     )
-    return Sentence(f"{filter_name}: {text}", sentences.intervals("curves", "sigma", worst))
+    return Sentence(f"{filter_name}: {text}", sigma.intervals)
 
 
 def _ambiguity_sentences(results: Sequence[Result]) -> list[Sentence]:

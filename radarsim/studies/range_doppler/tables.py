@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.report import case_selection, consistency_tables, key_labels, statistics
+from radarsim.report import case_selection, consistency_tables, interval_notes, key_labels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import package_filters, steady_state
 from radarsim.studies.range_doppler.study import RangeDopplerAxes
@@ -151,9 +151,7 @@ def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
     return float(t[first]) if first < len(t) else np.inf
 
 
-@table("curves")
-def _curves(result: Result) -> common.Columns:
-    """As everywhere."""
+def _case_curves(result: Result) -> common.Columns:
     variance = np.diagonal(result.axes.believed, axis1=2, axis2=3)
     if has_individual_gains(result):
         with np.errstate(invalid="ignore"):
@@ -161,9 +159,21 @@ def _curves(result: Result) -> common.Columns:
     return common.curve_columns(result, np.sqrt(variance))
 
 
+@table.add_of_all_cases("curves")
 def curves(results: Sequence[Result]) -> "pd.DataFrame":
-    """The table `curves` alone."""
-    return common.join_columns(map(_curves, results))
+    """As everywhere; where plots may be missed, rows that few realisations decide are marked though σ is exact."""
+    table = common.join_columns(map(_case_curves, results))
+    return _with_notes(table, table, results)
+
+
+def _with_notes(table: "pd.DataFrame", curves: "pd.DataFrame", results: Sequence[Result]) -> "pd.DataFrame":
+    """Curves or gains with notes on heavy tails in the cases whose plots may be missed."""
+    missing = table["case"].isin([result.name for result in results if has_individual_gains(result)]).to_numpy()
+    if not missing.any():
+        return table
+    notes = interval_notes.heavy_tail_notes(*interval_notes.estimate_counts(table, {"curves": curves}, results))
+    notes = np.where(missing, notes, "")
+    return table.assign(note=notes) if (notes != "").any() else table
 
 
 @table("consistency")
@@ -234,7 +244,9 @@ def _radar(result: Result) -> common.Columns:
 @table.add_of_all_cases("gains")
 def _gains_where_missed(results: Sequence[Result]) -> "pd.DataFrame | None":
     """As everywhere; where plots may be missed, of realisations in which both filters have an estimate."""
-    return gains(results) if any(has_individual_gains(result) for result in results) else None
+    if not any(has_individual_gains(result) for result in results):
+        return None
+    return _with_notes(gains(results), common.join_columns(map(_case_curves, results)), results)
 
 
 tables = table.make

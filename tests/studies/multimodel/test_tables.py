@@ -18,7 +18,8 @@ from radarsim.papers.verdict_rule import CONFIRMED
 from radarsim.report import typeset
 from radarsim.report.drawing import canvas as drawing_canvas
 from radarsim.report.drawing.model import Note
-from radarsim.studies.multimodel import STUDY, answer
+from radarsim.report.statistics import Estimate
+from radarsim.studies.multimodel import STUDY, answer, stage_ranking
 from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, rounding
 
@@ -146,7 +147,26 @@ def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     assert first.endswith(f"; next {second}, {more:.2g} %.")
 
 
-def test_answer_on_several_cases_is_one_sentence():
+def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
+    """Filters that are equal, or whose order another seed may turn, are named together; nothing is called closest."""
+    names, gains = ["a", "same", "near", "far"], {"same": (0, 0), "near": (-2.99, 2.7), "far": (5, 9)}
+    stages = pd.DataFrame({"filter": names, "sigma": [10.0, 10.0, 10.01, 11.0]})
+    stages = stages.assign(case="one", stage="start", sigma_lo=1.0, sigma_hi=99.0, component="y", unit="m")
+
+    def paired_gain(result, stage, name, other, component="y"):
+        low, high = gains[other]
+        return Estimate((low + high) / 2, low, high)
+
+    monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
+    case = SimpleNamespace(name="one", swept_values=(), spec=SimpleNamespace(device=""))
+    assert stage_ranking.least_filters(case, stages, stages.iloc[0]) == "a = same (not distinguished from it: near)"
+    sentence, *_ = answer_texts(answer, [case], {"stages": stages})
+    assert sentence.startswith(
+        "Least σ of the height by stage: start: a = same (not distinguished from it: near), 10 m"
+    )
+
+
+def test_answer_on_several_cases_is_one_sentence(monkeypatch):
     """Of the filters that all cases have; one that is best everywhere is never above the least."""
     rows = [  # a is 10 % above the least, b up to 100 %
         *(("one", "start", "a", 11.0), ("one", "start", "b", 10.0), ("one", "start", "only here", 1.0)),
@@ -155,6 +175,7 @@ def test_answer_on_several_cases_is_one_sentence():
     columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
     stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
     cases = [SimpleNamespace(name=name, swept_values=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
+    monkeypatch.setattr(stage_ranking, "paired_gain", lambda *_: Estimate(9.0, 8.0, 10.0))
     (sentence,) = answer_texts(answer, cases, {"stages": stages})
     assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in sentence
     single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})

@@ -1,0 +1,124 @@
+"""What sentences say of a quantity of a row: the exact value, else a paired one, else the measured one.
+
+Answers, headlines, captions and rankings take their numbers from here, so that the sentences of one page name the same
+scan and the same value. An extreme of measured values is chosen by their noise: it has an interval that holds for all
+values among which it was chosen."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import tr
+from radarsim.report import sentences, statistics, tables, wording
+from radarsim.report.quantities import GAIN, SIGMA, Quantity
+from radarsim.report.statistics import Estimate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Row = Any  # a row of a table: a Series, or a mapping by column
+WIDEN = {
+    "size": statistics.simultaneous_sizes,
+    "gain": statistics.simultaneous_gains,
+    "share": statistics.simultaneous_shares,
+}
+
+
+@dataclass(frozen=True)
+class ComparedValue:
+    """A value in sentences, with its 95 % interval unless it is exact, and the intervals of tables that it rests on."""
+
+    estimate: Estimate
+    is_exact: bool
+    intervals: tuple[sentences.MeasuredInterval, ...] = ()
+    looks: int = 1  # measured values among which it was chosen, for all of which its interval holds
+    kind: Literal["size", "gain", "share"] = "size"
+
+    @property
+    def value(self) -> float:
+        return float(self.estimate.value)
+
+    def chosen_among(self, looks: int) -> "ComparedValue":
+        """The same value as an extreme of so many measured ones; an exact one was not chosen by noise."""
+        if self.is_exact or looks < 2:
+            return self
+        return replace(self, estimate=WIDEN[self.kind](self.estimate, looks), looks=looks)
+
+    def mapped(self, function: Callable[[float], float]) -> "ComparedValue":
+        """A monotonic function of the value, with its interval."""
+        low, high = sorted(function(float(end)) for end in self.estimate[1:])
+        return replace(self, estimate=Estimate(function(self.value), low, high))
+
+    def text(self, unit: str = "", form: str = ".4g") -> str:
+        """12.3 m [12, 12.6], or 12.3 m (exact)."""
+        if not self.is_exact:
+            return wording.estimate(self.estimate, unit, form)
+        value = numeral(format(self.value, form)).replace("inf", "∞")
+        return tr("{value} (exact)", value=" ".join(filter(None, (value, unit))))
+
+    def choice_remark(self) -> str:
+        """In brackets, among how many measured values it was chosen; empty where it was not, or has no interval."""
+        if self.looks < 2 or np.isnan(self.estimate.lo):
+            return ""
+        return " " + tr("(interval for all {count} compared)", count=self.looks)
+
+
+def row_value(row: Row, quantity: Quantity = SIGMA) -> ComparedValue:
+    """The exact value of a quantity in a row, else the measured one with its interval."""
+    kind: Any = "gain" if quantity.paired else "share" if quantity.kind == "share" else "size"
+    exact = float(row.get(quantity.known, np.nan))
+    if not np.isnan(exact):
+        return ComparedValue(Estimate(exact, exact, exact), True, kind=kind)
+    estimate = Estimate(*(float(row[name]) for name in (quantity.value, *quantity.ends)))
+    rests_on = sentences.intervals(quantity.table, quantity.ends[0].removesuffix("_lo"), row) if has_label(row) else ()
+    return ComparedValue(estimate, False, rests_on, kind=kind)
+
+
+def has_label(row: Row) -> bool:
+    """Whether a row knows its label in its table."""
+    return getattr(row, "name", None) is not None
+
+
+def paired_sigma(baseline_sigma: float, gain_row: Row) -> ComparedValue:
+    """σ of a filter from the exact σ of its baseline and the paired gain over the same realisations."""
+    gain = row_value(gain_row, GAIN)
+    low, high = (baseline_sigma * (1 - gain.estimate[i] / 100) for i in (2, 1))
+    return ComparedValue(Estimate(baseline_sigma * (1 - gain.value / 100), low, high), gain.is_exact, gain.intervals)
+
+
+def sigma_value(row: Row, tables_by_name: "Mapping[str, pd.DataFrame]") -> ComparedValue:
+    """σ of a row of `curves`: exact; else by the paired gain over a baseline with an exact σ, where that is known
+    better and both have an estimate in the same realisations; else as measured."""
+    measured = row_value(row)
+    if measured.is_exact:
+        return measured
+    labels = {name: row[name] for name in ("case", "component", "k")}
+    curves = tables.select_rows(tables_by_name["curves"], **labels).set_index("filter")
+    for _, gain_row in tables.select_rows(tables_by_name["gains"], filter=row["filter"], **labels).iterrows():
+        baseline = curves.loc[gain_row["baseline"]]
+        if baseline["exact_sigma"] > 0 and baseline["n"] == row["n"]:
+            paired = paired_sigma(float(baseline["exact_sigma"]), gain_row)
+            if np.ptp(paired.estimate[1:]) < np.ptp(measured.estimate[1:]):
+                measured = paired
+    return measured
+
+
+def extreme(rows: "pd.DataFrame", quantity: Quantity, largest: bool = True) -> "tuple[pd.Series[Any], ComparedValue]":
+    """The row with the largest or the smallest value, exact values first, and its value.
+
+    Of measured values the interval is one that holds for all that were looked at."""
+    exact = rows.get(quantity.known, rows[quantity.value] * np.nan).to_numpy(dtype=float)
+    decides = np.where(np.isnan(exact), rows[quantity.value].to_numpy(dtype=float), exact)
+    row = rows.iloc[int(np.nanargmax(decides) if largest else np.nanargmin(decides))]
+    return row, row_value(row, quantity).chosen_among(int(np.isnan(exact).sum()))
+
+
+def are_distinguished(first: ComparedValue, second: ComparedValue) -> bool:
+    """Whether two values that are not paired differ by more than their noise."""
+    if first.is_exact and second.is_exact:
+        return first.value != second.value
+    difference = statistics.difference(first.estimate, second.estimate)
+    return bool(difference.lo > 0 or difference.hi < 0)

@@ -1,0 +1,245 @@
+"""The answer's sentences on gains of observing the velocity, component by component; of a single filter on its σ."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.config.experiment import Case
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import join_names, tr
+from radarsim.report import case_selection, compared_value, gain_sentences, key_labels, sentences, tables
+from radarsim.report.compared_value import ComparedValue
+from radarsim.report.quantities import GAIN, RADIAL
+from radarsim.report.sentences import Sentence
+from radarsim.studies.range_doppler.config import configured_variance
+from radarsim.studies.range_doppler.study import prepare
+from radarsim.studies.range_doppler.tables import Result, follows_the_model, steady_sigma
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TablesByName = Mapping[str, "pd.DataFrame"]
+LONG_RUN_MARGIN = 1.0  # per cent: a gain further than this from that of the long run has not settled
+MIN_LOSS = 1.0  # per cent: from this loss on a case's worst gain is in the answer
+
+
+def answer_gains(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """A sentence on the gains in each component; of an experiment with a single filter one on its σ."""
+    unswept_results = case_selection.unswept_cases(results)
+    unswept_gains = tables_by_name["gains"]
+    unswept_gains = unswept_gains[unswept_gains["case"].isin([result.name for result in unswept_results])]
+    gains, all_gains = (tables.group_by(rows, "component") for rows in (unswept_gains, tables_by_name["gains"]))
+    labels = {result.name: key_labels.plain_case_label(result) for result in results}
+    of_components = [
+        _gain_sentence(unswept_results, gains[(component.name,)], all_gains[(component.name,)], component.words, labels)
+        for component in RADIAL
+        if (component.name,) in gains
+    ]
+    return of_components or [_sigma_sentence(results[0], tables_by_name["curves"])]
+
+
+def _gain_sentence(
+    results: Sequence[Result],
+    gains: "pd.DataFrame",
+    all_gains: "pd.DataFrame",
+    quantity: str,
+    labels: Mapping[str, str],
+) -> Sentence:
+    """The gain in one quantity at the last scan, or at the last common time.
+
+    gains: of the cases in the sentence; all_gains: of all cases, among which the greatest loss is looked for."""
+    if all(gain_sentences.is_equal(compared_value.row_value(row, GAIN)) for _, row in all_gains.iterrows()):
+        return _equality(results, all_gains, quantity)
+    compared, time_text = _rows_compared(gains)
+    baseline = _than_baseline(results)
+    has_several_filters = gains["filter"].nunique() > 1
+    if len(compared) > 1:
+        lowest, highest = (compared_value.extreme(compared, GAIN, largest) for largest in (False, True))
+        clauses = [
+            _range_of_gains(compared, lowest, highest, time_text, quantity, baseline, labels, has_several_filters)
+        ]
+        shown = lowest[0]
+        long_run = [
+            f"{gain} ({_case_label(row, labels, has_several_filters)})"
+            for row in (lowest[0], highest[0])
+            if (gain := _long_run_gain(results, row))
+        ]
+        clauses += _long_run_clause(join_names(long_run))
+    else:
+        shown = compared.iloc[0]
+        final_gain = compared_value.row_value(shown, GAIN)
+        text = tr(
+            "{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}",
+            quantity=_capitalised(quantity),
+            t_s=shown["t_s"],
+            gain=gain_sentences.comparison_text(final_gain),
+            base=baseline,
+        )
+        clauses = [Sentence(text, final_gain.intervals), *_long_run_clause(_long_run_gain(results, shown))]
+        best, best_gain = compared_value.extreme(gains, GAIN)
+        if best["k"] != shown["k"]:
+            text = tr("at best {gain}, at {t_s:g} s", gain=_extreme_text(best_gain), t_s=best["t_s"])
+            clauses.append(Sentence(text, best_gain.intervals))
+    clauses += _worst_loss(all_gains, shown, labels)
+    sentence = sentences.join("; ", clauses)
+    return sentence.with_text(f"{sentence.text}.")
+
+
+def _equality(results: Sequence[Result], gains: "pd.DataFrame", quantity: str) -> Sentence:
+    """That filters have the same σ at every scan."""
+    value = compared_value.row_value(gains.iloc[0], GAIN)
+    text = tr(
+        "{quantity}: σ is equal to that {base} at every scan ({known}).",
+        quantity=_capitalised(quantity),
+        base=_with_baseline(results),
+        known=tr("exact") if value.is_exact else gain_sentences.unseen_text(min(result.count for result in results)),
+    )
+    return Sentence(text)
+
+
+def _extreme_text(gain: ComparedValue) -> str:
+    return gain_sentences.comparison_text(gain) + gain.choice_remark()
+
+
+def _rows_compared(gains: "pd.DataFrame") -> "tuple[pd.DataFrame, str]":
+    """The rows at which cases are compared, one for each case and filter, and when that is, in words.
+
+    The last scan, where all cases end together; else the last time that all of them have in common."""
+    final = gains.loc[gains.groupby(["case", "filter"], sort=False)["k"].idxmax()]
+    earliest, latest = final["t_s"].min(), final["t_s"].max()
+    if earliest == latest:
+        return final, tr("at {t_s:g} s", t_s=earliest)
+    times = [set(np.round(rows["t_s"], 6)) for rows in tables.group_by(gains, "case", "filter").values()]
+    shared_times = set.intersection(*times) - {0.0}
+    if not shared_times:
+        return final, tr("at the last scan (after {early:g} to {late:g} s)", early=earliest, late=latest)
+    time = max(shared_times)
+    time_text = tr("at {t_s:g} s, the last time that all have in common,", t_s=time)
+    return gains[np.round(gains["t_s"], 6) == time], time_text
+
+
+def _range_of_gains(
+    compared: "pd.DataFrame",
+    lowest: "tuple[pd.Series[Any], ComparedValue]",
+    highest: "tuple[pd.Series[Any], ComparedValue]",
+    time_text: str,
+    quantity: str,
+    baseline: str,
+    labels: Mapping[str, str],
+    has_several_filters: bool,
+) -> Sentence:
+    """The least and the largest of several gains, and whether they differ significantly."""
+    fields = {
+        "quantity": _capitalised(quantity),
+        "when": time_text,
+        "base": baseline,
+        "least": _extreme_text(lowest[1]),
+        "low": _case_label(lowest[0], labels, has_several_filters),
+        "most": _extreme_text(highest[1]),
+        "high": _case_label(highest[0], labels, has_several_filters),
+    }
+    values = [compared_value.row_value(row, GAIN).estimate for _, row in compared.iterrows()]
+    if max(value.lo for value in values) <= min(value.hi for value in values):
+        text = tr(
+            "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), not significantly different from "
+            "each other, {base}",
+            **fields,
+        )
+    else:
+        text = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}", **fields)
+    return Sentence(text, (*lowest[1].intervals, *highest[1].intervals))
+
+
+def _long_run_clause(gains: str) -> list[Sentence]:
+    """The clause on gains of the long run, which are exact, where there are such."""
+    return [Sentence(tr("not settled: {gains} in the long run", gains=gains))] if gains else []
+
+
+def _long_run_gain(results: Sequence[Result], row: "pd.Series[Any]") -> str:
+    """The exact gain in the long run, in words; empty where the gain in `row` has settled, or its limit is unknown.
+
+    Where plots may be missed, both are those of the same radar without misses."""
+    result = next(result for result in results if result.name == row["case"])
+    radar = result.spec.radar.model_copy(update={"detection_probability": 1.0})
+    if not follows_the_model(result) or not radar.as_the_papers:
+        return ""
+    axes = result.axes
+    if not axes.plain:
+        spec = result.spec.model_copy(update={"radar": radar})
+        axes = prepare(Case(result.name, key_labels.config_stem(result), result.study, spec, (), 1, 1)).axes
+
+    filter_index = axes.filters.index(row["filter"])
+    component_index = [name for name, _ in axes.components].index(row["component"])
+    sigma, baseline_sigma = steady_sigma(axes, filter_index), steady_sigma(axes, axes.baseline)
+    if sigma is None or baseline_sigma is None:
+        return ""
+    limit = 100 * (1 - float(sigma[component_index] / baseline_sigma[component_index]))
+    gain_now = axes.exact_gains[filter_index, row["k"] - 1, component_index]
+    if not abs(gain_now - limit) > LONG_RUN_MARGIN:  # also where the gain is not a number
+        return ""
+
+    percent = f"{numeral(f'{abs(limit):.1f}')} %"
+    text = tr("{percent} lower", percent=percent) if limit > 0 else tr("{percent} higher", percent=percent)
+    return text if result.axes.plain else tr("{gain} with every plot", gain=text)
+
+
+def _worst_loss(all_gains: "pd.DataFrame", sentence_row: "pd.Series[Any]", labels: Mapping[str, str]) -> list[Sentence]:
+    """The greatest loss of any case, unless it may be none or is the gain already given."""
+    worst, loss = compared_value.extreme(all_gains, GAIN, largest=False)
+    if not loss.estimate.hi < -MIN_LOSS or worst.name == sentence_row.name:
+        return []
+    has_several_filters = all_gains["filter"].nunique() > 1
+    fields = {"gain": _extreme_text(loss), "t_s": worst["t_s"]}
+    if has_several_filters or all_gains["case"].nunique() > 1:
+        label = _case_label(worst, labels, has_several_filters)
+        text = tr("at worst {gain}, at {t_s:g} s, with {who}", who=label, **fields)
+    else:
+        text = tr("at worst {gain}, at {t_s:g} s", **fields)
+    return [Sentence(text, loss.intervals)]
+
+
+def _than_baseline(results: Sequence[Result]) -> str:
+    """The clause on what the gains are relative to, and of which realisations where plots may be missed."""
+    baseline = tr("than {base}", base=_with_baseline(results))
+    if any(result.spec.radar.detection_probability < 1 for result in results):
+        return tr("{base}, where both have an estimate", base=baseline)
+    return baseline
+
+
+def _with_baseline(results: Sequence[Result]) -> str:
+    """The baseline after `than`: `with range alone` if only the baseline filter observes no more."""
+    baselines = [result.spec.filters[result.axes.baseline] for result in results]
+    variances = {variance for variance in map(configured_variance, baselines) if isinstance(variance, float)}
+    range_filters = [f.name for result in results for f in result.spec.filters if f.observes == ("range",)]
+    if all(f.observes == ("range",) for f in baselines) and len(range_filters) == len(baselines):
+        if len(variances) > 1:
+            return tr("with range alone at the same D_M")
+        return tr("with range alone")
+    if len({f.name for f in baselines}) == 1:
+        return tr("with filter '{filter}'", filter=baselines[0].name)
+    return tr("with the baseline filter")
+
+
+def _case_label(row: "pd.Series[Any]", labels: Mapping[str, str], has_several_filters: bool) -> str:
+    return labels[row["case"]] + (f", {row['filter']}" if has_several_filters else "")
+
+
+def _capitalised(quantity: str) -> str:
+    """The name of a quantity as a sentence begins with it."""
+    name = tr(quantity)
+    return name[:1].upper() + name[1:]
+
+
+def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> Sentence:
+    """σ of the range at the end, for experiments without a second filter."""
+    row = tables.select_rows(curves, case=result.name, component="r").iloc[-1]
+    sigma = compared_value.row_value(row)
+    text = tr(
+        "{case}, {filter}: σ of the range at {t_s:g} s is {sigma}.",
+        case=key_labels.plain_case_label(result),
+        filter=row["filter"],
+        t_s=row["t_s"],
+        sigma=sigma.text(tr("m")),
+    )
+    return Sentence(text, sigma.intervals)
