@@ -1,17 +1,21 @@
 """The types of keys, with their limits, and the definition of a key."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import pydantic
-from pydantic import AfterValidator, Field, Strict, StringConstraints
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, StringConstraints
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from radarsim.config.marks import OnlyForMark
 
+Item = TypeVar("Item")
+
 LARGEST = 1e18  # of any number; far beyond any sea, sky or signal, and its square and cube are still finite
 SMALLEST = 1e-18
+PLAIN_NAME = re.compile(r"\w[\w-]*")
 
 
 def _moderate(value: float) -> float:
@@ -44,6 +48,26 @@ def _no_formula(value: str) -> str:
     return value
 
 
+def _plain_name(value: str) -> str:
+    if not PLAIN_NAME.fullmatch(value):
+        raise PydanticCustomError("plain_name", "must be of letters, digits, _ and -")
+    return value
+
+
+def _number_or_name(value: Any) -> str:
+    """A whole number as text, or a plain name."""
+    text = str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+    if not isinstance(text, str) or not PLAIN_NAME.fullmatch(text):
+        raise PydanticCustomError("plain_name", "must be a whole number, or letters and digits, as 3 or 3a")
+    return text
+
+
+def _one_line(value: str) -> str:
+    if not value.isprintable():
+        raise PydanticCustomError("text", "must be printable text on one line")
+    return value
+
+
 Number = Annotated[float, Strict(), AfterValidator(_moderate)]
 Positive = Annotated[float, Strict(), Field(gt=0), AfterValidator(_moderate)]
 NonNegative = Annotated[float, Strict(), Field(ge=0), AfterValidator(_moderate)]
@@ -53,6 +77,11 @@ Flag = Annotated[bool, Strict()]
 Label = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=64), AfterValidator(_printable)]
 Name = Annotated[Label, AfterValidator(_no_formula)]
 Stem = Annotated[str, Strict(), StringConstraints(min_length=1, max_length=100)]
+PlainName = Annotated[Name, AfterValidator(_plain_name)]
+NumberOrName = Annotated[str, BeforeValidator(_number_or_name)]
+NonEmpty = Annotated[str, Strict(), StringConstraints(min_length=1)]
+Line = Annotated[str, Strict(), AfterValidator(_one_line)]
+NonEmptyTuple = Annotated[tuple[Item, ...], Field(min_length=1)]
 Anything = Annotated[Any, pydantic.WithJsonSchema({})]
 
 

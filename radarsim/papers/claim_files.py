@@ -18,7 +18,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from string import Template
@@ -27,159 +27,24 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList
-from radarsim.config.error_text import KeyPath, quoted_value
+from radarsim.config.error_text import KeyPath
 from radarsim.config.find_files import did_you_mean
-from radarsim.config.key_types import Anything, Flag, Name, Stem
 from radarsim.config.model import Model
 from radarsim.config.validate import validate
 from radarsim.config.yaml_io import parse_yaml, read_document
-from radarsim.errors import AUTHOR_ERRORS, ConfigError, MeasureError, RadarsimError
 from radarsim.papers import expected_ranges
 from radarsim.papers.claim import Claim, Part
-from radarsim.papers.evidence import Evidence, MissingEvidence, UnknownName, exact_number, has_interval
-from radarsim.papers.interpretations import (
-    LEADING_COLUMNS,
-    TRAILING_COLUMNS,
-    Alternative,
-    Choice,
-    ImpossibleInterpretation,
-)
-from radarsim.report.statistics import Estimate
-from radarsim.user_code import errors as user_code_errors
+from radarsim.papers.claim_keys import ChoiceKeys, ChoicesKeys, ClaimKeys, FileKeys, OwnFileKeys, PartKeys
+from radarsim.papers.evidence import Evidence
+from radarsim.papers.interpretations import LEADING_COLUMNS, TRAILING_COLUMNS, Alternative, Choice
+from radarsim.papers.measure_call import MeasureCall
 
 KeysModel = TypeVar("KeysModel", bound=Model)
 Declaration = TypeVar("Declaration", Claim, Choice)
 # The last is the name of a column of interpretations.csv in earlier versions.
 RESERVED_CHOICE_KEYS = (*LEADING_COLUMNS, *TRAILING_COLUMNS, "reading")
+MAX_PARTS = 10_000  # that a part of the text makes by `each`
 TYPE_WORDS = {str: "text", float: "a number", int: "a whole number", bool: "true or false"}
-
-
-class PartKeys(Model):
-    """A part of a claim; see `claim.Part`."""
-
-    what: str
-    of: Anything
-    measure: Anything
-    expected: Anything
-    unit: str = ""
-    scale: Anything = None
-    ceiling: Anything = None
-    statement: str = ""
-    number: str = ""
-    variant: str = ""
-    against_print: Anything = False
-    asserted: Flag = True
-    each: dict[str, Anything] = {}  # noqa: RUF012  (pydantic copies it)
-
-
-class ClaimKeys(Model):
-    """A claim; see `claim.Claim`. parts_of: the claims whose parts it has too."""
-
-    id: Anything
-    place: str
-    statement: str
-    interpretation: str = ""
-    reading: str = ""  # the key's name in earlier versions
-    config: Stem | None = None
-    original: str = ""
-    extension: Flag = False
-    reported: Flag = False
-    unstated: str = ""
-    joint: Flag = False
-    internal: Flag = False
-    parts_of: tuple[str, ...] = ()
-    parts: tuple[PartKeys, ...] = ()
-
-
-class AlternativeKeys(Model):
-    """A way to take a choice; see `Alternative`."""
-
-    name: str
-    kind: Literal["E", "U", "N"]
-    reason: str
-    sets: dict[str, Anything] = {}  # noqa: RUF012
-
-
-class ChoiceKeys(Model):
-    """An open point of a paper; see `Choice`. claims: without the paper; english: where the paper is not silent."""
-
-    key: Stem
-    asks: str
-    original: str
-    english: str = ""
-    claims: Anything = ()
-    contradicts: Flag = False
-    alternatives: tuple[AlternativeKeys, ...]
-
-
-class ChoicesKeys(Model):
-    """The open points of a paper, the file interpretations.yaml."""
-
-    paper: Name
-    names: dict[str, Anything] = {}  # noqa: RUF012
-    choices: tuple[ChoiceKeys, ...]
-
-
-class FileKeys(Model):
-    """The claims of a paper in one file; config: of those that name none. choices: as in interpretations.yaml."""
-
-    paper: Name
-    config: Stem
-    names: dict[str, Anything] = {}  # noqa: RUF012
-    claims: tuple[ClaimKeys, ...]
-    choices: tuple[ChoiceKeys, ...] = ()
-
-
-class OwnFileKeys(FileKeys):
-    """Claims of a user on a config that is named elsewhere, or on a table."""
-
-    config: Stem | None = None  # type: ignore[assignment]
-
-
-@dataclass(frozen=True)
-class MeasureCall:
-    """A function by name, or a method of the evidence where function is None, with its cases and arguments."""
-
-    name: str
-    function: Callable[..., Any] | None
-    cases: tuple
-    arguments: Mapping[str, Any]
-    source: str = field(default="", compare=False)  # where it is written, for messages
-
-    def __call__(self, evidence: Any) -> Estimate:
-        """The measured value; a plain number is without noise. Raises MeasureError where the function fails."""
-        try:
-            if self.function is None:
-                value = getattr(evidence, self.name)(*self.cases, **self.arguments)
-            else:
-                value = self.function(evidence, *self.cases, **self.arguments)
-        except AUTHOR_ERRORS as error:
-            is_our_error = isinstance(error, RadarsimError) and not isinstance(error, ConfigError)
-            if is_our_error or (
-                isinstance(error, MissingEvidence | ImpossibleInterpretation) and not self._misspelt(error)
-            ):
-                raise
-            raise MeasureError(f"{self.source}: {self.name}: {user_code_errors.error_summary(error)}") from error
-        if isinstance(value, Estimate):
-            return value
-        with suppress(TypeError, ValueError):
-            if not isinstance(value, str | bytes):
-                return exact_number(value)
-        raise MeasureError(f"{self.source}: {self.name}: must give an Estimate or a number, got {quoted_value(value)}")
-
-    def _misspelt(self, error: Exception) -> bool:
-        """Whether a function of a package asks for a name that the paper's own case does not have."""
-        of_a_package = self.function is not None and not self.function.__module__.startswith("radarsim.")
-        return of_a_package and isinstance(error, UnknownName)
-
-    def number(self, evidence: Any) -> float:
-        """Its value alone."""
-        return float(self(evidence).value)
-
-    def exact_number(self, evidence: Any) -> float:
-        """Its value where that is exact, else NaN."""
-        estimate = self(evidence)
-        return math.nan if has_interval(estimate) else float(estimate.value)
 
 
 def claims_of(file: Callable[[str], ModuleType]) -> Sequence[Claim]:
@@ -293,24 +158,30 @@ class _Reader:
         names = self._read_names(keys.names)
         parts: dict[str, list[Part]] = {}
         for i, claim_keys in enumerate(keys.claims):
-            if f"{keys.paper}.{claim_keys.id}" in parts:
+            claim_id = f"{keys.paper}.{claim_keys.id}"
+            if claim_id in parts:
                 self._add(("claims", i, "id"), "stands there already", claim_keys.id)
-            claim_parts = parts[f"{keys.paper}.{claim_keys.id}"] = [
-                part_keys
-                for name in claim_keys.parts_of
-                for part_keys in self._parts_of(name, parts, ("claims", i, "parts_of"))
-            ]
-            for j, part_keys in enumerate(claim_keys.parts):
-                claim_parts += self._parts(part_keys, names, ("claims", i, "parts", j))
-            fields = claim_keys.model_dump(exclude={"id", "config", "parts", "parts_of", "reading"})
-            fields["interpretation"] = claim_keys.interpretation or claim_keys.reading
-            fields["source"] = self._source(("claims", i, "config") if claim_keys.config else ("config",))
-            yield Claim(
-                f"{keys.paper}.{claim_keys.id}",
-                parts=tuple(claim_parts),
-                config=claim_keys.config or keys.config or "",
-                **fields,
-            )
+            parts[claim_id] = self._parts_of_claim(claim_keys, names, parts, ("claims", i))
+            yield self._claim(claim_id, claim_keys, keys.config, tuple(parts[claim_id]), ("claims", i))
+
+    def _parts_of_claim(
+        self, keys: ClaimKeys, names: Mapping[str, Any], earlier: Mapping[str, list[Part]], path: KeyPath
+    ) -> list[Part]:
+        """The parts of a claim, those of earlier claims that it names first."""
+        parts = [part for name in keys.parts_of for part in self._parts_of(name, earlier, (*path, "parts_of"))]
+        for j, part_keys in enumerate(keys.parts):
+            parts += self._parts(part_keys, names, (*path, "parts", j))
+        if not (keys.parts or keys.parts_of or keys.unstated):
+            self.fault((*path, "parts"), "must hold at least 1: what is measured, and what is expected")
+        return parts
+
+    def _claim(
+        self, claim_id: str, keys: ClaimKeys, config: str | None, parts: tuple[Part, ...], path: KeyPath
+    ) -> Claim:
+        fields = keys.model_dump(exclude={"id", "config", "parts", "parts_of", "reading"})
+        fields["interpretation"] = keys.interpretation or keys.reading
+        fields["source"] = self._source((*path, "config") if keys.config else ("config",))
+        return Claim(claim_id, parts=parts, config=keys.config or config or "", **fields)
 
     def choices(self, keys: ChoicesKeys | FileKeys) -> Iterator[Choice]:
         """The choices in their order."""
@@ -324,21 +195,37 @@ class _Reader:
             if choice_keys.key in earlier_keys:
                 self._add(("choices", i, "key"), "stands there already", choice_keys.key)
             earlier_keys.add(choice_keys.key)
-            claims = self._filled(choice_keys.claims, names, ("choices", i, "claims"))
-            claim_ids = [
-                claim_id
-                for alternative_keys in claims
-                for claim_id in (alternative_keys if isinstance(alternative_keys, tuple) else (alternative_keys,))
-            ]
+            claim_ids = self._claim_ids(choice_keys, names, ("choices", i, "claims"))
             yield Choice(
                 *(choice_keys.key, choice_keys.asks, choice_keys.original, choice_keys.english or choice_keys.original),
-                tuple(
-                    Alternative(**alternative_keys.model_dump(), source=self._source(("choices", i, "alternatives", j)))
-                    for j, alternative_keys in enumerate(choice_keys.alternatives)
-                ),
+                tuple(self._alternatives(choice_keys, ("choices", i, "alternatives"))),
                 tuple(f"{keys.paper}.{claim_id}" for claim_id in claim_ids),
                 choice_keys.contradicts,
             )
+
+    def _alternatives(self, keys: ChoiceKeys, path: KeyPath) -> Iterator[Alternative]:
+        """The alternatives of a choice, whose names must differ."""
+        names: set[str] = set()
+        for j, alternative_keys in enumerate(keys.alternatives):
+            if alternative_keys.name in names:
+                self._add((*path, j, "name"), "stands there already", alternative_keys.name)
+            names.add(alternative_keys.name)
+            yield Alternative(**alternative_keys.model_dump(), source=self._source((*path, j)))
+
+    def _claim_ids(self, keys: ChoiceKeys, names: Mapping[str, Any], path: KeyPath) -> list[Any]:
+        """The numbers of the claims that a choice affects; a name among them may stand for several."""
+        try:
+            values = self._filled(keys.claims, names, path)
+        except _UnknownNameError:
+            return []
+        lists = (
+            [value if isinstance(value, tuple) else (value,) for value in values] if isinstance(values, tuple) else []
+        )
+        claim_ids = [claim_id for members in lists for claim_id in members]
+        if not isinstance(values, tuple) or not all(isinstance(claim_id, int | str) for claim_id in claim_ids):
+            self._add(path, "must be a list of claims, by their id without the paper", keys.claims)
+            return []
+        return claim_ids
 
     def _read_names(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The values under `names`; each may use those before it."""
@@ -376,6 +263,9 @@ class _Reader:
                 )
                 raise _UnknownNameError
             axes.append([dict(zip(variables, row, strict=True)) for row in rows])
+        if not 1 <= (count := math.prod(map(len, axes))) <= MAX_PARTS:
+            self._add(path, f"makes {count:,} parts; allowed: 1 to {MAX_PARTS:,}", each)
+            raise _UnknownNameError
         for combination in itertools.product(*axes):
             yield {name: value for row in combination for name, value in row.items()}
 
@@ -384,27 +274,32 @@ class _Reader:
             key: self._filled(value, names, (*path, key)) for key, value in keys.model_dump(exclude={"each"}).items()
         }
         cases = fields.pop("of")
-        if not isinstance(cases, tuple):
-            self._add((*path, "of"), "must be a list of cases", keys.of)
+        if not isinstance(cases, tuple) or not cases:
+            message = "must hold at least 1 case" if cases == () else "must be a list of cases"
+            self._add((*path, "of"), message, keys.of)
             raise _UnknownNameError
         measure = self._call(fields.pop("measure"), self.measures, cases, (*path, "measure"))
-        words = fields.pop("expected")
-        expected = self._call(expected_ranges.with_further_arguments(words), self.ranges, (), (*path, "expected"))
+        expected_range = self._expected_range(fields.pop("expected"), (*path, "expected"))
         for key in ("scale", "ceiling"):
             if fields[key] is not None:
                 fields[key] = self._call(fields[key], self.measures, cases, (*path, key)).number
         exactly = self.functions.get(f"exact_{measure.name}")
         exact = replace(measure, name=f"exact_{measure.name}", function=exactly).exact_number if exactly else None
-        assert expected.function
+        return Part(cases, measure=measure, expected=expected_range, exact=exact, **fields)
+
+    def _expected_range(self, words: Any, path: KeyPath) -> expected_ranges.ExpectedRange:
+        """The range that words stand for."""
+        call = self._call(expected_ranges.with_further_arguments(words), self.ranges, (), path)
+        assert call.function  # a range is no method of evidence
         try:
-            expected_range = expected.function(**expected.arguments)
+            expected_range: expected_ranges.ExpectedRange = call.function(**call.arguments)
         except ValueError as error:
-            self._add((*path, "expected"), f"{expected.name}: {error}", words)
+            self._add(path, f"{call.name}: {error}", words)
             raise _UnknownNameError from None
         if not (expected_range.lo <= expected_range.hi and expected_range.margin > 0):
-            self._add((*path, "expected"), "must be a range from low to high with a margin > 0", expected_range.words)
+            self._add(path, "must be a range from low to high with a margin > 0", expected_range.words)
             raise _UnknownNameError
-        return Part(cases, measure=measure, expected=expected_range, exact=exact, **fields)
+        return expected_range
 
     def _filled(self, value: Any, names: Mapping[str, Any], path: KeyPath) -> Any:
         """A value with `$name` replaced, and tuples in place of lists."""
@@ -436,27 +331,32 @@ class _Reader:
             self._add(path, f"must be one of them{_allowed_names(str(name), functions)}", value)
             raise _UnknownNameError
         function, path = functions[name], (*path, name) if value is not name else path
-        parameters = _parameters_of(function)
-        names = list(parameters)[0 if functions is self.ranges else 1 :]
+        names = list(_parameters_of(function))[0 if functions is self.ranges else 1 :]
         if not isinstance(arguments, dict):
             if functions is not self.ranges:
                 self._add(path, "must have its arguments by name", arguments)
                 raise _UnknownNameError
             arguments = dict(zip(names, arguments if isinstance(arguments, tuple) else (arguments,), strict=False))
+        positional = () if functions is self.ranges else (None, *cases)
         try:
-            positional = () if functions is self.ranges else (None, *cases)
             inspect.signature(function).bind(*positional, **arguments)
         except TypeError as error:
             self._add(path, f"{name}({', '.join(names)}): {error}", value)
             raise _UnknownNameError from None
+        self._check_types(function, arguments, path, functions is self.ranges and _has_falling_ends(arguments))
+        called = self.functions.get(name) if functions is self.measures else function
+        return MeasureCall(name, called, cases, arguments, self._source(path))
+
+    def _check_types(
+        self, function: Callable[..., Any], arguments: Mapping[str, Any], path: KeyPath, falls: bool
+    ) -> None:
+        """Note arguments of a wrong type. falls: they are the ends of a range, in falling order."""
+        parameters = _parameters_of(function)
         for key, argument in arguments.items():
             wrong_type = _wrong_type(parameters[key].annotation, argument) if key in parameters else ""
             if wrong_type:
-                hint = "; its ends must rise" if functions is self.ranges and _has_falling_ends(arguments) else ""
-                self._add((*path, key), f"must be {wrong_type}{hint}", argument)
+                self._add((*path, key), f"must be {wrong_type}{'; its ends must rise' if falls else ''}", argument)
                 raise _UnknownNameError
-        called = self.functions.get(name) if functions is self.measures else function
-        return MeasureCall(name, called, cases, arguments, self._source(path))
 
     def _source(self, path: KeyPath) -> str:
         return str(self.document.origin(path))
@@ -471,7 +371,7 @@ def _parameters_of(function: Callable[..., Any]) -> Mapping[str, inspect.Paramet
 
 
 def _allowed_names(name: str, names: Mapping[str, Any]) -> str:
-    return f"{did_you_mean(name, list(names)) or ';'} allowed: {', '.join(names)}"
+    return f"{did_you_mean(name, list(names)) or ';'} allowed: {', '.join(names) or 'none'}"
 
 
 def _has_falling_ends(ends: Mapping[str, Any]) -> bool:

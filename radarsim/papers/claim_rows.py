@@ -168,7 +168,9 @@ def unit_after(value: float, unit: str) -> str:
         return plural("scan", "scans", count)
     if unit == "plots":
         return plural("plot", "plots", count)
-    return plural("point", "points", count) if unit == "points" else tr(unit)
+    if unit == "points":
+        return plural("point", "points", count)
+    return "" if unit == "1" else tr(unit)
 
 
 def expected_words(words: str, unit: str = "") -> str:

@@ -10,7 +10,7 @@ from typing import Any
 from radarsim.api import configs
 from radarsim.config.identity import identity_keys
 from radarsim.papers.claim import Claim, Part
-from radarsim.papers.claim_files import MeasureCall
+from radarsim.papers.measure_call import MeasureCall
 from radarsim.studies.sources import RADARSIM, code_digest
 
 CLAIMS_TEXT = "claims_yaml"  # the attribute of a study in one file that holds its claims

@@ -2,6 +2,7 @@
 
 import inspect
 import math
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from radarsim.papers.verdict_rule import ABOUT, GRID, LIMIT, MATERIAL, PRINT, SAME, SAMPLE, Z95
@@ -31,6 +32,14 @@ def last_digit_unit(text: str) -> float:
     return 10.0 ** -len(text.partition(".")[2])
 
 
+def printed_number(text: str) -> float:
+    """A number as it is printed. Raises ValueError for any other text."""
+    with suppress(ValueError):
+        if math.isfinite(number := float(text)):
+            return number
+    raise ValueError("must be a number as it is printed, such as 0.374")
+
+
 def printed(
     text: str,
     step: float | None = None,
@@ -49,7 +58,7 @@ def printed(
     factor, error = _printed_standard_error(runs, variance, se)
     rounding = (last_digit_unit(text) if step is None else step) / math.sqrt(12)  # of a number within half a step
     margin = factor * math.hypot(error, rounding)
-    value = float(text)
+    value = printed_number(text)
     return ExpectedRange(value, value, f"{text} ± {margin:.2g}", margin, SAMPLE, (value - margin, value + margin))
 
 
@@ -76,17 +85,19 @@ def between(low: str, high: str, step: float | None = None) -> ExpectedRange:
 def _inclusive_range(low: str, high: str, words: str, step: float | None, kind: str) -> ExpectedRange:
     half = max(last_digit_unit(low), last_digit_unit(high)) / 2
     margin = half if step is None else step / 2
-    strict = (float(low) - last_digit_unit(low) / 2, float(high) + last_digit_unit(high) / 2)
-    return ExpectedRange(float(low), float(high), f"{words} ± {margin:g}", margin, kind, strict)
+    bottom, top = printed_number(low), printed_number(high)
+    strict = (bottom - last_digit_unit(low) / 2, top + last_digit_unit(high) / 2)
+    return ExpectedRange(bottom, top, f"{words} ± {margin:g}", margin, kind, strict)
 
 
 def about(low: str, high: str | None = None, margin: float | None = None, kind: str = ABOUT) -> ExpectedRange:
     """A positive number or range with "about"; margin where the paper or its grid is coarser than 10 %."""
     high = high or low
     words = f"about {low}" + (f" to {high}" if high != low else "")
-    wide = 0.1 * float(high) if margin is None else margin
-    strict = (0.9 * float(low), 1.1 * float(high))
-    return ExpectedRange(float(low), float(high), f"{words} ± {wide:g}", wide, kind, strict)
+    bottom, top = printed_number(low), printed_number(high)
+    wide = 0.1 * top if margin is None else margin
+    strict = (0.9 * bottom, 1.1 * top)
+    return ExpectedRange(bottom, top, f"{words} ± {wide:g}", wide, kind, strict)
 
 
 def _half_last_digit(value: float) -> float:

@@ -15,8 +15,9 @@ from radarsim.config.validate import validate
 from radarsim.errors import ConfigError
 from radarsim.papers import one_file_measures
 from radarsim.papers.claim import Claim, PaperClaims
-from radarsim.papers.claim_files import MeasureCall, parse_claims
+from radarsim.papers.claim_files import parse_claims
 from radarsim.papers.interpretations import Choice, ImpossibleInterpretation, Interpretation, PaperInterpretations
+from radarsim.papers.measure_call import MeasureCall
 from radarsim.papers.one_file_measures import gain, gain_change, has_values, unknown_key
 from radarsim.papers.paper_cases import ShippedCases
 from radarsim.studies.onefile import OneFile

@@ -1,6 +1,7 @@
 """Claims that a user writes: on a stored run of any config, and on a table that radarsim did not make."""
 
 import codecs
+import csv
 import importlib.util
 import os
 from collections.abc import Iterable, Mapping
@@ -10,6 +11,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api.stored_runs import stored_result
+from radarsim.config.error_text import quoted_value
 from radarsim.config.experiment import Experiment
 from radarsim.errors import AUTHOR_ERRORS, ConfigError
 from radarsim.papers import one_file_measures, table_measures
@@ -48,19 +50,39 @@ def _rows(claim: Claim, evidence: Any, config: str) -> list[dict[str, Any]]:
 
 
 def _as_table(table: Any) -> "pd.DataFrame":
-    if hasattr(table, "reset_index"):
+    if isinstance(table, str | os.PathLike):
+        return _read_csv(Path(table))
+    if hasattr(table, "columns") and hasattr(table, "reset_index"):
         has_names = any(name is not None for name in table.index.names)
         frame_of_user: pd.DataFrame = table.reset_index() if has_names else table
-        return frame_of_user
+        return _checked_table(frame_of_user, "table")
     if isinstance(table, Mapping):
-        return frame({name: list(column) for name, column in table.items()})
+        try:
+            return frame({name: list(column) for name, column in table.items()})
+        except (TypeError, ValueError) as error:
+            raise ConfigError(f"table: must have columns of one length: {error}") from error
+    raise ConfigError(f"table: must be a DataFrame, its columns, or a CSV file, got {type(table).__name__}")
+
+
+def _read_csv(file: Path) -> "pd.DataFrame":
     try:
-        content = atomic_files.read(Path(table)).removeprefix(codecs.BOM_UTF8)  # which spreadsheets write
-        return csv_text.from_csv(content.rstrip(b"\r\n"))
+        content = atomic_files.read(file).removeprefix(codecs.BOM_UTF8)  # which spreadsheets write
+        first_line = content.partition(b"\n")[0]
+        if b"," not in first_line and (b";" in first_line or b"\t" in first_line):
+            raise ConfigError(f"{file}: is no table in CSV with commas: its first line has another separator")
+        return _checked_table(csv_text.from_csv(content.rstrip(b"\r\n")), f"{file}:1")
     except OSError as error:
-        raise ConfigError(f"{table}: cannot be read: {error.strerror}") from error
-    except ValueError as error:
-        raise ConfigError(f"{table}: is no table in CSV with commas: {error}") from error
+        raise ConfigError(f"{file}: cannot be read: {error.strerror}") from error
+    except (ValueError, csv.Error) as error:
+        raise ConfigError(f"{file}: is no table in CSV with commas: {error}") from error
+
+
+def _checked_table(table: "pd.DataFrame", name: str) -> "pd.DataFrame":
+    """The table. Raises ConfigError where a name of a column stands twice."""
+    if not table.columns.is_unique:
+        twice = ", ".join(map(str, dict.fromkeys(table.columns[table.columns.duplicated()])))
+        raise ConfigError(f"{name}: names of columns must differ, twice there: {twice}")
+    return table
 
 
 def rows_on_stored_run(
@@ -97,6 +119,8 @@ def _load(
     claims: str | os.PathLike[str], modules: Iterable[ModuleType], measures: ModuleType | None = None
 ) -> tuple[Claim, ...]:
     """The claims of a file or a text, with the measures of these modules and of the one beside the file."""
+    if not isinstance(claims, str | os.PathLike) or "\0" in os.fspath(claims):
+        raise ConfigError(f"claims: must be a YAML file, or its text, got {quoted_value(claims)}")
     if isinstance(claims, str) and "\n" in claims:
         return parse_own_claims(claims, TEXT, *modules, *([measures] if measures else []))
     file = Path(claims)

@@ -29,7 +29,15 @@ class TableRows:
 
     def __init__(self, name: str, rows: "pd.DataFrame"):
         self.name, self.rows = name, rows
-        self.count = int(rows["n"].min()) if "n" in rows and len(rows) else len(rows) if len(rows) > 1 else 0
+        self.count = _least_count(rows["n"]) if "n" in rows and len(rows) else len(rows) if len(rows) > 1 else 0
+
+
+def _least_count(column: "pd.Series") -> int:
+    """The least of a column of counts. Raises ConfigError where a cell is none."""
+    for cell in column:
+        if not isinstance(cell, int | float | np.number) or not 0 < cell < math.inf or cell != int(cell):
+            raise ConfigError(f"column 'n' holds the realisations of a number, whole and > 0, got {cell}")
+    return int(column.min())
 
 
 class TableEvidence:
@@ -44,6 +52,8 @@ class TableEvidence:
         if not isinstance(key, Mapping):
             raise ConfigError(f"of: must name cells, {{COLUMN: VALUE}}, got {key!r}")
         rows = self.table
+        if not len(rows):
+            raise ConfigError("the table has no rows")
         for name, value in key.items():
             column = self.column(name, "of: ")
             rows = rows[rows[name].map(lambda cell, value=value: _is_equal(cell, value))]
@@ -61,8 +71,9 @@ class TableEvidence:
     def numbers(self, key: Any, name: str) -> np.ndarray:
         """The numbers (rows,) of a column. Raises ConfigError where it has text."""
         self.column(name)
+        cells = self.case(key).rows[name]
         try:
-            return np.asarray(self.case(key).rows[name], dtype=float)
+            return np.asarray(cells, dtype=float)
         except (TypeError, ValueError):
             raise ConfigError(f"column {name!r} has cells that are no numbers") from None
 

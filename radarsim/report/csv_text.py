@@ -43,6 +43,8 @@ def from_csv(content: bytes, whole_numbers: bool = False) -> "pd.DataFrame":
     names, rows = next(reader, None), []
     if not names:
         raise ValueError("has no names of columns in its first line")
+    if twice := [name for i, name in enumerate(names) if name in names[:i]]:
+        raise ValueError(f"line 1 has the column {twice[0]!r} twice")
     for row in reader:
         if len(row) != len(names):
             raise ValueError(f"line {reader.line_num} has {len(row)} cells, and the first line {len(names)}")

@@ -86,8 +86,8 @@ def share(value: float, low: float, high: float) -> str:
 
 
 def unit(name: str) -> str:
-    """A unit of a table as people write it: m/s² of m/s2."""
-    return "Hz" if name == "hz" else name.translate(POWERS)
+    """A unit of a table as people write it: m/s² of m/s2, nothing of 1."""
+    return {"hz": "Hz", "1": ""}.get(name, name.translate(POWERS))
 
 
 def with_unbroken_units(words: str) -> str:

@@ -9,6 +9,8 @@ import pytest
 
 import radarsim
 from radarsim.errors import ConfigError
+from radarsim.papers.claim_rows import measured_words
+from radarsim.report import wording
 from tests.program import command
 
 HEAD = "paper: mine\nclaims:\n"
@@ -155,7 +157,7 @@ def test_claims_or_tables_that_cannot_be_read_are_named(tmp_path):
         radarsim.claims.judge(text, tmp_path / "nowhere.csv")
     for content, said in (
         ("a,b\n1\n", "line 2 has 1 cells, and the first line 2"),
-        ("a;b\n0,5;1\n", "line 2 has 2 cells, and the first line 1"),
+        ("a;b\n0,5;1\n", "its first line has another separator"),
         ("", "has no names of columns"),
     ):
         (tmp_path / "odd.csv").write_text(content)
@@ -202,3 +204,107 @@ def test_claims_on_the_stored_run_of_a_shipped_config(tmp_path):
     )
     with pytest.raises(ConfigError, match="no claim is of rls2; there are claims of rls3"):
         radarsim.claims("rls2", also=file, out=tmp_path)
+
+
+WELL = ("[{filter: ekf}]", "{value: {column: mean}}", '{printed: "0.374"}')
+
+
+def fault(text, table=None):
+    with pytest.raises(ConfigError) as caught:
+        radarsim.claims.judge(text, TABLE if table is None else table)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("paper: mine", "paper: a.b", "claims:1:8: paper: must be of letters, digits, _ and -, got 'a.b'"),
+        ("id: 1", "id: [1]", "claims:3:8: claims.0.id: must be a whole number, or letters and digits, as 3 or 3a, got"),
+        ("id: 1", "id: true", "as 3 or 3a, got true"),
+        ("id: 1", "id: 1.5", "as 3 or 3a, got 1.5"),
+        ("statement: It holds", "statement: ''", "claims.0.statement: must not be empty"),
+        ("what: number", "what: ''", "claims.0.parts.0.what: must not be empty"),
+        ("what: number", "what: $zzz", "$zzz is not given under names or each; allowed: none"),
+        ("what: number", 'what: n, unit: "m\\n"', "unit: must be printable text on one line"),
+        ("what: number", "what: n, each: {a: []}", "claims.0.parts.0.each: makes 0 parts; allowed: 1 to 10,000"),
+        (
+            "what: number",
+            "what: n, each: {" + ", ".join(f"{key}: [1,2,3,4,5,6,7,8,9,0]" for key in "abcdefg") + "}",
+            "makes 10,000,000 parts; allowed: 1 to 10,000",
+        ),
+        ("[{filter: ekf}]", "[]", "claims.0.parts.0.of: must hold at least 1 case"),
+        ('"0.374"', '"nan"', "expected: printed: must be a number as it is printed, such as 0.374"),
+        ('"0.374"', '"inf"', "expected: printed: must be a number as it is printed, such as 0.374"),
+        ('"0.374"', "abc", "expected: printed: must be a number as it is printed, such as 0.374"),
+    ],
+)
+def test_a_mistake_in_claims_is_one_line_with_its_place_and_what_is_allowed(old, new, words):
+    text = claims(WELL)
+    assert old in text
+    said = fault(text.replace(old, new, 1))
+    assert words in said
+    assert said.startswith("claims:")
+
+
+@pytest.mark.parametrize("text", ["paper: mine\nclaims: []\n", HEAD + "- {id: 1, place: p, statement: s, parts: []}\n"])
+def test_claims_without_a_part_are_refused(text):
+    assert "must hold at least 1" in fault(text)
+
+
+@pytest.mark.parametrize("given", [None, 3, b"a", "a\0b"])
+def test_claims_that_are_no_file_are_refused(given):
+    assert fault(given).startswith("claims: must be a YAML file, or its text, got ")
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        (3, "table: must be a DataFrame, its columns, or a CSV file, got int"),
+        (pd.Series([1.0]), "table: must be a DataFrame, its columns, or a CSV file, got Series"),
+        ({"filter": ["ekf"], "mean": [1, 2]}, "table: must have columns of one length"),
+        (pd.DataFrame([[1, 2]], columns=["mean", "mean"]), "table: names of columns must differ, twice there: mean"),
+        (b"filter,mean,mean\nekf,1,2\n", "line 1 has the column 'mean' twice"),
+        (b"filter;mean\nekf;1\n", "mine.csv: is no table in CSV with commas: its first line has another separator"),
+        (b'filter,mean\n"ekf,1\n', "is no table in CSV with commas: unexpected end of data"),
+    ],
+)
+def test_a_table_that_is_none_is_refused(tmp_path, table, words):
+    if isinstance(table, bytes):
+        (tmp_path / "mine.csv").write_bytes(table)
+        table = tmp_path / "mine.csv"
+    assert words in fault(claims(WELL), table)
+
+
+@pytest.mark.parametrize("count", ["many", math.nan, math.inf, -3, 1.5])
+def test_a_count_that_is_none_is_said(count):
+    (row,) = judged({"filter": ["ekf"], "mean": [0.374], "n": [count]}, WELL)
+    assert row["verdict"] == "not judged here"
+    assert f"column 'n' holds the realisations of a number, whole and > 0, got {count}" in row["why"]
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("return Estimate(5, 10, 20)", "must give an Estimate whose value is within its interval, got 5 and [10, 20]"),
+        ("return Estimate('a', 'b', 'c')", "must give an Estimate or a number"),
+        ("return Estimate(float('nan'), 1, 2)", "its measure gives no number"),
+        ("return float('inf')", "its measure gives no number"),
+        ("return [1, 2]", "must give an Estimate or a number"),
+        ("raise RuntimeError('boom')", "RuntimeError: boom"),
+        ("import sys; sys.exit(3)", "SystemExit: 3"),
+    ],
+)
+def test_what_a_measure_may_not_give_is_said(tmp_path, body, why):
+    (tmp_path / "mine.yaml").write_text(claims((WELL[0], "odd", WELL[2])))
+    head = "from radarsim.report.statistics import Estimate\n\n\n"
+    (tmp_path / "mine.py").write_text(f"{head}def odd(evidence, rows):\n    {body}\n")
+    (row,) = radarsim.claims.judge(tmp_path / "mine.yaml", TABLE).table.to_dict("records")
+    assert row["verdict"] == "not judged here"
+    assert why in row["why"]
+
+
+def test_a_unit_of_one_is_not_written():
+    text = claims(WELL).replace("what: number", "what: number, unit: '1'")
+    (row,) = radarsim.claims.judge(text, TABLE).in_words
+    assert measured_words(row).endswith("]")
+    assert wording.unit("1") == ""

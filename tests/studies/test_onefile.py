@@ -15,9 +15,9 @@ from radarsim.config.study_keys import Member
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.papers import one_file_measures
-from radarsim.papers.claim_files import MeasureCall
 from radarsim.papers.claims_table import claims_table, failed_measures
 from radarsim.papers.evidence import MissingEvidence, UnknownName
+from radarsim.papers.measure_call import MeasureCall
 from radarsim.papers.study_claims import check_declarations, claim_faults, claims_of, interpretations_of
 from radarsim.report import tables
 from radarsim.report.quantities import Component
