@@ -98,7 +98,7 @@ ROOMS = {
         *("config", "extensions", "report.quantities", "studies.interface", "studies.user_filters"),
         "user_code.errors",
     ),
-    "studies.sources": ("config", "studies.registry", "studies.user_filters", "user_code"),
+    "studies.sources": ("config", "studies.registry", "user_code"),
     "studies.identity": ("config", "engine.blocks", "kernels.random", "studies.registry", "studies.sources"),
     "api": (
         *("api.design", "config", "engine", "engine.store", "extensions", "language"),

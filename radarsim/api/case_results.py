@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from radarsim.api.case_work import CaseWork
-from radarsim.api.run_errors import CaseErrors
+from radarsim.api.realisation_errors import CaseErrors
 from radarsim.config.experiment import Case
 from radarsim.engine.dispatch import CollectedSums
 from radarsim.engine.results import CaseResult

@@ -1,20 +1,18 @@
-"""Configs read with all studies that are installed, and new configs made from shipped ones."""
+"""Configs read with all studies that are installed."""
 
 import os
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
-from radarsim.config import find_files, new_config, overrides
+from radarsim.config import find_files, overrides
 from radarsim.config import load as config_loading
 from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError
 from radarsim.extensions import extensions
 from radarsim.language import current
 from radarsim.language.translate import tr
-from radarsim.report import atomic_files
 from radarsim.studies import registry
 
 Config = str | os.PathLike[str] | Mapping[str, Any] | Experiment
@@ -86,45 +84,6 @@ def shadow_warnings(experiment: Experiment) -> list[str]:
     if file.is_relative_to(Path(__file__).parents[1].resolve()):  # of the self-test
         return []
     return [tr("{file}: used in place of the shipped config {config}", file=file.name, config=experiment.stem)]
-
-
-EDITORS, SCHEMA = "# yaml-language-server: $schema=", "schema.json"
-
-
-def new(
-    name: str,
-    like: str | os.PathLike[str],
-    folder: str | os.PathLike[str] = ".",
-    values: Mapping[str, float] = MappingProxyType({}),
-    overrides: Overrides = (),
-) -> Path:
-    """Write folder/NAME.yaml, with or without suffix given, from a known config with some values changed; its path.
-
-    The config is taken with its overrides, which it can have if it has one case.
-
-    Where the folder holds a schema.json, the first line points editors to it. Raises ConfigError where the config
-    exists already, StoreError where it cannot be written."""
-    name, text = new_config.new_config(name, like, registry, values, overrides)
-    path = Path(folder) / name
-    if path.with_name(SCHEMA).is_file():
-        text = f"{EDITORS}{SCHEMA}\n{text}"
-    try:
-        atomic_files.create(path, text.encode())
-    except FileExistsError:
-        raise ConfigError(FILE_EXISTS.format(path=path)) from None
-    return path
-
-
-FILE_EXISTS = "{path}: already exists and is never overwritten; choose another name"
-
-
-def check_writable(path: str, like: str | os.PathLike[str], overrides: Overrides) -> None:
-    """Check, before a long search, that a config with these overrides can be written there. Raises ConfigError."""
-    new_config.new_config(os.path.basename(path), like, registry, {}, overrides)
-    if os.path.lexists(path):
-        raise ConfigError(FILE_EXISTS.format(path=path))
-    if not os.path.isdir(os.path.dirname(path) or "."):
-        raise ConfigError(f"{path}: cannot be written: there is no such folder")
 
 
 def schema_json() -> str:

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.api import arguments, configs, dataset
+from radarsim.api import arguments, configs
 from radarsim.api.display import Displayable, ShortTuple
 from radarsim.api.replacement import check_counts, check_replacement
 from radarsim.api.result_config import config_text
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
+    from radarsim.api.dataset import LabelledArrays
     from radarsim.api.result_content import Answer
     from radarsim.report.drawing.model import Figure
 
@@ -149,13 +150,19 @@ class Result(Displayable):
         >>> dict(dataset["sigma"].sizes)
         {'case': 1, 'filter': 2, 'component': 3, 'k': 15}
         """
+        from radarsim.api import dataset
+
         return dataset.to_xarray(self._labelled_arrays())
 
     def write_netcdf(self, path: str | os.PathLike[str]) -> None:
         """Write what `to_xarray` has to a netCDF file, which needs no further package. Raises StoreError."""
+        from radarsim.api import dataset
+
         dataset.write_netcdf(path, self._labelled_arrays())
 
-    def _labelled_arrays(self) -> "dataset.LabelledArrays":
+    def _labelled_arrays(self) -> "LabelledArrays":
+        from radarsim.api import dataset
+
         attributes = {"title": self._label, "study": self.experiment.study, "config": self.config}
         attributes |= {"seed": str(self.experiment.seed), "source": f"radarsim {provenance.versions()['radarsim']}"}
         return dataset.labelled_arrays(self.curves, self.gains, attributes)
@@ -185,16 +192,16 @@ class Result(Displayable):
         >>> sum(len(errors) for errors in result.errors("r", "r"))
         2000
         """
-        from radarsim.api import run_errors
+        from radarsim.api import realisation_errors
 
-        return run_errors.result_errors(self, filter, component, case, realisations)
+        return realisation_errors.result_errors(self, filter, component, case, realisations)
 
     def add_runs_table(self, span: str = "all") -> None:
         """Add the table `runs`: of each run's root mean square over the scans of a span, `2:60`, the mean, median,
         variance and quantiles over the runs. Raises ConfigError for an impossible span."""
-        from radarsim.api import run_errors
+        from radarsim.api import runs_table
 
-        self._tables["runs"] = run_errors.runs_table(self, span)
+        self._tables["runs"] = runs_table.runs_table(self, span)
 
     @cached_property
     def _figures_by_name(self) -> "dict[str, Figure]":

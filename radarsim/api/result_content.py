@@ -17,8 +17,7 @@ from radarsim.report.drawing.model import Figure, reworded
 from radarsim.report.math_text import plain_text
 from radarsim.report.row_notes import has_note
 from radarsim.report.sentences import Sentence
-from radarsim.report.user_filters import answer as user_filters_answer
-from radarsim.report.user_filters import figures, tables
+from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.report.wording import estimate
 from radarsim.studies.floors import table
 from radarsim.studies.interface import Study
@@ -34,15 +33,31 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
     A study whose errors are not of all realisations at common scans makes its own curves and gains. stem: that of the
     shipped config, whose claims are all in their table, even those that can no longer be judged."""
     case_study = study(results[0].study)
-    tables_by_name, user_rows = measured_tables(results), tables.measured_rows(results)
+    tables_by_name, user_rows = measured_tables(results), _user_filter_rows(results)
     for extension in extensions():
         tables_by_name |= extension.tables(results, tables_by_name, user_rows, stem)
     tables_by_name = interval_notes.add_notes(
         tables_by_name, results, case_study.exact_errors, quantities(results[0].study, results[0].spec)
     )
-    tables_by_name = tables.with_user_filters(tables_by_name, results, user_rows)
+    if user_rows:
+        from radarsim.report.user_filters import tables as user_filters_tables
+
+        tables_by_name = user_filters_tables.with_user_filters(tables_by_name, results, user_rows)
     tables_by_name["curves"] = table.with_floors(tables_by_name["curves"], case_study.floors(results))
     return tables_by_name
+
+
+def _user_filter_rows(results: Sequence[CaseResult]) -> "Mapping[str, pd.DataFrame]":
+    """The measured tables of user filters; none where there are no such filters."""
+    if not _has_user_filters(results):
+        return {}
+    from radarsim.report.user_filters import tables as user_filters_tables
+
+    return user_filters_tables.measured_rows(results)
+
+
+def _has_user_filters(results: Iterable[Case | CaseResult]) -> bool:
+    return any(result.user_filters for result in results)
 
 
 def measured_tables(results: Sequence[CaseResult]) -> dict:
@@ -97,10 +112,10 @@ class Answer(NamedTuple):
 
 def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
     """The answer of an experiment: on user filters, of its study, and gains against further baselines."""
-    study_tables = with_first_baseline(tables.without_user_filters(tables_by_name, results), results)
+    study_tables = with_first_baseline(user_filters_rows.without_user_filters(tables_by_name, results), results)
     further_baselines = [gain for result in results for gain in result.further_baselines]
     answer = [
-        *user_filters_answer.answer(results, tables_by_name),
+        *_user_filter_answer(results, tables_by_name),
         *(
             sentences.as_sentence(sentence, study_tables)
             for sentence in study(results[0].study).answer(results, study_tables)
@@ -123,8 +138,24 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
 
 def question_text(experiment: Experiment) -> str:
     """The question of an experiment, in one sentence."""
-    question = user_filters_answer.question(experiment) or study(experiment.study).question(experiment)
+    if _has_user_filters(experiment.cases):
+        from radarsim.report.user_filters import answer as user_filters_answer
+
+        question = user_filters_answer.question(experiment)
+    else:
+        question = study(experiment.study).question(experiment)
     return translate_names(question, config_names(experiment.cases))
+
+
+def _user_filter_answer(
+    results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataFrame]"
+) -> Sequence[Sentence]:
+    """How user filters compare with the config's; nothing where there are none."""
+    if not _has_user_filters(results):
+        return ()
+    from radarsim.report.user_filters import answer as user_filters_answer
+
+    return user_filters_answer.answer(results, tables_by_name)
 
 
 def config_names(cases: Iterable[Case | CaseResult]) -> frozenset[str]:
@@ -166,18 +197,27 @@ def case_figures(
     The config may select fewer: `Experiment.selected_figures`."""
     case_study = study(results[0].study)
     figure_tables = _with_bands(tables_by_name)
-    figures_by_name = _study_figures(results, tables.without_user_filters(figure_tables, results), experiment)
-    user_figures = figures.figures(results, figure_tables, experiment, figures_by_name, case_study.shown())
-    figures_by_name = user_figures | {  # those of user filters first: the answer is about them
-        name: figure for name, figure in figures_by_name.items() if name not in user_figures
-    }
+    figures_by_name = _study_figures(
+        results, user_filters_rows.without_user_filters(figure_tables, results), experiment
+    )
+    drawn_results = results
+    if _has_user_filters(results):
+        from radarsim.report.user_filters import figures as user_filters_figures
+
+        drawn_results = user_filters_figures.with_user_filters_in_cases(results)
+        user_figures = user_filters_figures.figures(
+            results, figure_tables, experiment, figures_by_name, case_study.shown()
+        )
+        figures_by_name = user_figures | {  # those of user filters first: the answer is about them
+            name: figure for name, figure in figures_by_name.items() if name not in user_figures
+        }
     for extension in extensions():
         figures_by_name |= extension.figures(tables_by_name)
     if not case_study.draws_sweeps:
         from radarsim.report import sweep_figures
 
         curves = common.group_by(figure_tables["curves"], "case", "filter", "component")
-        figures_by_name |= sweep_figures.sweep_figures(figures.with_user_filters_in_cases(results), curves)
+        figures_by_name |= sweep_figures.sweep_figures(drawn_results, curves)
     if any(has_note(tables_by_name[name]).any() for name in ("curves", "gains")):
         figures_by_name = {name: panel_layout.with_remark_on_bands(figure) for name, figure in figures_by_name.items()}
     translate = partial(translate_names, names=config_names(results))

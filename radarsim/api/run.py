@@ -11,15 +11,12 @@ from radarsim.api import arguments
 from radarsim.api.configs import Config, Overrides, load
 from radarsim.api.executor import open_executor
 from radarsim.api.load_experiments import combine_overrides
-from radarsim.api.precision_target import check_precision
 from radarsim.api.progress import Progress
 from radarsim.api.repeat_command import repeat_command
 from radarsim.api.replacement import check_replacement, larger_counts, stored_counts, with_counts
-from radarsim.api.run_errors import parse_span
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, missing_pieces, simulate, works_by_identity
 from radarsim.api.stored_runs import config_filter_warnings, make_result
-from radarsim.api.writing_time import writing_seconds
 from radarsim.config.experiment import Experiment
 from radarsim.engine import stopping
 from radarsim.engine.executors import Executor
@@ -95,8 +92,12 @@ def run(
     overrides = combine_overrides(arguments.check_arguments(overrides, **checked_arguments), realisations, seed)
     experiment = load(config, overrides)
     if runs is not None:
+        from radarsim.api.runs_table import parse_span
+
         parse_span(runs)
     if precision is not None:
+        from radarsim.api.precision_target import check_precision
+
         check_precision([experiment], precision, of)
     rule = required_stop_rule() if decide else None
     if rule is not None:
@@ -112,6 +113,8 @@ def run(
     started, writing_s = time.perf_counter(), None
     filter_warnings = config_filter_warnings(experiment)
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.remaining_s >= MIN_MEASURED_LIMIT_S:
+        from radarsim.api.writing_time import writing_seconds
+
         limit = limit.with_reserve(writing_s := writing_seconds(experiment, figures, width_mm))
     with open_executor(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else available_cores() if threads is None else int(threads)

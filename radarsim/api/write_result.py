@@ -26,7 +26,7 @@ from radarsim.report import atomic_files, csv_text, exact_check, provenance
 from radarsim.report.drawing.model import Figure
 from radarsim.report.drawing.page_figure import DrawnFigure
 from radarsim.report.row_notes import with_note_texts
-from radarsim.report.user_filters import tables
+from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def write_files(
             answer.texts,
             question,
             inputs=case_study.inputs(results),
-            cost=case_study.cost(tables.without_user_filters(tables_by_name, results), run),
+            cost=case_study.cost(user_filters_rows.without_user_filters(tables_by_name, results), run),
             agreement=exact_check.agreement_table(tables_by_name["curves"]) if case_study.exact_errors else None,
             drawn_from=case_study.drawn_from(),
             config_text=kept_config.get(CONFIG_FILE, b"").decode(),

@@ -26,10 +26,10 @@ def new(name: str, like: str) -> None:
     Example
       radarsim new mine --like rls2
     """
-    from radarsim.api import configs
+    from radarsim.api import new_configs
     from radarsim.cli import console
 
-    path = configs.new(name, like)
+    path = new_configs.write_new_config(name, like)
     console.print_field("config", str(path))
     console.print_field(
         "", tr("edit its values, then `radarsim check {path}` and `radarsim run {path}`", path=str(path))

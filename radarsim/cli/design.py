@@ -182,14 +182,14 @@ def tune(
       radarsim tune rls2_manoeuvres --filter r+Vr --for "sigma r" --free manoeuvre_variance --free initial_scans=2:7
       radarsim tune multimodel --filter MMA2-11 --for "sigma y at 60 s" --free models -n 500
     """
-    from radarsim.api import configs, json_output
+    from radarsim.api import json_output, new_configs
     from radarsim.api.design import tune as design_tune
     from radarsim.cli import console, print_answers
     from radarsim.cli import progress as cli_progress
     from radarsim.report import output_labels
 
     if write:
-        configs.check_writable(write, config, arguments["overrides"])
+        new_configs.check_writable(write, config, arguments["overrides"])
     with cli_progress.Progress(config, quiet=as_json) as progress:
         notify = None if as_json else console.print_error_line
         arguments |= {"filter": filter_name, "progress": progress.update, "notify": notify}
@@ -200,7 +200,9 @@ def tune(
         print_answers.print_tuning(result)
     if write:
         path = pathlib.Path(write)
-        config_path = configs.new(path.name, config, path.parent, result.settings, arguments["overrides"])
+        config_path = new_configs.write_new_config(
+            path.name, config, path.parent, result.settings, arguments["overrides"]
+        )
         click.echo(output_labels.labelled_line("config", str(config_path)), err=as_json)
 
 

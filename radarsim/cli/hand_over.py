@@ -126,7 +126,7 @@ def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: 
     """Verify archives, and print what was checked. Raises StoreError for faults, else NotChecked for what was not."""
     from radarsim.api import json_output
     from radarsim.api.maintenance.check_archive import RECOMPUTED_PIECES, check_archive
-    from radarsim.cli import console, print_results, progress
+    from radarsim.cli import console, print_inventory, progress
 
     documents: list[dict[str, Any]] = []
     faults: list[str] = []
@@ -147,8 +147,8 @@ def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: 
         console.print_line(tr("{path}: {files}, each as listed", path=archive, files=files))
         console.print_field("SHA-256", checked.sha256)
         for inspection in checked.results.values():
-            print_results.print_inspection(inspection)
-        console.print_line(f"{archive}: {print_results.recomputed_share(checked.results)}")
+            print_inventory.print_inspection(inspection)
+        console.print_line(f"{archive}: {print_inventory.recomputed_share(checked.results)}")
     if as_json:
         click.echo(json_output.text(documents))
     if faults:
@@ -162,6 +162,8 @@ def compare_with_archives(
 ) -> None:
     """Say whether the tables of results that were run are those of their archives, see `loadable`. Raises StoreError
     for tables that differ, else NotChecked for one that was not computed."""
+    if all(archive is None for _, archive in sources):
+        return
     from radarsim.api.maintenance.check_archive import differences, has_its_counts, missing_runs_option
     from radarsim.cli import console
 

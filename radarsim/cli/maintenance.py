@@ -32,9 +32,9 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
 
         click.echo(json_output.text(json_output.inventory(matches)))
         return
-    from radarsim.cli import print_results
+    from radarsim.cli import print_inventory
 
-    print_results.print_inventory(matches) if words else print_results.print_names(matches)
+    print_inventory.print_inventory(matches) if words else print_inventory.print_names(matches)
 
 
 @main.command()
@@ -102,7 +102,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
     from radarsim.api import json_output, run_facts
     from radarsim.api.maintenance import doctor as maintenance_doctor
     from radarsim.api.maintenance import self_test
-    from radarsim.cli import console, print_results, progress
+    from radarsim.cli import console, print_inventory, progress
 
     not_checked: list[str] = []
     if result is None:
@@ -123,7 +123,7 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
         if as_json:
             click.echo(json_output.text(json_output.fields(inspection)))
         else:
-            print_results.print_inspection(inspection)
+            print_inventory.print_inspection(inspection)
         faults = inspection.faults
     if faults:
         raise StoreError(*faults)
@@ -163,7 +163,7 @@ def clean(
     """
     from radarsim.api import json_output, load_experiments
     from radarsim.api.maintenance import clean as maintenance_clean
-    from radarsim.cli import print_results
+    from radarsim.cli import print_inventory
 
     if not configs and (overrides or seed is not None):
         raise click.UsageError("--set and --seed need a CONFIG")
@@ -176,4 +176,4 @@ def clean(
     if as_json:
         click.echo(json_output.text(json_output.fields(cleaned) | {"dry_run": dry_run}))
     else:
-        print_results.print_removed_blocks(cleaned, dry_run)
+        print_inventory.print_removed_blocks(cleaned, dry_run)

@@ -1,16 +1,14 @@
-"""Results, forecasts, stored blocks and inventories on the terminal."""
+"""Results on the terminal: of runs, of shares, and comparisons of runs."""
 
-import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.cli.console import case_count_text, print_field, print_line, print_table, print_warnings
+from radarsim.cli.console import print_field, print_line, print_table, print_warnings
 from radarsim.extensions import extensions
-from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, plural, shorten_names, term, tr
+from radarsim.language.translate import join_names, shorten_names, term, tr
 from radarsim.report.wording import format_if_known, significant_digits
 from radarsim.report.wording import unit as unit_of
 
@@ -18,22 +16,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from radarsim.api.compare import Comparison
-    from radarsim.api.cost import CaseCost, CostEstimate, RequiredRealisations
-    from radarsim.api.inventory import Inventory
-    from radarsim.api.maintenance.clean import RemovedBlocks
-    from radarsim.api.maintenance.doctor import Inspection
     from radarsim.api.result import Result
     from radarsim.api.simulate_cases import Shares
-    from radarsim.config.experiment import Experiment
 
 
-MAX_STARTED_CASES = 4  # cases whose stored part is listed
 MAX_ROWS = 36  # of the last scan's table; for a larger experiment the answer and the files suffice
 NARROW_INTERVAL_MARKS = {  # behind intervals that are too narrow
     " *": term("heavy tails: the interval is too narrow"),
     " †": term("the interval is too narrow: the column note of curves.csv or gains.csv says why"),
 }
-DROPPED_TEXT = term("dropped {files} in {folders} of {path}: {size:.2f} MB")
 
 
 def print_result(result: "Result") -> None:
@@ -178,76 +169,6 @@ def narrow_interval_mark(row: Any, column: str) -> str:
     return heavy_tails_mark if note == str(interval_notes.HEAVY_TAILS) else other_mark
 
 
-def print_cost(experiment: "Experiment", outlook: "CostEstimate") -> None:
-    """The cost of a run."""
-    print_line(tr("{config}: valid", config=str(experiment.path or experiment.stem)))
-    rows = [
-        (case.name, case.filters, str(case.scans), numeral(f"{case.realisations:,}"), _seconds_text(case))
-        for case in outlook.cases
-    ]
-    columns = ("case", "filters", "scans", "realisations", "one thread")
-    print_table("", columns, rows, right=columns[2:], spare=("scans",))
-    from radarsim.api.stored_runs import missing_realisations
-
-    started_cases = [
-        (case.name, stock) for case in outlook.cases if (stock := case.stock) and stock.stored and stock.missing
-    ]
-    for name, stock in started_cases[:MAX_STARTED_CASES]:
-        values = {"stored": stock.stored, "asked": stock.requested, "missing": missing_realisations(stock)}
-        whole = tr("{stored:,} of {asked:,} stored; missing: {missing}", **values)
-        print_field(name, whole if stock.part == (1, 1) else tr("{stored:,} of {asked:,} stored; {missing}", **values))
-    if len(started_cases) > MAX_STARTED_CASES:
-        print_line(tr("and {cases} more stored in part", cases=case_count_text(len(started_cases) - MAX_STARTED_CASES)))
-    if outlook.precision is not None:
-        print_required_realisations(experiment, outlook)
-    if outlook.share is not None:
-        number, share_count = outlook.share
-        print_field("share", tr("{number} of {of}", number=number, of=share_count))
-    print_field("total", outlook.total)
-    print_warnings(outlook.warnings)
-
-
-def _seconds_text(case: "CaseCost") -> str:
-    """Seconds of one thread for a case."""
-    if case.timed or not case.seconds:
-        return tr("{t_s:.3g} s", t_s=case.seconds)
-    return tr("under {t_s:.2g} s", t_s=case.seconds)
-
-
-def print_required_realisations(experiment: "Experiment", outlook: "CostEstimate") -> None:
-    """How many realisations a precision takes, and whether the run may do so many."""
-    configured = {case.name: case.realisations for case in experiment.cases}
-    needs = {case.name: need for case in outlook.cases if (need := case.need) is not None}
-    rows = [
-        (
-            case.name,
-            numeral(f"{need.realisations:,}") if need.realisations is not None else _unreached_text(need),
-            tr("{t_s:.3g} s", t_s=float(case.seconds)),
-            need.known_by,
-            need.last,
-        )
-        for case in outlook.cases
-        if (need := case.need) is not None
-    ]
-    precision_heading = tr("for ± {percent:g} {unit}", percent=outlook.precision, unit=tr(outlook.of.half_width_unit))
-    columns = ("case", precision_heading, "one thread", "known from", "last to get there")
-    print_table("", columns, rows, right=columns[1:3], spare=columns[4:])
-    unreached_cases = [
-        name for name, need in needs.items() if need.realisations is None or need.realisations > configured[name]
-    ]
-    if unreached_cases:
-        largest_need = max((need.realisations or math.inf) for need in needs.values())
-        remedy = tr("; -n {most} would do", most=str(largest_need)) if math.isfinite(largest_need) else ""
-        cases = case_count_text(len(unreached_cases))
-        values = {"cases": cases, "names": ", ".join(unreached_cases[:3]), "cure": remedy}
-        print_line(tr("precision not within reach of {cases}: {names}{cure}", **values))
-
-
-def _unreached_text(need: "RequiredRealisations") -> str:
-    """Why a pilot predicts no number of realisations."""
-    return tr("out of reach") if need.below is None else tr("none observed: below {rate:.2g}", rate=need.below)
-
-
 def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
     """The result of a share of an experiment, and the next step."""
     done = sum(case_share.done for case_share in share.cases.values())
@@ -259,91 +180,3 @@ def print_share(share: "Shares", out: str | os.PathLike[str]) -> None:
     folder = str(Path(out) / ".blocks")
     print_field("blocks", tr("{folder}; copy all shares into one, and `radarsim run` finds them", folder=folder))
     print_warnings(share.warnings)
-
-
-def print_inspection(inspection: "Inspection") -> None:
-    """Findings about a result; faults are reported as errors."""
-    outputs = plural("{count} output", "{count} outputs", inspection.outputs)
-    pieces = plural("{count} stored piece", "{count} stored pieces", inspection.pieces)
-    print_line(
-        tr("{folder}: {outputs} and {pieces} checked", folder=str(inspection.folder), outputs=outputs, pieces=pieces)
-    )
-    for note in inspection.notes:
-        print_line(tr("note: {words}", words=note))
-    print_recomputed(inspection)
-    if inspection.faults:
-        print_line(plural("{count} fault found", "{count} faults found", len(inspection.faults)))
-    elif not inspection.not_checked:
-        print_line(tr("all intact"))
-
-
-def print_recomputed(inspection: "Inspection") -> None:
-    """How much of a result was computed again, and which tables were compared."""
-    if not inspection.realisations:
-        return
-    parts = [plural("{count} piece", "{count} pieces", len(inspection.recomputed))] * bool(inspection.recomputed)
-    if inspection.from_config:
-        parts.append(tr("{cases} from the config", cases=shorten_names(inspection.from_config, 3)))
-    values = {"done": inspection.realisations, "total": inspection.total, "pieces": join_names(parts)}
-    values["percent"] = significant_share(inspection.realisations, inspection.total)
-    print_line(tr("computed again: {pieces}: {done:,} of {total:,} realisations ({percent} %)", **values))
-    if inspection.tables and not inspection.faults:
-        count = plural("{count} table", "{count} tables", len(inspection.tables))
-        print_line(tr("compared: {tables} made from the sums, equal to those stored", tables=count))
-
-
-def recomputed_share(inspections: "Mapping[str, Inspection]") -> str:
-    """How much of several results was computed again."""
-    done = sum(inspection.realisations for inspection in inspections.values())
-    total = sum(inspection.total for inspection in inspections.values())
-    percent = significant_share(done, total)
-    return tr(
-        "{done:,} of {total:,} realisations computed again ({percent} %)", done=done, total=total, percent=percent
-    )
-
-
-def significant_share(part: int, whole: int) -> str:
-    """A share in per cent, rounded down, so that only the whole is 100."""
-    return numeral(f"{math.floor(1000 * part / whole) / 10:g}") if whole else "0"
-
-
-def print_removed_blocks(cleaned: "RemovedBlocks", dry_run: bool) -> None:
-    """The amount dropped, or to be dropped."""
-    amount = {
-        "files": plural("{count} file", "{count} files", cleaned.files),
-        "folders": plural("{count} folder", "{count} folders", cleaned.identities),
-        "path": str(cleaned.path),
-        "size": cleaned.size / 1e6,
-    }
-    would = tr("would drop {files} in {folders} of {path}: {size:.2f} MB", **amount)
-    print_line(would if dry_run else tr(DROPPED_TEXT, **amount))
-    if cleaned.not_judged:
-        words = tr(
-            "blocks of {cases} are left: filters of your own code run only where you name the config: "
-            "`radarsim clean CONFIG --other-sources`",
-            cases=shorten_names(cleaned.not_judged),
-        )
-        print_line(tr("note: {words}", words=words))
-
-
-def print_names(inventory: "Inventory") -> None:
-    """The numbers of configs, scenarios, studies and filters, and their names, those of configs by paper."""
-    (_, _, configs), (_, _, scenarios), (_, _, studies), (_, _, filters) = inventory
-    print_line(plural("{count} config (radarsim run NAME)", "{count} configs (radarsim run NAME)", len(configs)))
-    for paper in dict.fromkeys(paper for _, paper, _ in configs):
-        print_line(f"{paper}  {', '.join(name for name, config_paper, _ in configs if config_paper == paper)}")
-    count_texts = (
-        plural("{count} scenario (target: NAME)", "{count} scenarios (target: NAME)", len(scenarios)),
-        plural("{count} study (study: NAME)", "{count} studies (study: NAME)", len(studies)),
-        plural("{count} filter", "{count} filters", len(filters)),
-    )
-    print_line(", ".join(count_texts))
-    print_line(tr("A line each: `radarsim list configs`, scenarios, studies, filters, P2, any word"))
-
-
-def print_inventory(inventory: "Inventory") -> None:
-    """Filters, studies, scenarios and configs, with a line on each: the most useful last."""
-    for n, (title, columns, rows) in enumerate(reversed(inventory)):
-        if n:
-            print_line("")
-        print_table(tr(title), columns, [(*row[:-1], tr(row[-1])) for row in rows])

@@ -302,7 +302,7 @@ def check(
     _refuse_incompatible(arguments["share"], arguments["precision"], None, None)
     refuse_quantity_without_precision(arguments["of"], arguments["precision"])
     from radarsim.api import cost, json_output, load_experiments
-    from radarsim.cli import print_results, progress
+    from radarsim.cli import print_cost, progress
 
     documents = []
     loaded = load_experiments.load_all(configs, load_experiments.combine_overrides(overrides, realisations, seed))
@@ -312,6 +312,6 @@ def check(
             outlook = cost.check(experiment, progress=bar.update, **arguments)
         documents.append(json_output.cost(experiment, outlook))
         if not as_json:
-            print_results.print_cost(experiment, outlook)
+            print_cost.print_cost(experiment, outlook)
     if as_json:
         click.echo(json_output.text(documents))

@@ -65,7 +65,7 @@ class CaseResult(Generic[A_co]):
     seconds: float = 0.0
     further_baselines: "tuple[CaseResult[A_co], ...]" = ()
     user_filters: "CaseResult[Axes] | None" = None
-    realisation_errors: Any = None  #: those of its realisations, drawn again (`api.run_errors.CaseErrors`), if known
+    realisation_errors: Any = None  #: of its realisations, drawn again (`api.realisation_errors`), if known
 
     def __repr__(self) -> str:
         filters = ", ".join(self.axes.filters)

@@ -13,9 +13,12 @@ from functools import cache
 from gettext import GNUTranslations, NullTranslations
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from radarsim.errors import ConfigError
-from radarsim.language import gettext_catalogue
+
+if TYPE_CHECKING:
+    from radarsim.language.gettext_catalogue import Entry
 
 ENGLISH = "en"
 VARIABLE = "RADARSIM_LANGUAGE"
@@ -62,7 +65,7 @@ def use_language(code: str) -> Iterator[None]:
         _languages.pop()
 
 
-def messages(code: str, package: str = RADARSIM) -> tuple[gettext_catalogue.Entry, ...]:
+def messages(code: str, package: str = RADARSIM) -> "tuple[Entry, ...]":
     """The catalogue of a package, which is imported, in a language; English needs none, another package may have none.
 
     Raises ConfigError where radarsim's file is not a catalogue; another package's is then left out, see `faults`.
@@ -76,11 +79,13 @@ def translations(code: str, package: str = RADARSIM) -> NullTranslations:
 
 
 @cache
-def _read(code: str, package: str) -> tuple[tuple[gettext_catalogue.Entry, ...], NullTranslations]:
+def _read(code: str, package: str) -> "tuple[tuple[Entry, ...], NullTranslations]":
     folders = getattr(sys.modules.get(package), "__path__", ())
     files = [file for folder in folders if (file := Path(folder, "language", f"{code}.po")).is_file()]
     if code == ENGLISH or not files:
         return (), NullTranslations()
+    from radarsim.language import gettext_catalogue  # English needs none
+
     try:
         entries = tuple(gettext_catalogue.entries(files[0].read_text(encoding="utf-8")))
         return entries, GNUTranslations(gettext_catalogue.compile_catalogue(entries))

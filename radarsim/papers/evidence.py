@@ -15,7 +15,7 @@ from radarsim.report.run_statistics import ScanSpan
 from radarsim.report.statistics import Estimate, difference
 
 if TYPE_CHECKING:
-    from radarsim.api.run_errors import CaseErrors
+    from radarsim.api.realisation_errors import CaseErrors
 
 DEPENDENT_REALISATIONS = "realisations of a filter depend on each other: no interval holds"
 INTERVAL_ROUNDING = 1e-12  # of a number: an interval that is narrower is rounding

@@ -13,8 +13,13 @@ from radarsim.papers.claims_table import NOT_JUDGED
 from radarsim.papers.interpretation_verdicts import InterpretationVerdicts
 from radarsim.papers.open_papers import open_papers
 from radarsim.papers.stored_verdicts import CLASSES, TABLE, stored_claims, stored_classes, stored_interpretations
-from radarsim.papers.verdict_classes import CLASS_FILE_COLUMNS, verdict_class
-from radarsim.papers.verdicts_by_interpretation import InterpretationVerdict, verdict_columns, verdict_rows
+from radarsim.papers.verdict_classes import CLASS_FILE_COLUMNS
+from radarsim.papers.verdicts_by_interpretation import (
+    InterpretationVerdict,
+    verdict_class,
+    verdict_columns,
+    verdict_rows,
+)
 from radarsim.report import atomic_files, provenance
 from radarsim.report.stored_tables import find_record
 

@@ -21,6 +21,7 @@ from radarsim.papers.open_papers import JudgingRequest
 from radarsim.papers.verdict_rule import UNDECIDED
 from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts, InterpretationVerdict, judge_claim
 from radarsim.report.precision import look_counts
+from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.report.user_filters import tables as user_filters_tables
 
 # Expected seconds of judging a run, of an exact verdict and of a figure, until some are measured.
@@ -217,7 +218,7 @@ class InterpretationRuns:
     def _changed_results(self, pairs: Sequence[tuple[Case, Case]], simulated: SimulatedCases) -> ChangedResults:
         results = simulate_cases.collected_results(simulated)
         user_rows = user_filters_tables.measured_rows(results)
-        tables = user_filters_tables.tables_for_claims(result_content.measured_tables(results), user_rows)
+        tables = user_filters_rows.tables_for_claims(result_content.measured_tables(results), user_rows)
         originals = [interpreted_case(changed, case.spec) for changed, (case, _) in zip(results, pairs, strict=True)]
         may_grow = self._paper.claims.may_grow
         places = {

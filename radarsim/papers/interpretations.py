@@ -88,16 +88,11 @@ class Interpretation:
         return dict(self.alternatives)[key]
 
 
-class PaperInterpretations(ABC):
-    """The interpretations of a paper, and how its claims are measured under one. A study with exact numbers gives
-    evidence without a run; any other changes the cases of a claim's config, which are then run, and reads their sums
-    like those of the paper's own."""
+class OpenChoices:
+    """What a paper leaves open."""
 
     paper: str  # P1
     choices: tuple[Choice, ...]
-
-    realisations: int = 1000  # of each run, by default
-    max_realisations: int = 16_000  # of a run that is to decide a claim, by default
 
     @property
     def module(self) -> str:
@@ -107,6 +102,31 @@ class PaperInterpretations(ABC):
     def leaves_open(self, claim: Claim) -> bool:
         """Whether the paper leaves anything open that affects a claim of its own."""
         return not claim.extension and any(choice.affects(claim.id) for choice in self.choices)
+
+    @cached_property
+    def choice_words(self) -> Mapping[str, str]:
+        """The choices by key, in words."""
+        return {choice.key: choice.asks for choice in self.choices}
+
+    def list_choices(self, keys: Iterable[str]) -> str:
+        """Choices within a sentence."""
+        return join_names([tr(self.choice_words[key]) for key in keys])
+
+
+class ShippedChoices(OpenChoices):
+    """What a paper that radarsim ships leaves open, without the code of its interpretations."""
+
+    def __init__(self, paper: str, choices: tuple[Choice, ...]):
+        self.paper, self.choices = paper, choices
+
+
+class PaperInterpretations(OpenChoices, ABC):
+    """The interpretations of a paper, and how its claims are measured under one. A study with exact numbers gives
+    evidence without a run; any other changes the cases of a claim's config, which are then run, and reads their sums
+    like those of the paper's own."""
+
+    realisations: int = 1000  # of each run, by default
+    max_realisations: int = 16_000  # of a run that is to decide a claim, by default
 
     def declared_interpretations(self) -> Sequence[Interpretation]:
         """The interpretations to judge, the default first: all combinations of E and U, and each N alone."""
@@ -168,15 +188,6 @@ class PaperInterpretations(ABC):
             {choice.key: interpretation[choice.key] for choice in self._changed_choices(interpretation)},
             self.choice_words,
         )
-
-    @cached_property
-    def choice_words(self) -> Mapping[str, str]:
-        """The choices by key, in words."""
-        return {choice.key: choice.asks for choice in self.choices}
-
-    def list_choices(self, keys: Iterable[str]) -> str:
-        """Choices within a sentence."""
-        return join_names([tr(self.choice_words[key]) for key in keys])
 
     def settings(self, interpretation: Interpretation) -> dict[str, Any]:
         """The settings of an interpretation's alternatives."""

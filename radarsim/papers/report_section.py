@@ -18,7 +18,7 @@ from radarsim.papers.claim_rows import (
 from radarsim.papers.claims_table import TABLES_READ
 from radarsim.papers.reasons import translate_reason
 from radarsim.papers.stored_verdicts import FILE, recorded_claims
-from radarsim.papers.study_claims import interpretations_of
+from radarsim.papers.study_claims import choices_of
 from radarsim.papers.verdict_classes import rows_in_words
 from radarsim.report import page_tables, render_page, typeset
 from radarsim.report.stored_tables import TableKind, read_rows
@@ -77,7 +77,7 @@ def _claims(
     records: Any = table.to_dict("records")
     rows = [row | {TABLES_READ: part_tables} for row, part_tables in zip(records, tables_read, strict=True)]
     claims = []
-    for parts in group_by_claim(rows_in_words(rows, [interpretations_of(study(study_name))])):
+    for parts in group_by_claim(rows_in_words(rows, [choices_of(study(study_name))])):
         read = list(dict.fromkeys(table for part in parts for table in part[TABLES_READ]))
         columns = ("statement", "paper", "place", "interpretation", "original", "overall", "class")
         claims.append(

@@ -9,9 +9,9 @@ from radarsim.engine.results import CaseResult
 from radarsim.papers.claim_rows import CLASS_ORDER, group_by_claim, is_extension
 from radarsim.papers.claims_table import NOT_JUDGED, claims_table, first_rows
 from radarsim.papers.stored_verdicts import known_classes
-from radarsim.papers.study_claims import claims_of, interpretations_of
+from radarsim.papers.study_claims import choices_of, claims_of
 from radarsim.papers.verdict_classes import CLASS_COLUMNS, add_classes, is_judged_only_as_shipped
-from radarsim.report.user_filters import tables as user_filters_tables
+from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.studies.registry import study
 
 if TYPE_CHECKING:
@@ -25,18 +25,18 @@ def claims_of_results(
     results: Sequence[CaseResult], measured: "Tables", user_filters: "Tables", stem: str
 ) -> "pd.DataFrame":
     """claims.csv of results, with the shipped classes; see `Extension.tables`."""
-    tables = user_filters_tables.tables_for_claims(measured, user_filters)
+    tables = user_filters_rows.tables_for_claims(measured, user_filters)
     verdicts = claims_table(claims_of(study(results[0].study)), results, tables, configs.shipped, stem)
     return with_stored_classes(verdicts, results[0].study)
 
 
 def with_stored_classes(claims: "pd.DataFrame", study_name: str, out: Path | None = None) -> "pd.DataFrame":
     """claims.csv of a study with the classes over all interpretations: those stored under `out`, else the shipped."""
-    paper_claims, interpretations = claims_of(study(study_name)), interpretations_of(study(study_name))
-    if interpretations is None or paper_claims is None or not len(claims):
+    paper_claims, choices = claims_of(study(study_name)), choices_of(study(study_name))
+    if choices is None or paper_claims is None or not len(claims):
         return claims
     records: Any = claims.to_dict("records")
-    rows = add_classes(records, known_classes([(interpretations, paper_claims)], out))
+    rows = add_classes(records, known_classes([(choices, paper_claims)], out))
     return claims.assign(**{column: [row[column] for row in rows] for column in CLASS_COLUMNS})
 
 

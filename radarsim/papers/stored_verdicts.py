@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 from radarsim.errors import StoreError
 from radarsim.papers.claim import PaperClaims
 from radarsim.papers.claims_table import COLUMNS, NUMBER_COLUMNS
-from radarsim.papers.interpretations import PaperInterpretations
+from radarsim.papers.interpretations import OpenChoices
 from radarsim.papers.verdict_classes import CLASS_FILE_COLUMNS, KnownClasses, VerdictClass, declaration_digest
 from radarsim.report.stored_tables import HOW_TO_REMAKE, RECORD, TableKind, find_files, read_content, read_rows
 
@@ -67,7 +67,7 @@ def shipped_classes() -> tuple[VerdictClass, ...]:
     return tuple(_rows(SHIPPED_CLASSES, set(CLASS_FILE_COLUMNS), VerdictClass.from_row))
 
 
-def known_classes(papers: Iterable[tuple[PaperInterpretations, PaperClaims]], out: Path | None) -> KnownClasses:
+def known_classes(papers: Iterable[tuple[OpenChoices, PaperClaims]], out: Path | None) -> KnownClasses:
     """The class over all interpretations of each claim that depends on an open choice of its paper; None where it is
     not known.
 
@@ -76,10 +76,10 @@ def known_classes(papers: Iterable[tuple[PaperInterpretations, PaperClaims]], ou
         (verdict.claim, verdict.declaration_digest): verdict for verdict in (*shipped_classes(), *stored_classes(out))
     }
     return {
-        claim.id: classes.get((claim.id, declaration_digest(interpretations, claim)))
-        for interpretations, paper in papers
+        claim.id: classes.get((claim.id, declaration_digest(choices, claim)))
+        for choices, paper in papers
         for claim in paper.claims
-        if interpretations.leaves_open(claim)
+        if choices.leaves_open(claim)
     }
 
 

@@ -4,28 +4,31 @@ A study of a package has them beside it, in claims.yaml with measures.py and in 
 `claims` and `interpretations`; a study in one file has them in its attributes `paper` and `claims_yaml`."""
 
 from collections.abc import Callable, Collection, Sequence
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any, TypeVar
 
-from radarsim.papers import one_file_claims
 from radarsim.papers.claim import PaperClaims
-from radarsim.papers.claim_files import load_claims
-from radarsim.papers.interpretations import PaperInterpretations
+from radarsim.papers.claim_files import load_choices, load_claims
+from radarsim.papers.interpretations import Choice, OpenChoices, PaperInterpretations, ShippedChoices
 from radarsim.papers.paper_cases import ShippedCases
 from radarsim.papers.paper_keys import CLAIMS_FILE, PACKAGE, claim_folders, has_shipped_claims, paper_key
 from radarsim.studies import registry
 from radarsim.studies.interface import Paper, Study
-from radarsim.studies.onefile import OneFile
 
 Declared = TypeVar("Declared")
+INTERPRETATIONS_FILE = "interpretations.yaml"
 
 
-def claims_of(study: Study) -> PaperClaims | None:
+def claims_of(study: Any) -> PaperClaims | None:
     """The claims of a study's paper; None where it has none."""
     if callable(method := getattr(study, "claims", None)):
         claims: PaperClaims | None = method()
         return claims
-    if isinstance(study, OneFile):
+    if _is_one_file(study):
+        from radarsim.papers import one_file_claims
+
         return one_file_claims.claims_of(study)
     folders, paper = claim_folders(study), _paper_of(study)
     if not folders or paper is None:
@@ -41,12 +44,14 @@ def claims_of(study: Study) -> PaperClaims | None:
     return PaperClaims(all_claims, measures[0].Evidence, *paper)
 
 
-def interpretations_of(study: Study) -> PaperInterpretations | None:
+def interpretations_of(study: Any) -> PaperInterpretations | None:
     """The open choices of a study's paper, and its claims under each interpretation; None where it has none."""
     if callable(method := getattr(study, "interpretations", None)):
         declared: PaperInterpretations | None = method()
         return declared
-    if isinstance(study, OneFile):
+    if _is_one_file(study):
+        from radarsim.papers import one_file_claims
+
         return one_file_claims.interpretations_of(study)
     for package, folder in claim_folders(study):
         if (folder / "interpretations.py").is_file():
@@ -55,15 +60,41 @@ def interpretations_of(study: Study) -> PaperInterpretations | None:
     return None
 
 
-def check_declarations(study: Study) -> None:
+def choices_of(study: Study) -> OpenChoices | None:
+    """What a study's paper leaves open; None where it has no interpretations. A shipped paper's are data."""
+    if not callable(getattr(study, "interpretations", None)) and has_shipped_claims(study):
+        for _, folder in claim_folders(study):
+            if (folder / INTERPRETATIONS_FILE).is_file():
+                return ShippedChoices(paper_key(study), _choices_in(folder / INTERPRETATIONS_FILE))
+        return None
+    return interpretations_of(study)
+
+
+@cache
+def _choices_in(file: Path) -> tuple[Choice, ...]:
+    return load_choices(file)
+
+
+def check_declarations(study: Any) -> None:
     """Raise ConfigError for unknown names in the claims of a study in one file."""
-    if isinstance(study, OneFile) and study.claims_yaml:
+    if _is_one_file(study) and study.claims_yaml:
+        from radarsim.papers import one_file_claims
+
         one_file_claims.declarations(study)
 
 
-def claim_faults(study: Study, shipped: ShippedCases) -> Sequence[str]:
+def claim_faults(study: Any, shipped: ShippedCases) -> Sequence[str]:
     """Names in a study's claims and interpretations that no shipped config has, a line each."""
-    return one_file_claims.claim_faults(study, shipped) if isinstance(study, OneFile) else ()
+    if not _is_one_file(study):
+        return ()
+    from radarsim.papers import one_file_claims
+
+    return one_file_claims.claim_faults(study, shipped)
+
+
+def _is_one_file(study: Any) -> bool:
+    """Whether a study in one file declares its claims itself; told without loading what such studies are made of."""
+    return hasattr(study, "claims_yaml")
 
 
 def by_study(take: Callable[[Study], Declared], keys: Collection[str] = ()) -> dict[str, Declared | None]:

@@ -13,12 +13,12 @@ from radarsim.language.translate import term, tr
 from radarsim.papers.claim import Claim
 from radarsim.papers.claim_sources import measure_calls, package_sources, plain_data
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN
-from radarsim.papers.interpretations import PaperInterpretations
+from radarsim.papers.interpretations import OpenChoices
 from radarsim.papers.verdict_rule import CLASSES, CONTRADICTORY, DEPENDS, FIXED_CLASSES, UNDECIDED
-from radarsim.papers.verdicts_by_interpretation import DEPENDS_ON, ClaimVerdicts
 
 CLASS_FILE_COLUMNS = ("claim", "class", "holds", "of", "depends_on", "needed", "declared")
 CLASS_COLUMNS = ("class", "overall", "holds", "of", "depends_on", "needed")  # columns of claims.csv
+DEPENDS_ON = term("depends on {choices}")
 SHIPPED_AND_OVERALL = term("{own} as shipped; {over}")
 OVERALL = term("{kind} over all interpretations")
 ONLY_SHIPPED = term("{own} as shipped; other interpretations not judged")
@@ -67,7 +67,7 @@ class VerdictClass:
 KnownClasses = Mapping[str, VerdictClass | None]
 
 
-def declaration_digest(interpretations: PaperInterpretations, claim: Claim) -> str:
+def declaration_digest(choices: OpenChoices, claim: Claim) -> str:
     """A mark of all that a verdict follows from: a claim's assertions and what measures them, and the choices that
     affect it, with what they set; see `claim_sources`. A changed mark means another claim."""
     part_declarations = [
@@ -88,28 +88,11 @@ def declaration_digest(interpretations: PaperInterpretations, claim: Claim) -> s
                 for alternative in choice.alternatives
             ),
         ]
-        for choice in interpretations.choices
+        for choice in choices.choices
         if choice.affects(claim.id)
     ]
-    sources = package_sources(claim, interpretations.module)
+    sources = package_sources(claim, choices.module)
     return digest([part_declarations, claim.judging_options, choice_declarations, sources])[:16]
-
-
-def verdict_class(verdicts: ClaimVerdicts) -> VerdictClass | None:
-    """The class of a claim over its interpretations; None where it could not be judged."""
-    outcome = verdicts.outcome
-    if outcome is None or outcome.interpretations is None or outcome.holds_in is None:
-        return None
-    needed, depends_on = float(outcome.needed or math.nan), ", ".join(outcome.depends_on)
-    return VerdictClass(
-        verdicts.claim.id,
-        outcome.kind,
-        outcome.holds_in,
-        outcome.interpretations,
-        depends_on,
-        needed,
-        declaration_digest(verdicts.interpretations, verdicts.claim),
-    )
 
 
 def add_classes(rows: Sequence[Mapping[str, Any]], classes: KnownClasses) -> list[dict[str, Any]]:
@@ -137,9 +120,7 @@ def _class_columns(row: Mapping[str, Any], classes: KnownClasses) -> dict[str, A
     return columns_of_class | needed | {"overall": class_words(overall.kind, as_shipped, overall.depends_on)}
 
 
-def rows_in_words(
-    rows: Iterable[Mapping[str, Any]], papers: Iterable[PaperInterpretations | None]
-) -> list[dict[str, Any]]:
+def rows_in_words(rows: Iterable[Mapping[str, Any]], papers: Iterable[OpenChoices | None]) -> list[dict[str, Any]]:
     """Rows of claims.csv for people: what a claim depends on is in the words of its paper's interpretations."""
     by_paper = {paper.paper: paper for paper in papers if paper is not None}
     records = [dict(row) for row in rows]

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from radarsim.errors import MeasureError
-from radarsim.language.translate import term, tr
+from radarsim.language.translate import tr
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.claim_outcome import ClaimOutcome, claim_outcome, largest_needed, round_up
 from radarsim.papers.claims_table import NO_NUMBER, judged_part, lacks_number
@@ -22,6 +22,7 @@ from radarsim.papers.interpretations import (
     PaperInterpretations,
 )
 from radarsim.papers.reasons import translate_reason
+from radarsim.papers.verdict_classes import DEPENDS_ON, VerdictClass, declaration_digest
 from radarsim.papers.verdict_rule import (
     AGAINST,
     CONFIRMED,
@@ -34,7 +35,6 @@ from radarsim.papers.verdict_rule import (
 )
 from radarsim.report.statistics import Estimate
 
-DEPENDS_ON = term("depends on {choices}")
 NOTHING_TO_MEASURE = "there is nothing to measure it with"
 
 
@@ -201,6 +201,23 @@ class ClaimVerdicts:
         return tr(
             "{count} open at {n} realisations, about {needed} would decide", **values, needed=f"{round_up(needed):,}"
         )
+
+
+def verdict_class(verdicts: ClaimVerdicts) -> VerdictClass | None:
+    """The class of a claim over its interpretations; None where it could not be judged."""
+    outcome = verdicts.outcome
+    if outcome is None or outcome.interpretations is None or outcome.holds_in is None:
+        return None
+    needed, depends_on = float(outcome.needed or math.nan), ", ".join(outcome.depends_on)
+    return VerdictClass(
+        verdicts.claim.id,
+        outcome.kind,
+        outcome.holds_in,
+        outcome.interpretations,
+        depends_on,
+        needed,
+        declaration_digest(verdicts.interpretations, verdicts.claim),
+    )
 
 
 def verdict_columns(papers: Iterable[PaperInterpretations]) -> tuple[str, ...]:

@@ -286,7 +286,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> 
       radarsim fit rls2 plots.csv
       radarsim fit rls2 plots.csv --write mine.yaml
     """
-    from radarsim.api import configs, json_output, load_experiments
+    from radarsim.api import json_output, load_experiments, new_configs
     from radarsim.cli import progress
     from radarsim.recordings import print_results
     from radarsim.recordings.fit import fit as fit_fit
@@ -303,7 +303,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> 
         raise click.UsageError("--plain goes with neither --robust nor --correlated")
     allowing = explanations if explanations or options["plain"] else None
     if options["write"]:
-        configs.check_writable(options["write"], loaded.path or config, overrides)
+        new_configs.check_writable(options["write"], loaded.path or config, overrides)
     with progress.CountedProgress("fitting", "likelihoods") as counter:
         fitted = fit_fit.fit_plots(loaded, plots, options["filter_name"], allowing, counter.update)
     if options["as_json"]:
@@ -312,7 +312,7 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> 
         print_results.print_fit(fitted)
     if options["write"]:
         path = Path(options["write"])
-        config_path = configs.new(
+        config_path = new_configs.write_new_config(
             path.name, loaded.path or config, path.parent, fit_fit.fitted_settings(fitted), overrides
         )
         click.echo(output_labels.labelled_line("config", str(config_path)), err=options["as_json"])

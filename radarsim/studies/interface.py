@@ -14,8 +14,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from radarsim.studies.recording_interface import RecordingInterface
-
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
@@ -29,6 +27,7 @@ if TYPE_CHECKING:
     from radarsim.report.quantities import Component, Quantity
     from radarsim.report.sentences import Sentence
     from radarsim.studies.floors.bound import Floor
+    from radarsim.studies.recording_interface import RecordingInterface
 
 
 class Plan(Protocol):
@@ -224,7 +223,7 @@ class Study(ABC):
         """A table of the filters' cost, for the report; run is as in run.json. Default: none."""
         return None
 
-    def recording_interface(self) -> RecordingInterface | None:
+    def recording_interface(self) -> "RecordingInterface | None":
         """Its simulated and recorded plots. Default: none; `track` and `simulate` refuse its configs."""
         return None
 

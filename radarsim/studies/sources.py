@@ -18,8 +18,8 @@ from pathlib import Path
 from radarsim.config.experiment import Case
 from radarsim.config.model import Model
 from radarsim.studies.registry import study
-from radarsim.studies.user_filters.sources import imports_in
 from radarsim.user_code.files import is_user_module
+from radarsim.user_code.imports import imports_in
 from radarsim.user_code.module_sources import module_digest, module_source, module_spec, note_loaded_modules
 
 RADARSIM = __package__.partition(".")[0]

@@ -11,8 +11,9 @@ import pytest
 
 import radarsim
 from radarsim.api import load_experiments, repeat_command, stored_runs
-from radarsim.api.configs import load, new
+from radarsim.api.configs import load
 from radarsim.api.maintenance import doctor
+from radarsim.api.new_configs import write_new_config
 from radarsim.config.find_files import SHIPPED
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import atomic_files, index_page
@@ -123,7 +124,7 @@ def test_a_config_is_not_named_as_a_file_among_the_results(tmp_path, name):
     with pytest.raises(ConfigError, match="must have another name: there is a file of that name among the results"):
         load(path)
     with pytest.raises(ConfigError, match="must have another name"):
-        new(name, "rls2", tmp_path)
+        write_new_config(name, "rls2", tmp_path)
 
 
 def test_one_name_written_in_two_ways_is_one(tmp_path):
@@ -236,20 +237,20 @@ def test_a_folder_that_stays_locked_is_told(tmp_path, monkeypatch):
 
 
 def test_a_new_config_is_whole_or_not_there(tmp_path, monkeypatch):
-    path = new("mine", "rls2", tmp_path)
+    path = write_new_config("mine", "rls2", tmp_path)
     before = path.read_bytes()
     with pytest.raises(ConfigError, match="never overwritten"):
-        new("mine", "rls1", tmp_path)
+        write_new_config("mine", "rls1", tmp_path)
     assert path.read_bytes() == before
     with pytest.raises(StoreError, match="cannot be written"):
-        new("mine", "rls2", tmp_path / "nowhere")
+        write_new_config("mine", "rls2", tmp_path / "nowhere")
 
     def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(atomic_files, "create_readable_file", full)
     with pytest.raises(StoreError, match="No space left"):
-        new("other", "rls2", tmp_path)
+        write_new_config("other", "rls2", tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["mine.yaml"]
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from radarsim.api import configs
+from radarsim.api.new_configs import write_new_config
 from radarsim.errors import ConfigError
 from tests.program import command
 from tests.recordings import plot_files
@@ -42,13 +42,13 @@ def test_a_filter_without_a_row_is_named(tmp_path, ranges, silent):
 
 
 def test_the_suffix_of_a_new_config_may_be_given(tmp_path):
-    assert configs.new("mine.yaml", "rls2", tmp_path) == tmp_path / "mine.yaml"
+    assert write_new_config("mine.yaml", "rls2", tmp_path) == tmp_path / "mine.yaml"
 
 
 @pytest.mark.parametrize(("name", "shown"), [("-a", "-a"), ("=a", "=a"), ("a\nb", r"a\nb"), (".yaml", "")])
 def test_what_a_name_may_begin_with_is_told_in_one_line(tmp_path, name, shown):
     with pytest.raises(ConfigError) as caught:
-        configs.new(name, "rls2", tmp_path)
+        write_new_config(name, "rls2", tmp_path)
     (line,) = caught.value.lines
     assert line.startswith(f"{shown}: must be a plain name")
     assert line.endswith("that begins with a letter, a digit or _")

@@ -14,6 +14,7 @@ import pytest
 
 from radarsim.api import configs, load_experiments
 from radarsim.api.case_work import CaseWork
+from radarsim.api.new_configs import write_new_config
 from radarsim.cli import command_group
 from radarsim.cli.command_group import main
 from radarsim.config import find_files
@@ -302,7 +303,7 @@ def test_the_choice_of_swept_mappings_and_of_configs_elsewhere(tmp_path, monkeyp
     turn = "{kind: polynomial, coefficients: [1e5, -100]}"
     (away / "targets.yaml").write_text(f"include: [rls2]\nsweep:\n  target: [{turn}, turn]\n  scans: [12, 15]\n")
     command(*advised(command("track", "away/targets.yaml", "a {b}.csv", code=2).stderr))
-    configs.new("mine", "rls2")
+    write_new_config("mine", "rls2")
     (tmp_path / "mine.yaml").rename(away / "mine.yaml")
     (away / "both.yaml").write_text("include: [mine, rls2]\n")
     fault = command("track", "away/both.yaml", "a {b}.csv", code=2).stderr
@@ -369,7 +370,7 @@ def test_the_page_names_a_config_for_every_example_file(tmp_path):
 
 @pytest.mark.parametrize("like", find_files.available_stems("configs"))
 def test_a_config_of_ones_own_is_the_same_experiment(tmp_path, like):
-    path = configs.new("mine", like, tmp_path)
+    path = write_new_config("mine", like, tmp_path)
     mine, theirs = configs.load(str(path)), configs.load(like)
     assert [identity_keys(case.spec) for case in mine.cases] == [identity_keys(case.spec) for case in theirs.cases]
     assert [(case.realisations, case.seed) for case in mine.cases] == [(c.realisations, c.seed) for c in theirs.cases]

@@ -12,7 +12,8 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import BaseModel, Field
 
-from radarsim.api.configs import load, new, schema_json
+from radarsim.api.configs import load, schema_json
+from radarsim.api.new_configs import write_new_config
 from radarsim.config import common_keys
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList, Origin
@@ -211,10 +212,10 @@ def test_a_bare_key_means_those_members_that_have_it(fans):
 
 
 def test_a_new_config_names_the_schema_that_lies_beside_it(tmp_path):
-    without = new("bare.radarsim", "rls2", tmp_path).read_text(encoding="utf-8")
+    without = write_new_config("bare.radarsim", "rls2", tmp_path).read_text(encoding="utf-8")
     assert "yaml-language-server" not in without
     (tmp_path / "schema.json").write_text(schema_json(), encoding="utf-8")
-    file = new("told.radarsim", "rls2", tmp_path)
+    file = write_new_config("told.radarsim", "rls2", tmp_path)
     first, rest = file.read_text(encoding="utf-8").split("\n", 1)
     named = re.fullmatch(r"# yaml-language-server: \$schema=(\S+)", first)[1]
     assert json.loads((file.parent / named).read_text(encoding="utf-8"))["oneOf"]

@@ -518,9 +518,10 @@ def test_innovations_of_a_right_filter_over_folded_velocities():
 def test_an_angle_fitted_takes_the_place_of_the_one_in_degrees(tmp_path, monkeypatch):
     """And a key of one filter among several that of this filter alone."""
     from radarsim.api import configs
+    from radarsim.api.new_configs import write_new_config
 
     monkeypatch.chdir(tmp_path)
     values = {"sensor.sigma_bearing_rad": 0.05, "filters.4.manoeuvre_variance": 0.25}
-    spec = configs.load(configs.new("mine", "sonar_smoothing", values=values)).cases[0].spec
+    spec = configs.load(write_new_config("mine", "sonar_smoothing", values=values)).cases[0].spec
     assert (spec.sensor.sigma_bearing_rad, spec.sensor.sigma_range_m) == (0.05, 30)
     assert [one.manoeuvre_variance for one in spec.filters[3:6]] == [None, 0.25, 0.0025]

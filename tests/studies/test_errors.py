@@ -9,7 +9,7 @@ from scipy import stats
 
 import radarsim
 from radarsim.api.configs import load
-from radarsim.api.run_errors import CaseErrors
+from radarsim.api.realisation_errors import CaseErrors
 from radarsim.api.simulate_cases import RunOptions, collected_results, simulate
 from radarsim.errors import ConfigError
 from radarsim.papers.evidence import MissingEvidence, UnknownName, UnknownScans

@@ -16,7 +16,8 @@ from radarsim.report import tables as common
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import GAIN
 from radarsim.report.sentences import Sentence
-from radarsim.report.user_filters.tables import IMPROPER, REASONS, TablesByName, user_filter_cases
+from radarsim.report.user_filters.rows import TablesByName, user_filter_cases
+from radarsim.report.user_filters.tables import IMPROPER, REASONS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from radarsim.report import case_selection, consistency_figures, key_labels, tim
 from radarsim.report import tables as common
 from radarsim.report.drawing.model import Figure
 from radarsim.report.quantities import RADIAL, Component
-from radarsim.report.user_filters.tables import TablesByName, append, user_filter_cases
+from radarsim.report.user_filters.rows import TablesByName, append, user_filter_cases
 
 
 def figures(

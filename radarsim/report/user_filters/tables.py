@@ -3,7 +3,7 @@
 The study's own tables stay as they are; rows of user filters stand below. Their gains are relative to every filter of
 the config, each over the realisations in which both have an estimate."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +13,12 @@ from radarsim.language.translate import term
 from radarsim.report import consistency_tables, interval_notes, statistics
 from radarsim.report import tables as common
 from radarsim.report.row_notes import note_kinds
+from radarsim.report.user_filters.rows import TablesByName, append, user_filter_cases
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-TablesByName = Mapping[str, "pd.DataFrame"]
 ROUNDING = 1e-6  # per cent: half-width of a gain that is nought but for rounding, whose variance is a difference
 SINGLE = 1e-3  # per cent: width of the interval of a gain that is nought but for rounding to single precision
 IMPROPER = "not_positive_definite"  # covariances, counted after the reasons of failures
@@ -27,11 +27,6 @@ REASONS = {  # in the order of the sums
     "no_estimate": term("no estimate:"),
     "diverged": term("over 100 times the largest error of the config's filters:"),
 }
-
-
-def user_filter_cases(result: CaseResult) -> list[CaseResult]:
-    """The user filters of a result as a case; none where it has none."""
-    return [] if result.user_filters is None else [result.user_filters]
 
 
 def baseline_names(result: CaseResult) -> tuple[str, ...]:
@@ -190,12 +185,6 @@ def without_intervals(table: "pd.DataFrame", results: Sequence[CaseResult]) -> "
     return table.assign(**{end: table[end].mask(rows) for end in ends})
 
 
-def tables_for_claims(tables_by_name: TablesByName, measured_rows: TablesByName) -> TablesByName:
-    """The tables with the measured rows below their own."""
-    appended = {name: append(tables_by_name[name], table) for name, table in measured_rows.items()}
-    return {**tables_by_name, **appended}
-
-
 def table_with_user_filters(name: str, table: "Callable[[Sequence[CaseResult]], pd.DataFrame]") -> Any:
     """A table of the study, made from results, with the rows of user filters: curves or gains."""
 
@@ -206,27 +195,3 @@ def table_with_user_filters(name: str, table: "Callable[[Sequence[CaseResult]], 
         return append(study_rows, rows[name]) if name in rows else study_rows
 
     return make_table
-
-
-def without_user_filters(tables_by_name: TablesByName, results: Sequence[CaseResult]) -> TablesByName:
-    """The tables without the rows of user filters, as the study made them."""
-    user_filters = {name for result in results for case in user_filter_cases(result) for name in case.axes.filters}
-    if not user_filters:
-        return tables_by_name
-    study_rows = {}
-    for name in ("curves", "gains"):
-        table = tables_by_name[name]
-        labels = table.loc[:, table.columns.isin(("filter", "baseline"))]
-        study_rows[name] = table[~labels.isin(user_filters).any(axis=1)]
-    return {**study_rows, **{name: table for name, table in tables_by_name.items() if name not in study_rows}}
-
-
-def append(table: "pd.DataFrame", rows: "pd.DataFrame") -> "pd.DataFrame":
-    """Rows below those of a table, whose columns they get, and `note`; empty cells where they lack one."""
-    columns = [*table, *(["note"] if "note" in rows and "note" not in table else [])]
-
-    def filled(part: "pd.DataFrame", reference: "pd.DataFrame") -> "pd.DataFrame":
-        blank = {n: "" if n == "note" or reference[n].dtype == object else np.nan for n in columns if n not in part}
-        return part.assign(**blank)[columns]
-
-    return common.stack_tables([filled(table, rows), filled(rows, table)]) if len(table) else rows

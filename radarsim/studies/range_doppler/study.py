@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +15,8 @@ from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.designed_case import DesignedCase, design_case
 
 if TYPE_CHECKING:
-    from radarsim.studies.range_doppler.kernel_problem import Problem
-
-    pass
+    from radarsim.kernels import second_order
+    from radarsim.studies.range_doppler.kernels import missed_block
 
 COMPONENTS = (("r", "m"), ("Vr", "m/s"), ("ar", "m/s2"))
 BLOCK = 4096  # 8 chunks of 512; 0.4 ms with two filters and 15 scans
@@ -65,16 +65,27 @@ class Plan:
 
     @cached_property
     def layout(self) -> Layout:
-        from radarsim.studies.range_doppler import kernel_problem
-
-        return kernel_problem.layout(self.design)
+        layout: Layout = self.kernel.layout(self.design)
+        return layout
 
     @cached_property
-    def problem(self) -> "Problem":
-        """What is simulated, as the kernels take it."""
-        from radarsim.studies.range_doppler import kernel_problem
+    def problem(self) -> "second_order.Problem | missed_block.Problem":
+        """What is simulated, as the kernel takes it."""
+        problem: second_order.Problem | missed_block.Problem
+        problem = self.kernel.problem(self.case, self.design, self.axes.baseline)
+        return problem
 
-        return kernel_problem.problem(self.case, self.design, self.axes.baseline)
+    @property
+    def kernel(self) -> ModuleType:
+        """The module that simulates: for the paper's world with shared gains, for any other one with gains of each
+        realisation. Each loads the compiler and kernels of its own."""
+        if self.design.plain:
+            from radarsim.studies.range_doppler import shared_gains
+
+            return shared_gains
+        from radarsim.studies.range_doppler import individual_gains
+
+        return individual_gains
 
 
 def prepare(case: Case) -> Plan:
@@ -222,13 +233,11 @@ def exact_means(designed_case: DesignedCase, baseline: int) -> ExactErrors:
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
-    from radarsim.studies.range_doppler import kernel_problem
-
-    return kernel_problem.sums(plan.problem, plan.layout, first, count)
+    sums: np.ndarray = plan.kernel.sums(plan.problem, plan.layout, first, count)
+    return sums
 
 
 def errors(plan: Plan, first: int, count: int) -> np.ndarray:
     """The errors (F, count, K, 3) of its realisations."""
-    from radarsim.studies.range_doppler import kernel_problem
-
-    return kernel_problem.errors(plan.problem, first, count)
+    block_errors: np.ndarray = plan.kernel.errors(plan.problem, first, count)
+    return block_errors

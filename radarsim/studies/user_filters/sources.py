@@ -23,6 +23,7 @@ from radarsim.config.identity import digest
 from radarsim.errors import ConfigError
 from radarsim.user_code import errors as user_code_errors
 from radarsim.user_code.files import is_program_file
+from radarsim.user_code.imports import imports_in
 from radarsim.user_code.module_sources import INSTALLED
 
 MAX_NAME = 255  # characters of the name of a file
@@ -163,19 +164,6 @@ def _names_in(file: Path, name: str) -> tuple[list[str], list[str]]:
     package = name if file.name == "__init__.py" else name.rpartition(".")[0]
     constants = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)]
     return imports_in(tree, package), [value for value in constants if isinstance(value, str)]
-
-
-def imports_in(tree: ast.Module, package: str) -> list[str]:
-    """The names of modules that a module in a package imports, and names in them that may be modules."""
-    modules = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            modules += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
-            base = ".".join([*above, *([node.module] if node.module else [])])
-            modules += [base, *(f"{base}.{alias.name}" for alias in node.names)]
-    return modules
 
 
 @lru_cache(maxsize=200)
