@@ -294,24 +294,42 @@ def module_files() -> list[Path]:
 MODULES = {module_name(path): path for path in module_files()}
 
 
+class Source(NamedTuple):
+    """What a source imports at any depth, what of it when it runs, not for a type checker alone, and its texts."""
+
+    imports: frozenset[str]
+    running_imports: frozenset[str]
+    texts: frozenset[str]
+
+
 @cache
-def imports(text: str, with_types: bool = True) -> frozenset[str]:
-    """The modules that a source imports at any depth; on demand without those for a type checker alone."""
-    tree = ast.parse(text)
-    return imported_modules(tree.body) if with_types else frozenset(import_names(running_nodes(tree)))
+def read_source(text: str) -> Source:
+    """A source read once, for all tests."""
+    imports, running_imports, texts = set(), set(), set()
+    waiting: list[tuple[ast.AST, bool]] = [(ast.parse(text), True)]
+    while waiting:
+        node, runs = waiting.pop()
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = set(import_names([node]))
+            imports |= names
+            running_imports |= names if runs else set()
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            texts.add(node.value)
+        runs = runs and not is_for_type_checker(node)
+        waiting += [(child, runs) for child in ast.iter_child_nodes(node)]
+    return Source(frozenset(imports), frozenset(running_imports), frozenset(texts))
+
+
+def is_for_type_checker(node: ast.AST) -> bool:
+    """Whether this is `if TYPE_CHECKING`, or an `if` that names it otherwise."""
+    return isinstance(node, ast.If) and any(
+        "TYPE_CHECKING" in (getattr(part, "id", ""), getattr(part, "attr", "")) for part in ast.walk(node.test)
+    )
 
 
 def imported_modules(body: Iterable[ast.stmt]) -> frozenset[str]:
     """The modules that statements import at any depth."""
     return frozenset(import_names(node for statement in body for node in ast.walk(statement)))
-
-
-def running_nodes(tree: ast.AST) -> Iterator[ast.AST]:
-    """All nodes of a source but those under `if TYPE_CHECKING`."""
-    for node in ast.iter_child_nodes(tree):
-        if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
-            yield node
-            yield from running_nodes(node)
 
 
 def import_names(nodes: Iterable[ast.AST]) -> Iterator[str]:
@@ -337,7 +355,9 @@ imported, ours = imported_modules, name_in_radarsim  # as tests/test_lean.py cal
 
 def radarsim_imports(text: str, with_types: bool = True) -> set[str]:
     """The modules of radarsim that a source imports, without `radarsim.`."""
-    return {name for name in map(name_in_radarsim, imports(text, with_types)) if name is not None}
+    source = read_source(text)
+    names = source.imports if with_types else source.running_imports
+    return {name for name in map(name_in_radarsim, names) if name is not None}
 
 
 def faults(module: str, text: str) -> list[str]:
@@ -346,6 +366,7 @@ def faults(module: str, text: str) -> list[str]:
     return [f"{module} → {name}: {reason}" for name, reason in pairs if reason]
 
 
+@cache
 def text_of(module: str) -> str:
     return MODULES[module].read_text(encoding="utf-8")
 
@@ -410,10 +431,9 @@ PLANTED = [
 @pytest.mark.parametrize(("module", "planted"), PLANTED)
 def test_a_planted_import_is_refused(module, planted):
     package, _, name = planted.rpartition(".")
-    text = text_of(module)
-    assert faults(module, text) == []
+    assert faults(module, text_of(module)) == []
     for form in (f"import {planted}", f"from {package} import {name}", f"def f():\n    import {planted}"):
-        assert len(faults(module, f"{text}\n{form}\n")) == 1
+        assert len(faults(module, form)) == 1
 
 
 def import_circle(imports_by_module: Mapping[str, Iterable[str]]) -> list[str]:
@@ -456,7 +476,7 @@ def library_users() -> dict[str, set[str]]:
     """By library, the files that import it when they run, by their path in the package."""
     users: dict[str, set[str]] = defaultdict(set)
     for module, path in MODULES.items():
-        for name in imports(text_of(module), with_types=False):
+        for name in read_source(text_of(module)).running_imports:
             users[name.split(".")[0]].add(path.relative_to(PACKAGE).as_posix())
     return users
 
@@ -499,9 +519,7 @@ def test_only_the_registry_names_the_studies_modules():
         module
         for module in MODULES
         if place(module).room != "study"
-        for node in ast.walk(ast.parse(text_of(module)))
-        if isinstance(node, ast.Constant)
-        if isinstance(node.value, str) and any(f"studies.{study}" in node.value for study in STUDIES)
+        if any(f"studies.{study}" in text for text in read_source(text_of(module)).texts for study in STUDIES)
     }
     assert modules == {"studies.registry"}
 
