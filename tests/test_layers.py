@@ -52,6 +52,7 @@ ROOMS = {
     "studies.radial_truth": ("constants", "physics"),
     "studies.random_numbers": ("kernels.random",),
     "studies.error_law": (),
+    "studies.missed_scans": (),
     "studies.gross_errors": ("kernels.likelihood",),
     "studies.plot_arrays": ("studies.random_numbers",),
     "studies.recording_interface": ("config.experiment", "studies.error_law", "studies.plot_arrays"),
@@ -121,7 +122,8 @@ ROOMS = {
     ),
     "recordings.formats": ("recordings", "recordings.fit.folded_doppler", "language", "physics", "report"),
     "recordings.fit": (
-        *("recordings", "config", "language", "report", "studies.error_law", "studies.recording_interface"),
+        *("recordings", "config", "language", "report", "studies.error_law", "studies.missed_scans"),
+        "studies.recording_interface",
     ),
     "recordings.registration": ("recordings", "recordings.formats", "language", "report"),
     "recordings.report": (
@@ -162,7 +164,7 @@ ROLES = {
     "answer": ((*DISPLAY, "language"), (*DISPLAYED, "answer")),
     "chart": ((*DISPLAY, "report.drawing", "language"), (*COMPUTED, "figures")),
     "tracking": (
-        (*NUMBERS, "studies.noise", "studies.plot_arrays", "studies.recording_interface"),
+        (*NUMBERS, "studies.missed_scans", "studies.noise", "studies.plot_arrays", "studies.recording_interface"),
         (*COMPUTED, "tracking"),
     ),
     "plot_likelihood": (

@@ -36,6 +36,7 @@ from radarsim.recordings.study_part import recording_interface, unknown_inherite
 from radarsim.recordings.target_speed import impossible_column_speed
 from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, ErrorLaw
+from radarsim.studies.missed_scans import without_empty_rows
 from radarsim.studies.recording_interface import Likelihood, TurnError
 
 FALSE_FINDING_LEVEL = 0.05  # of a false finding
@@ -99,9 +100,8 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
     progress is called with the number of likelihoods computed."""
     case, interface = followed.case, recording_interface(followed.case)
     results = list(followed.tracks.values()) or [followed]
-    stretches = [
-        stretch for result in results for stretch in result.sample.stretches() if len(stretch["t_s"]) >= MIN_TRACK_ROWS
-    ]
+    stretches = [without_empty_rows(stretch) for result in results for stretch in result.sample.stretches()]
+    stretches = [stretch for stretch in stretches if len(stretch["t_s"]) >= MIN_TRACK_ROWS]
     if not stretches or unknown_inherited_keys(case, "likelihood"):
         return None
     sample = sample_rows(stretches, interface.rows_asked)

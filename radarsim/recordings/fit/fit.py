@@ -36,6 +36,7 @@ from radarsim.recordings.study_part import recording_interface, refuse_inherited
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
 from radarsim.recordings.track_rows import split_by_track
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
+from radarsim.studies.missed_scans import without_empty_rows
 from radarsim.studies.recording_interface import Likelihood
 
 FITTED_EXPLANATIONS = (OUTLIERS, CORRELATION)  # for which a fit can allow
@@ -214,8 +215,8 @@ def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters:
 def _read_tracks(
     source: str | os.PathLike, choices: Sequence[Sequence[str]], any_origin: bool
 ) -> tuple[dict[str | None, dict[str, np.ndarray]], int]:
-    """The columns (n,) of each track of a file of plots, by its name, and how many further plots of a scan are left
-    out."""
+    """The columns (n,) of each track of a file of plots, by its name, without empty rows; and how many further plots of
+    a scan are left out."""
     pieces_by_track, doubles = dict[str | None, list[dict[str, np.ndarray]]](), 0
     for piece in read_plots.pieces(source, choices, any_origin=any_origin):
         doubles = piece.doubles
@@ -223,8 +224,8 @@ def _read_tracks(
             if rows.name != "":
                 pieces_by_track.setdefault(rows.name, []).append(rows.columns)
     tracks = {
-        name: {key: np.concatenate([piece[key] for piece in track_pieces]) for key in track_pieces[0]}
-        for name, track_pieces in pieces_by_track.items()
+        name: without_empty_rows({key: np.concatenate([piece[key] for piece in pieces]) for key in pieces[0]})
+        for name, pieces in pieces_by_track.items()
     }
     return tracks, doubles
 

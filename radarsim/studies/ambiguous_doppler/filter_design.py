@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from radarsim.kernels import kalman_algebra
+from radarsim.kernels.gap_noise import ONE_PERIOD, manoeuvre_noise
 from radarsim.kernels.second_order import as_kernel_array
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import transition
 from radarsim.studies.ambiguous_doppler.kernels import layout
 
 UNLIMITED_DEPTH = 10.0**300  # of a list from which no hypothesis is dropped
@@ -44,17 +46,26 @@ def components(options: Any) -> tuple[bool, ...]:
 
 
 def model(order: int, variance: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """F and Q (3, 3) of a motion of order 0, 1 or 2 over dt, in a state of range, velocity and acceleration.
+    """F and Q (3, 3) of a motion of order 0, 1 or 2 over a scan, in a state of range, velocity and acceleration.
 
     Order 2 has a random jerk, order 1 a random acceleration, constant over the scan, of that variance (P1 eqs. 3, 6).
     Order 0 has a random velocity, drawn at each scan with that variance: if measured, it moves the range; else it is
     the step of a random walk."""
+    return model_over(order, variance, dt, dt)
+
+
+def model_over(order: int, variance: float, dt: float, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """As `model`, over a time dt: of more than a period as if there were a scan in each."""
     F, Q = np.zeros((3, 3)), np.zeros((3, 3))
     if order == 0:
         F[0, :2], Q[1, 1] = (1.0, dt), variance
+        if dt > ONE_PERIOD * period:  # velocities of the scans between last a period each, the latest one what is left
+            F[0, 1], (whole, part) = period, divmod(dt / period, 1.0)
+            Q[0, 0] = variance * period**2 * (whole - 1.0 + part**2)
     else:
         size = order + 1
-        F[:size, :size], Q[:size, :size] = transition(dt, size), manoeuvre_covariance(variance, dt, size)
+        F[:size, :size] = transition(dt, size)
+        Q[:size, :size] = kalman_algebra.unpack(manoeuvre_noise(variance, dt, period, size))[:size, :size]
     return F, Q
 
 

@@ -59,10 +59,10 @@ def prior_covariance(member: filter_design.Member, spec: Any) -> tuple[float, ..
 
 @lru_cache(maxsize=64)
 def packed_motion(
-    order: int, variance: float, dt: float
+    order: int, variance: float, dt: float, period: float
 ) -> tuple[np.ndarray, tuple[float, ...], tuple[np.ndarray, ...]]:
     """The matrix F of a motion over dt, and F and Q packed; cached, as most intervals of a recording are the same."""
-    F, Q = filter_design.model(order, variance, dt)
+    F, Q = filter_design.model_over(order, variance, dt, period)
     return F, pack_transition(F), pack(Q)
 
 
@@ -107,7 +107,8 @@ class SingleFollower:
         self.nis = np.full(2, np.nan)
         F, gains, had_range = np.eye(3), [np.zeros(3), np.zeros(3)], self.has_range
         if self.has_row:
-            F, f, q = packed_motion(self.member.order, self.member.manoeuvre_variance, t - self.last_t)
+            order, period = self.member.order, self.radar.scan_period_s
+            F, f, q = packed_motion(order, self.member.manoeuvre_variance, t - self.last_t, period)
             self.x = np.array(predict_state(self.x, f))
             self.P = np.array(predict_covariance(self.P, f, q))
             self.right_covariance = predict_covariance(self.right_covariance, f, q)
@@ -198,8 +199,9 @@ class InteractingFollower:
         self.nis = np.full(2, np.nan)
         self._mix(1 if np.isnan(self.last_t) else max(1, round((t - self.last_t) / self.radar.scan_period_s)))
         if not np.isnan(self.last_t):
+            times = t - self.last_t, self.radar.scan_period_s
             models = [
-                filter_design.model(member.order, member.manoeuvre_variance, t - self.last_t) for member in self.members
+                filter_design.model_over(member.order, member.manoeuvre_variance, *times) for member in self.members
             ]
             F, Q = (np.array(matrices) for matrices in zip(*models, strict=True))
             f = pack_transition(F)

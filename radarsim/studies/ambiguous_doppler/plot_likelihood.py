@@ -51,16 +51,20 @@ class PlotLikelihood:
 
     def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem":
         """The arrays of a track for the kernel."""
+        is_kept = np.any([np.isfinite(columns[name]) for name in self.columns], axis=0, keepdims=True)[0]
+        is_kept[:1] = True
+        columns = {name: column[is_kept] for name, column in columns.items()}
         dt = np.diff(columns["t_s"], prepend=columns["t_s"][0])
         steps, step_indices = np.unique(dt, return_inverse=True)
-        motions = [packed_motion(self.member.order, 1.0, step) for step in steps.tolist()]
+        period = self.spec.radar.scan_period_s
+        motions = [packed_motion(self.member.order, 1.0, step, period) for step in steps.tolist()]
         f, q = (np.array([motion[i] for motion in motions], dtype=float)[step_indices] for i in (1, 2))
         rows = np.array(plot_rows(columns))
         folds = FoldResolver(self.spec.radar)
         for row in rows:
             folds.begin_row(row[0], row[3])
             row[3] = folds.span
-        return _Problem(f, q, rows[:, 1:])
+        return _Problem(f, q, rows[:, 1:], np.flatnonzero(is_kept))
 
     def _track_scores(self, values: np.ndarray, law: ErrorLaw) -> list[np.ndarray]:
         """For each track the log-densities of its ranges and velocities, and their probabilities to be no outliers
@@ -107,7 +111,10 @@ class PlotLikelihood:
     def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""
         scores = self._track_scores(values, law)
-        judged = [(i, np.arange(len(part)), part[:, : self.observes]) for i, (_, part) in enumerate(scores)]
+        judged = [
+            (i, problem.numbers, part[:, : self.observes])
+            for i, (problem, (_, part)) in enumerate(zip(self.problems, scores, strict=False))
+        ]
         return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
@@ -119,8 +126,9 @@ class PlotLikelihood:
 class _Problem(NamedTuple):
     """A track for the kernel: motions F (n, 5) and Q (n, 6) to each row, of unit variance, and rows (n, 3).
 
-    A row holds range, velocity and span."""
+    A row holds range, velocity and span; numbers (n,): those of the rows in the track."""
 
     F: np.ndarray
     Q: np.ndarray
     rows: np.ndarray
+    numbers: np.ndarray

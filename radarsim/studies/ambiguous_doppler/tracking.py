@@ -11,6 +11,7 @@ from radarsim.studies.ambiguous_doppler.axes import COMPONENTS
 from radarsim.studies.ambiguous_doppler.followers import RowResult, make_follower
 from radarsim.studies.ambiguous_doppler.kernels import realisations
 from radarsim.studies.ambiguous_doppler.study import prepare
+from radarsim.studies.missed_scans import missed_scan_times
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
 from radarsim.studies.recording_interface import Track
 
@@ -46,6 +47,7 @@ class Tracker:
         usable = usable_filters(case.spec)
         self.names = tuple(options.name for options in usable)
         self.followers = [make_follower(options, case.spec) for options in usable]
+        self.last_t, self.period = np.nan, case.spec.radar.scan_period_s
         self.plot_sigmas = np.array([case.spec.radar.sigma_range_m, case.spec.radar.sigma_velocity_mps])
         # An estimate correlates with a number that it has taken, so that variances subtract; with others they add.
         self.estimate_signs = np.array([[-1.0, 1.0 if options.doppler == "none" else -1.0] for options in usable])
@@ -55,7 +57,8 @@ class Tracker:
 
         Raises PlotFault for a row that leaves too many folds, or exceeds a filter's digits."""
         rows = plot_rows(columns)
-        results_by_filter = [run_rows(follower, rows) for follower in self.followers]
+        results_by_filter = [run_rows(follower, rows, self.last_t, self.period) for follower in self.followers]
+        self.last_t = rows[-1][0]
         fields = {
             name: np.array([[getattr(result, name) for result in results] for results in results_by_filter])
             for name in RowResult._fields
@@ -79,13 +82,17 @@ def usable_filters(spec: Any) -> list[Any]:
     return [options for options in spec.filters if options.doppler != "unfolded" or not folded]
 
 
-def run_rows(follower: Any, rows: Sequence[tuple[float, ...]]) -> list[RowResult]:
-    """Run a filter over rows; a PlotFault carries the number of its row."""
+def run_rows(follower: Any, rows: Sequence[tuple[float, ...]], last_t: float, period: float) -> list[RowResult]:
+    """Run a filter over rows after one at last_t, and over the scans missed between them; a PlotFault carries the
+    number of its row."""
     results: list[RowResult] = []
     try:
         with np.errstate(invalid="ignore"):  # a variance lost in rounding: not-a-number, which the caller refuses
             for row in rows:
+                for missed_t in missed_scan_times(last_t, row[0], period):
+                    follower.step(missed_t, np.nan, np.nan)
                 results.append(follower.step(*row))
+                last_t = row[0]
     except PlotFault as fault:
         fault.row = len(results)
         raise

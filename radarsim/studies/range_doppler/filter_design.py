@@ -59,13 +59,12 @@ def least_squares_start(observes: int, start: int, sigma: np.ndarray, dt: float)
 
 
 def noise_by_time(noise: str, manoeuvre_variance: float, period: float) -> np.ndarray:
-    """Process noise over any time t, (2, 6) packed: Q_ij = a_ij t^(5 − i − j) + b_ij t^(6 − i − j), i and j from 0.
-    What `motion.process_noise` adds over a scan period (s), for plots at uneven times: the jerk stays constant between
-    two plots; white jerk keeps its density; of the acceleration's steps there are as many as periods."""
-    coefficients = np.zeros((2, 6))
-    noise_per_second = np.array(kalman_algebra.pack(process_noise(noise, manoeuvre_variance, 1.0)))
-    coefficients[int(noise == "random_jerk")] = noise_per_second * (1.0 if noise == "random_jerk" else period)
-    return coefficients
+    """What `motion.process_noise` adds over a scan period (s), for plots at uneven times, as `kernels.gap_noise` says:
+    the period, the variance of the jerk, and the densities of the acceleration's steps and of white jerk (4,)."""
+    numbers = np.array([period, 0.0, 0.0, 0.0])
+    kind = ("random_jerk", "white_acceleration", "white_jerk").index(noise)
+    numbers[1 + kind] = manoeuvre_variance * (period if kind else 1.0)
+    return numbers
 
 
 def design(

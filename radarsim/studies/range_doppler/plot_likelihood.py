@@ -62,14 +62,16 @@ class PlotLikelihood:
         if not present[:, 0].any():
             return None
         first = int(present[:, 0].argmax())
-        rows = np.arange(first, len(z))
+        rows = first + np.flatnonzero(present[first:].any(axis=1))
         t, z, present = columns["t_s"][rows], z[rows], present[rows]
         settled = int(np.searchsorted(np.cumsum(present[:, 0]), START_RANGES, side="right"))
         present[0, 0] = False  # it starts the track
         dt = np.diff(t, prepend=t[0])
-        F, Q = np.stack([transition(step) for step in dt]), unpack(recorded_rows.noise_over(self.noise, dt))
+        F, Q = np.stack([transition(step) for step in dt]), np.empty((len(dt), 6))
+        recorded_rows.fill_noise(self.noise, dt, Q)
         H = np.tile(observation(self.observes), (len(t), 1, 1))
-        return _Problem(track, rows, F, Q, H, np.where(present, z, 0.0), z[0, 0], present, settled, dt / self.usual_s)
+        model = F, unpack(Q.T), H
+        return _Problem(track, rows, *model, np.where(present, z, 0.0), z[0, 0], present, settled, dt / self.usual_s)
 
     def _score(self, problem: "_Problem", values: np.ndarray, law: ErrorLaw) -> tuple[np.ndarray, np.ndarray]:
         """The log-densities (n, m) of a track's numbers, and their probabilities to be no outliers."""

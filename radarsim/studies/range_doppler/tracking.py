@@ -55,9 +55,9 @@ class Tracker:
 
     A filter starts by least squares as soon as it has taken as many plots as the config's `initial_scans` says and
     these determine range, velocity and acceleration; before, its estimates are the plots. Then the Kalman filter of the
-    study goes from row to row, its gains computed for the interval and for what the row holds. Where the config leaves
-    the manoeuvre variance to be looked for, it is the best one on the config's target. A filter of a package makes its
-    gains for the times of the whole recording and for what each row holds."""
+    study goes from row to row, its gains computed for the interval and for what the row holds; an empty row is none.
+    Where the config leaves the manoeuvre variance to be looked for, it is the best one on the config's target. A filter
+    of a package makes its gains for the times of the whole recording and for what each row holds."""
 
     several = False
 
@@ -110,7 +110,7 @@ class _TrackFilter(ABC):
         self.observes, self.needed, self.sigma = len(options.observes), options.plots_to_start, sigma
         self.x: np.ndarray | None = None
         self.P = np.zeros(6)
-        self.last = 0.0
+        self.last_t = np.zeros(1)
         self.held: list[tuple[float, np.ndarray]] = []
 
     def feed(self, t: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -125,11 +125,10 @@ class _TrackFilter(ABC):
                 estimate[k, :2] = np.where(is_used[k], z[k], np.nan)
                 sigma[k, :2] = np.where(is_used[k], self.sigma, np.nan)
             else:
-                estimate[k], sigma[k] = self.x, np.sqrt(self.P[[0, 3, 5]])
+                estimate[k], sigma[k], self.last_t[0] = self.x, np.sqrt(self.P[[0, 3, 5]]), t[k]
             k += 1
         if k < n:
             estimate[k:], sigma[k:], nis[k:] = self.after(k, t, z, is_used)
-        self.last = t[-1]
         return estimate, sigma, nis
 
     @abstractmethod
@@ -163,11 +162,10 @@ class _KalmanTrackFilter(_TrackFilter):
     def after(
         self, k: int, t: np.ndarray, z: np.ndarray, is_used: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        dt = np.diff(t[k:], prepend=self.last if k == 0 else t[k - 1])
-        n = len(dt)
+        n, state = len(t) - k, (self.x, self.P, self.last_t)
         outputs = np.empty((n, 3)), np.empty((n, 3)), np.full((n, 2), np.nan)
-        inputs = self.x, self.P, dt, np.where(is_used, z, 0.0)[k:], is_used[k:].astype(float), self.sigma**2, self.noise
-        recorded_rows.filter_rows(*inputs, *outputs)
+        plots = t[k:], np.where(is_used, z, 0.0)[k:], is_used[k:].astype(float), self.sigma**2
+        recorded_rows.filter_rows(*state, *plots, self.noise, *outputs)
         return outputs
 
 

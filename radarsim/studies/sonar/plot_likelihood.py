@@ -6,8 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.kernels.gap_noise import manoeuvre_noise
+from radarsim.kernels.kalman_algebra import unpack
 from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import transition
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
 from radarsim.studies.recording_interface import usual_interval_s
@@ -69,14 +71,16 @@ class PlotLikelihood:
         if self.spec.frame != "polar":
             is_used[:, :2] = is_used[:, :2].all(axis=1, keepdims=True)
         first = int(is_whole.argmax())
-        rows = np.arange(first, len(is_whole))
+        rows = first + np.flatnonzero(is_used[first:].any(axis=1))
         t, z, is_used, is_whole = columns["t_s"][rows], z[:, rows], is_used[rows], is_whole[rows]
         steps = np.diff(t, prepend=t[0])
         eye = np.eye(C)
         F = np.stack([np.kron(eye, transition(step, size)) for step in steps])
-        Q = np.stack([np.kron(np.diag(scale), manoeuvre_covariance(1.0, step, size)) for step in steps])
+        period = self.spec.sensor.scan_period_s
+        noises = [unpack(manoeuvre_noise(1.0, step, period, size))[:size, :size] for step in steps.tolist()]
+        Q = np.stack([np.kron(np.diag(scale), noise) for noise in noises])
         settled = int(np.searchsorted(np.cumsum(is_whole), STARTING_PLOTS, side="right"))
-        usual_interval_s = float(np.median(steps[1:])) if len(steps) > 1 else self.spec.sensor.scan_period_s
+        usual_interval_s = float(np.median(steps[1:])) if len(steps) > 1 else period
         rates = WIDE_RATE_SIGMAS * usual_interval_s ** -np.arange(1.0, size)
         is_used[0] = False  # it starts the track
         second_whole = int(is_whole[1:].argmax()) + 1 if is_whole[1:].any() else 0

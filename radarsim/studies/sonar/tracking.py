@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.studies.missed_scans import with_missed_scans
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
 from radarsim.studies.recording_interface import Track
 from radarsim.studies.sonar import conversion, detector_arrays, filter_banks, filter_design, kernel_inputs, labels
@@ -102,9 +103,13 @@ class Tracker:
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
         """The estimates over all rows: columns (n,), NaN where a value is missing."""
         spec, specs = self.spec, self.specs()
-        t = columns["t_s"] - columns["t_s"][0]
+        t, period = columns["t_s"] - columns["t_s"][0], spec.sensor.scan_period_s
         z, weight, sigma = plots_in_filter_frame(spec, list(columns.values())[1:])
-        x, P, is_known = _estimate_tracks(specs, t, spec.sensor.scan_period_s, z, weight, sigma)
+        times, rows = with_missed_scans(t, period)
+        all_z, all_weights = np.zeros((2, len(z), len(times)))
+        all_z[:, rows], all_weights[:, rows] = z, weight
+        estimates = _estimate_tracks(specs, times, period, all_z, all_weights, sigma)
+        x, P, is_known = (part[:, rows] for part in estimates)
         size = max(filter_spec.size for filter_spec in specs)
         flat = (len(specs), len(t), len(z) * size)
         variance = np.diagonal(P, axis1=3, axis2=4)

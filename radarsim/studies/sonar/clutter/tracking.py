@@ -6,6 +6,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
+from radarsim.studies.missed_scans import with_missed_scans
 from radarsim.studies.noise import noise_key
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
 from radarsim.studies.recording_interface import Track
@@ -60,16 +61,17 @@ class Tracker:
             raise ConfigError(
                 f"{self.case.name}: filters: it is not known which plots are the target's: use nearest or pda"
             )
-        t, row = np.unique(columns["t_s"], return_inverse=True)
+        t, scan = np.unique(columns["t_s"], return_inverse=True)
+        times, places = with_missed_scans(t, spec.sensor.scan_period_s)
         plots = np.stack([columns["range_m"], columns["bearing_rad"]])
         complete = np.isfinite(plots).all(axis=0)
-        scans = [(time, *plots[:, complete & (row == k)]) for k, time in enumerate(t)]
+        scans = [(time, *plots[:, complete & (places[scan] == k)]) for k, time in enumerate(times)]
         by_filter = {
             f: confirmed_tracks(specs[f], tracker_design.tracking_conditions(spec), scans) for f in filter_indices
         }
         tracks = [(f, n, track) for f, histories in by_filter.items() for n, track in enumerate(histories, start=1)]
-        estimate, sigma = np.full((2, len(tracks), len(t), 4), np.nan)
-        score = np.full((len(tracks), len(t)), np.nan)
+        estimate, sigma = np.full((2, len(tracks), len(times), 4), np.nan)
+        score = np.full((len(tracks), len(times)), np.nan)
         for i, (_, _, track) in enumerate(tracks):
             estimate[i, track.scans], sigma[i, track.scans] = track.states, np.sqrt(track.variances)
             score[i, track.scans] = track.scores
@@ -77,8 +79,8 @@ class Tracker:
             filters=tuple(spec.filters[f].name for f, _, _ in tracks),
             components=labels.labels(spec, SIZE),
             t_s=t,
-            estimate=estimate,
-            sigma=sigma,
+            estimate=estimate[:, places],
+            sigma=sigma[:, places],
             numbers=np.array([n for _, n, _ in tracks]),
-            score=score,
+            score=score[:, places],
         )

@@ -16,11 +16,11 @@ import numpy as np
 
 from radarsim.kernels import kalman_algebra, lane_matrices, lanes
 from radarsim.kernels.compiler import inline
+from radarsim.kernels.gap_noise import manoeuvre_noise
 from radarsim.kernels.lane_matrices import choose3, choose6, get6, put3, put6
 from radarsim.kernels.lanes import full, get, put, where_greater
 from radarsim.studies.sonar.kernels import steps
 from radarsim.studies.sonar.kernels.chunks import GROUPS
-from radarsim.studies.sonar.kernels.kalman import manoeuvre_covariance
 from radarsim.studies.sonar.kernels.least_squares import least_squares
 from radarsim.studies.sonar.kernels.steps import memory_addresses
 
@@ -102,7 +102,7 @@ def update_imm(filters, plots, f, c, pairs, size, dt, period, sigma):
     tau, per, unit, ones, zeros = dt / period, 1.0 / period, 1.0 / sigma, full(1.0), full(0.0)
     first_scans, half, F = full(size - 0.5), full(0.5), kalman_algebra.constant_acceleration(dt)
     q, stay = pairs.manoeuvre[f, c], pairs.stay[f]
-    Q = (manoeuvre_covariance(q[0], tau, size), manoeuvre_covariance(q[1], tau, size))
+    Q = (manoeuvre_noise(q[0], tau, 1.0, size), manoeuvre_noise(q[1], tau, 1.0, size))
     p11, p22 = stay[0], stay[1]
     p12, p21 = 1.0 - p11, 1.0 - p22
     stationary = full(p21 / (p12 + p21))

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from radarsim.kernels import kalman_algebra
 from radarsim.kernels.compiler import inline
+from radarsim.kernels.gap_noise import manoeuvre_noise
 from radarsim.kernels.lane_matrices import choose3, choose6
 from radarsim.kernels.lanes import full, where_greater
 from radarsim.studies.sonar.kernels.least_squares import NOTHING_NEW
@@ -22,18 +23,10 @@ class Model(NamedTuple):
 
 
 @inline
-def manoeuvre_covariance(q, tau, size):
-    """Q (6) of a random derivative of order `size` and variance q, constant over tau."""
-    half = 0.5 * tau * tau
-    g = (half, tau, 0.0) if size == 2 else (tau * half / 3.0, half, tau)
-    return kalman_algebra.add_outer(kalman_algebra.NO_NOISE, q, g)
-
-
-@inline
 def predicted_joint(J, w, tau, model):
     """Predict the joint covariance: F J Fᵀ + Q; the error stays stationary, with variance 1 / w."""
     ones, zeros, c, F = full(1.0), full(0.0), model.c, kalman_algebra.constant_acceleration(tau)
-    P = kalman_algebra.predict_covariance(J[:6], F, manoeuvre_covariance(model.q, tau, model.size))
+    P = kalman_algebra.predict_covariance(J[:6], F, manoeuvre_noise(model.q, tau, 1.0, model.size))
     e = kalman_algebra.predict_state(J[6:9], F)
     return (*P, c * e[0], c * e[1], c * e[2], c * c * J[9] + (1.0 - c * c) / where_greater(w, zeros, w, ones))
 

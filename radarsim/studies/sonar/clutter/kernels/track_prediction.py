@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.kernels.compiler import aligned_zeros, inline, kernel
+from radarsim.kernels.gap_noise import manoeuvre_noise
 from radarsim.kernels.kalman_algebra import constant_acceleration, predict_covariance, predict_state
 from radarsim.kernels.lane_matrices import choose6, get3, get4, get6
 from radarsim.kernels.lanes import address, full, get, put
-from radarsim.studies.sonar.kernels import kalman
 from radarsim.studies.sonar.kernels.chunks import CHUNK, GROUPS
 
 LEAST_SQUARES_PLOTS = 2.0  # plots from which a line is no longer least squares
@@ -55,7 +55,7 @@ def clear_track(tracks, i):
 @inline
 def predict_line_covariance(P, n, tau, q):
     """Predict the covariance (6) of a line over tau periods."""
-    moved = predict_covariance(P, constant_acceleration(tau), kalman.manoeuvre_covariance(q, tau, 2))
+    moved = predict_covariance(P, constant_acceleration(tau), manoeuvre_noise(q, tau, 1.0, 2))
     return choose6(full(LEAST_SQUARES_PLOTS), n, P, moved)
 
 

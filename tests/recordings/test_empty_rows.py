@@ -1,0 +1,91 @@
+"""An empty row and no row are the same, for every filter of every study that takes recorded plots."""
+
+import numpy as np
+import pytest
+
+from radarsim.api.load_experiments import load_all
+from radarsim.recordings import simulate_plots
+from radarsim.recordings.study_part import recording_interface
+from radarsim.studies.missed_scans import with_missed_scans
+
+CONFIGS = {
+    "rls2": ("scans=40",),
+    "multimodel_families": ("scans=40",),
+    "sonar_smoothing": (),
+    "sonar_correlated": ("sweep.sensor.error_correlation=[0.6]",),
+    "sonar_conversion": ("sweep.sensor.sigma_bearing_deg=[1]", "sweep.frame=[cartesian]"),
+    "sonar_manoeuvre": ("scans=60", "sweep.target.acceleration_mps2=[0.1]"),
+    "ambiguous_rls2": ("scans=25",),
+    "ambiguous_orders": ("scans=25",),
+}
+
+
+def loaded(config, *overrides):
+    (one,) = load_all([config], overrides)
+    return one.cases[0]
+
+
+def recording(config, *overrides):
+    (one,) = load_all([config], overrides)
+    columns = simulate_plots.simulate_realisation(one, 3)
+    return {name: column for name, column in columns.items() if not name.startswith("true_")}
+
+
+def tracked(case, columns):
+    return recording_interface(case).tracker(case).feed({name: column.copy() for name, column in columns.items()})
+
+
+def with_and_without(columns, missed):
+    """The columns with empty rows, and without them; and which rows are left."""
+    kept = ~np.isin(np.arange(len(columns["t_s"])), missed)
+    empty = {name: np.where(kept | (name == "t_s"), column, np.nan) for name, column in columns.items()}
+    return empty, {name: column[kept] for name, column in columns.items()}, kept
+
+
+def assert_same(first, second, kept):
+    assert first.filters == second.filters
+    for name in ("estimate", "sigma"):
+        a, b = getattr(first, name)[:, kept], getattr(second, name)
+        assert (np.isfinite(a) == np.isfinite(b)).all()
+        scale = np.nan_to_num(first.sigma[:, kept], nan=1.0)
+        assert np.nanmax(np.abs(a - b) / np.maximum(scale, 1e-300), initial=0.0) < 1e-6
+
+
+@pytest.mark.parametrize("config", CONFIGS)
+def test_empty_rows_change_no_estimate(config):
+    case, columns = loaded(config, *CONFIGS[config]), recording(config, *CONFIGS[config])
+    empty, without, kept = with_and_without(columns, [6, 9, 10, 11, 14])
+    assert_same(tracked(case, empty), tracked(case, without), kept)
+    interface = recording_interface(case)
+    for member in case.spec.members:
+        one, other = (interface.likelihood(case, member.name, [track]) for track in (empty, without))
+        if one is not None:
+            assert one(one.stated) == pytest.approx(other(other.stated), rel=1e-9)
+
+
+def test_a_scan_without_plots_ends_tracks_among_false_plots_as_one_without_rows():
+    overrides = "sweep.gate_probability=[0.99]", "sweep.sensor.detection_probability=[0.9]"
+    case, columns = loaded("sonar_clutter_gate", *overrides), recording("sonar_clutter_gate", *overrides)
+    t = np.unique(columns["t_s"])
+    is_missed = np.isin(columns["t_s"], t[[8, 12, 13, 20]])
+    without = {name: column[~is_missed] for name, column in columns.items()}
+    empty = {name: np.where((name == "t_s") | ~is_missed, column, np.nan) for name, column in columns.items()}
+    first, second = tracked(case, empty), tracked(case, without)
+    kept = np.isin(first.t_s, second.t_s)
+    assert_same(first, second, kept)
+    np.testing.assert_array_equal(first.score[:, kept], second.score)
+
+
+@pytest.mark.parametrize(("config", "gap_s"), [("rls2", 1e4), ("sonar_smoothing", 1e6)])
+def test_a_long_gap_leaves_variances(config, gap_s):
+    case, columns = loaded(config, *CONFIGS[config]), recording(config, *CONFIGS[config])
+    columns["t_s"] = columns["t_s"] + np.where(np.arange(len(columns["t_s"])) > 12, gap_s, 0.0)
+    track = tracked(case, columns)
+    assert np.isfinite(track.sigma[:, 13:][np.isfinite(track.estimate[:, 13:])]).all()
+    assert (track.sigma[np.isfinite(track.sigma)] >= 0).all()
+
+
+def test_missed_scans_are_those_of_whole_periods():
+    times, rows = with_missed_scans(np.array([0.0, 10.0, 40.001, 45.0, 70.0, 1e9]), 10.0)
+    np.testing.assert_allclose(times[:10], [0, 10, 20.0003, 30.0007, 40.001, 45, 55, 70, 80, 90], rtol=1e-5)
+    assert len(times) == rows[-1] + 1 == 8 + 100 + 1
