@@ -151,11 +151,23 @@ def add_user_filter(
     counts: dict[str, Any] = {"realisations": n or available} if n or available else {}
     cases = tuple(replaced(case, user_filters=(*case.user_filters, member), **counts) for case in cases)
     stem = f"{experiment.stem}_{'_'.join(name.split())}"
-    judged_experiment = replaced(experiment, stem=stem, cases=cases, **counts)
+    judged_experiment = replaced(experiment, stem=stem, cases=cases, content=_named(experiment, stem), **counts)
     return judged_experiment, [
         *tuning_warnings,
         *(line for case in judged_experiment.cases for line in check_user_filter(case, member)),
     ]
+
+
+OUTER_KEYS = ("figures", "realisations", "runs", "scenarios", "seed")  # of a config that includes another
+
+
+def _named(experiment: Experiment, stem: str) -> dict[str, Any] | None:
+    """The content of an experiment under another name; its cases keep theirs."""
+    if experiment.content is None:
+        return None
+    inner = {key: value for key, value in experiment.content.items() if key not in OUTER_KEYS}
+    outer = {key: value for key, value in experiment.content.items() if key in OUTER_KEYS}
+    return {"name": stem, "include": [inner], **outer}
 
 
 def make_user_filter(

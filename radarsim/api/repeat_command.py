@@ -57,6 +57,8 @@ def command(
     for override in overrides:
         key, _, value = override.partition("=")
         words += [SHORT_OPTIONS[key], value] if key in SHORT_OPTIONS else ["--set", override]
+    if experiment.runs:
+        words += ["--runs", experiment.runs]
     if precision is not None:
         percent, quantity_name = precision
         words += ["--precision", f"{percent:.17g}", *(["--of", quantity_name] if quantity_name != "sigma" else [])]

@@ -70,8 +70,9 @@ def run(
     open. width_mm: width of the figures, instead of their own. replace: whether tables of other settings or another
     seed, or of more realisations, may be replaced in the folder of the result; otherwise ConfigError is raised before
     anything is computed, and of more realisations the stored ones are shown. runs: scans, `2:60` or `all`, for the
-    table `runs` of each run's root-mean-square error over them (`Result.add_runs_table`). progress is called with the
-    realisations that are done, are to be done, and were stored, where cases are weighed by their time.
+    table `runs` of each run's root-mean-square error over them (`Result.add_runs_table`), in place of those of the
+    config. progress is called with the realisations that are done, are to be done, and were stored, where cases are
+    weighed by their time.
 
     Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
     TargetUnmet if the time did not suffice for a single block, and Interrupted on a signal; finished blocks are then
@@ -95,6 +96,7 @@ def run(
         from radarsim.api.runs_table import parse_span
 
         parse_span(runs)
+        experiment = experiment.with_runs(runs)
     if precision is not None:
         from radarsim.api.precision_target import check_precision
 
@@ -139,9 +141,9 @@ def run(
     result = make_result(experiment, simulated, facts, repeat)
     run_warnings = (line for case in experiment.cases for member in case.user_filters for line in member.warnings())
     result.facts["warnings"] += dict.fromkeys((*filter_warnings, *run_warnings))
-    if runs is not None:
+    if experiment.runs:
         with limited(threads):
-            result.add_runs_table(runs)
+            result.add_runs_table(experiment.runs)
     if out is None:
         result.check()
     else:

@@ -39,6 +39,9 @@ class CommonKeys(Model):
         "names or patterns with * and ?, in the report's order; or a mapping to the cases of each; default and []: all",
         (),
     )
+    runs: Annotated[str, Strict(), StringConstraints(pattern=r"^(all|[1-9]\d*:[1-9]\d*)$")] | None = key(
+        "scans of runs.csv", "table of each run's root-mean-square error over these scans, '2:60' or all", None
+    )
     scenarios: dict[Stem, dict[str, Anything]] | None = key(
         "scenarios", "scenarios by the stems under which this config names them, in place of files", None
     )

@@ -114,6 +114,7 @@ class Expander:
             figures=common.cases_of_figures(),
             changes_included=changes_included(document),
             like=common.like or "",
+            runs=common.runs or "",
             content=self._complete_content(expansion.content, document),
         )
 
@@ -128,7 +129,7 @@ class Expander:
         if any(scenario != scenarios[0] for scenarios in self.named_scenarios.values() for scenario in scenarios):
             return None
         scenarios = {stem: scenarios[0] for stem, scenarios in self.named_scenarios.items()}
-        further = {"figures": document.data.get("figures"), "scenarios": scenarios}
+        further = {key: document.data.get(key) for key in ("figures", "runs")} | {"scenarios": scenarios}
         return content | {key: value for key, value in further.items() if value}
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...], overlays: OverlaidKeys) -> Expansion:

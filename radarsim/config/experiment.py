@@ -89,8 +89,8 @@ class Experiment:
 
     figures: for each figure to draw, the names or patterns of its cases. changes_included: whether keys of the study
     stand beside `include`, so that a case differs from the config of its stem. like: the shipped config of which it is
-    a version, as it says itself. content: the config written out in full, see `radarsim.config.complete_config`; None
-    where no text describes it."""
+    a version, as it says itself. runs: the scans of the table of runs, empty for none. content: the config written out
+    in full, see `radarsim.config.complete_config`; None where no text describes it."""
 
     stem: str
     study: str
@@ -101,12 +101,18 @@ class Experiment:
     figures: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     changes_included: bool = False
     like: str = ""
+    runs: str = ""
     content: Mapping[str, Any] | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return (
             f"<experiment {self.stem} of study {self.study}: cases {', '.join(case.name for case in self.cases)[:120]}>"
         )
+
+    def with_runs(self, span: str) -> "Experiment":
+        """The experiment with a table of runs over a span of scans."""
+        content = None if self.content is None else {**self.content, "runs": span}
+        return replace(self, runs=span, content=content)
 
     @cached_property
     def resolved(self) -> dict[str, Any]:

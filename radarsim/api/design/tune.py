@@ -23,6 +23,7 @@ from radarsim.api.design import quantities, question
 from radarsim.api.design.jackknife import jackknife_interval
 from radarsim.api.design.quantities import MeasuredQuantity
 from radarsim.api.design.question import Curve, measure_seconds
+from radarsim.api.design.tuned_content import tuned_content
 from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, objective_words
 from radarsim.api.design.tuning_space import (
     DIGITS,
@@ -619,7 +620,8 @@ def tune_baseline(
         spec = family_case.spec
         members = [*map(all_keys, spec.members), *(result.member(family_case) for result in results)]
         tuned_cases.append(case_with_filters(family_case, members, getattr(spec, "baseline", None)))
-    return replace(experiment, cases=tuple(tuned_cases)), left_out, _point_of(results[0].quantity, axes)
+    tuned = replace(experiment, cases=tuple(tuned_cases), content=tuned_content(experiment, tuned_cases))
+    return tuned, left_out, _point_of(results[0].quantity, axes)
 
 
 def judged_point(experiment: Experiment, target: str) -> tuple[str, float] | None:
