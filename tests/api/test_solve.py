@@ -112,7 +112,8 @@ def test_the_confirming_run_confirms():
     found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 30, overrides=["radar.sigma_range_m=200"])
     program, run, config, *words = shlex.split(found.command)
     assert (program, run) == ("radarsim", "run")
-    result = radarsim.run(config, overrides=[word for word in words if word != "--set"], realisations=2000)
+    overrides = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
+    result = radarsim.run(config, overrides=overrides, realisations=2000)
     row = result.gains.query("component == 'r' and t_s == 60").iloc[0]
     assert row["exact_percent"] == pytest.approx(30, abs=0.5e-11 * abs(found.slope * found.value))  # twelve digits
     assert row["gain_lo"] < 30 < row["gain_hi"]
@@ -341,7 +342,7 @@ def test_the_command_says_value_slope_and_check():
         "radar.sigma_velocity_mps = 13.7212 m/s   exact",
         "attains  gain of r+Vr in r at 60 s: 30 % (at 15 m/s: 27.92 %)",
         "slope    1 m/s more costs 1.70 points",
-        "check    radarsim run rls2 --set radar.sigma_velocity_mps=13.7212493675",
+        "check    radarsim run rls2 --set radar.sigma_velocity_mps=13.7212493675 --out results/solved",
     ]
 
 

@@ -14,6 +14,7 @@ from radarsim.api.configs import Config, load
 from radarsim.api.design import quantities, root_search
 from radarsim.api.design.quantities import UNKNOWN_ESTIMATE, MeasuredQuantity
 from radarsim.api.design.solve_answer import Answer, number, rounded
+from radarsim.api.repeat_command import RESULTS
 from radarsim.config import numeric_keys
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.find_files import did_you_mean
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 V = TypeVar("V")
 
+SOLVED_OUT = f"{RESULTS}/solved"  # where the run that confirms an answer writes
 SEARCH_FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
 WHOLE_NUMBER_NOTE = term("the nearest whole number that is at least as good as the target")
 MAX_NAMED_CASES = 6  # cases listed in a message
@@ -135,12 +137,15 @@ class Question:
     realisations: int | None = None
 
     def command(self, value: float) -> str:
-        """The run that confirms a value, with independent noise and the requested number of realisations."""
+        """The run that confirms a value, with independent noise and the requested number of realisations, in a
+        directory of its own: the usual one may hold the config's results."""
         config_name = self.cases.config if isinstance(self.cases.config, str | os.PathLike) else "CONFIG.yaml"
         settings = [*self.overrides, f"{self.key}={number(value)}"]
         realisations_option = [] if self.realisations is None else ["-n", str(self.realisations)]
         set_options = [word for setting in settings for word in ("--set", setting)]
-        return shlex.join(["radarsim", "run", os.fspath(config_name), *set_options, *realisations_option])
+        return shlex.join(
+            ["radarsim", "run", os.fspath(config_name), *set_options, "--out", SOLVED_OUT, *realisations_option]
+        )
 
 
 def key_range(

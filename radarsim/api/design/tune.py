@@ -43,6 +43,7 @@ from radarsim.api.design.tuning_space import (
     value_at_path,
 )
 from radarsim.api.load_experiments import combine_overrides
+from radarsim.api.repeat_command import RESULTS
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.identity import all_keys
 from radarsim.config.labels import label
@@ -55,6 +56,7 @@ from radarsim.report.user_filters.answer import TUNED
 from radarsim.report.wording import format_number
 from radarsim.studies import registry
 
+TUNED_OUT = f"{RESULTS}/tuned"  # where the run with tuned values writes
 TRAINING_SEED_OFFSET = 2**32  # more than the seed of the config: the seed of the noise that is searched with
 FLAT_CHANGE = 1e-3  # of the quantity: within it a key is as good as tuned
 STEP = 0.25  # on the scale of the search, of derivatives of sampled values
@@ -556,7 +558,7 @@ def _tuning_result(
 def _run_command(
     config: Config, settings: Sequence[str], prefix: str, paths: Iterable[Path], tuned_keys: Mapping[str, Any]
 ) -> str:
-    """The command of a run with the tuned keys."""
+    """The command of a run with the tuned keys, in a directory of its own."""
     setting_texts = list(settings)
     for path in paths:
         # An item of a list is set with the whole list, which other items of it may have changed as well.
@@ -564,7 +566,7 @@ def _run_command(
         setting_texts.append(f"{prefix}{text}={one_line_yaml(value_at_path(tuned_keys, path[: text.count('.') + 1]))}")
     config_name = os.fspath(config) if isinstance(config, str | os.PathLike) else "CONFIG.yaml"
     set_options = [word for setting in dict.fromkeys(setting_texts) for word in ("--set", setting)]
-    return shlex.join(["radarsim", "run", config_name, *set_options])
+    return shlex.join(["radarsim", "run", config_name, *set_options, "--out", TUNED_OUT])
 
 
 def _tuning_notes(
