@@ -10,6 +10,7 @@ from radarsim.api.case_work import CaseWork
 from radarsim.api.simulate_cases import SimulatedCases
 from radarsim.language.translate import shorten_names, tr
 from radarsim.studies import registry
+from radarsim.studies.sources import user_packages
 
 
 def run_facts(simulated: SimulatedCases, threads: int, seconds: float) -> dict[str, Any]:
@@ -30,6 +31,9 @@ def run_facts(simulated: SimulatedCases, threads: int, seconds: float) -> dict[s
         ],
         "identities": {case.name: work.identity for case, work, _ in simulated.cases},
     }
+    packages = [user_packages(case) for case, _, _ in simulated.cases]
+    if any(packages):
+        facts["packages"] = {name: package._asdict() for by_name in packages for name, package in by_name.items()}
     if measured := seconds_per_update(work for _, work, _ in simulated.cases):
         facts["seconds_per_update"] = measured
     if simulated.precision is None:

@@ -1,6 +1,7 @@
 """The cases of earlier results as today's program reads them, from their run.json."""
 
 import hashlib
+import importlib.metadata
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +26,20 @@ def stored_experiment(record: Mapping, folder: Path) -> Experiment | None:
         return experiment if provenance.is_same_config(record["resolved"], experiment.resolved) else None
     except (RadarsimError, LookupError, TypeError):
         return None
+
+
+def missing_packages(record: Mapping) -> str:
+    """The packages that a result names and that are not installed, with versions, as a phrase that says what to do;
+    empty where there is none."""
+    packages = record.get("packages")
+    missing = []
+    for name, package in packages.items() if isinstance(packages, dict) else ():
+        try:
+            importlib.metadata.version(str(name))
+        except importlib.metadata.PackageNotFoundError:
+            details = package if isinstance(package, dict) else {}
+            missing.append(f"{name} {details.get('version')} (SHA-256 of its sources: {details.get('sha256')})")
+    return f"install the package that computed it: {', '.join(missing)}" if missing else ""
 
 
 def config_faults(record: Mapping, folder: Path) -> list[str]:

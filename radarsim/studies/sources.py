@@ -10,14 +10,15 @@ import ast
 import contextlib
 import hashlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
-from importlib.metadata import distributions
+from importlib.metadata import distributions, packages_distributions
 from pathlib import Path
+from typing import NamedTuple
 
 from radarsim.config.experiment import Case
 from radarsim.config.model import Model
-from radarsim.studies.registry import study
+from radarsim.studies.registry import FILTERS, entry_points_by_name, study
 from radarsim.user_code.files import is_user_module
 from radarsim.user_code.imports import imports_in
 from radarsim.user_code.module_sources import module_digest, module_source, module_spec, note_loaded_modules
@@ -44,11 +45,41 @@ def sources_digest(case: Case) -> str:
     """SHA-256 of the sources that compute a case's numbers, in hexadecimal."""
     note_loaded_modules(RADARSIM)
     digests = {name: module_digest(name) for name in computing_modules(_first_modules(case))}
-    user_packages = sorted({name.partition(".")[0] for name in digests} - {RADARSIM})
+    user_packages = _user_packages(digests)
     for top in user_packages:
         digests |= {f"{top}: {name}": digest for name, digest in _data_digests(top).items()}
     versions = _installed_versions() if user_packages else []
     return hashlib.sha256(repr((sorted(digests.items()), versions)).encode()).hexdigest()
+
+
+def _user_packages(modules: Iterable[str]) -> list[str]:
+    """The top-level packages of modules that are not radarsim's."""
+    return sorted({name.partition(".")[0] for name in modules} - {RADARSIM})
+
+
+class UserPackage(NamedTuple):
+    """An installed package of the user's that computes a case: its version, and the SHA-256 of its sources."""
+
+    version: str
+    sha256: str
+
+
+def user_packages(case: Case) -> dict[str, UserPackage]:
+    """The packages of the user's that compute a case, by the names under which they are installed."""
+    modules = computing_modules(_first_modules(case))
+    if not (tops := _user_packages(modules)):
+        return {}
+    groups = entry_points_by_name(), entry_points_by_name(FILTERS)
+    entries = [entry for group in groups for by_package in group.values() for entry in by_package.values()]
+    names = {top: found[0] for top, found in packages_distributions().items()}
+    names |= {entry.module.partition(".")[0]: entry.dist.name for entry in entries if entry.dist}
+    packages = {}
+    for top in tops:
+        digests = {name: module_digest(name) for name in modules if name.partition(".")[0] == top}
+        digest = hashlib.sha256(repr(sorted((digests | _data_digests(top)).items())).encode()).hexdigest()
+        name = names.get(top, top)
+        packages[name] = UserPackage(dict(_installed_versions()).get(name, ""), digest)
+    return packages
 
 
 def _first_modules(case: Case) -> tuple[str, ...]:

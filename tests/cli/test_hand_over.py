@@ -19,6 +19,7 @@ from radarsim.engine.store.block_file import decode
 from radarsim.report import provenance
 from tests.engine.test_damage import reforged
 from tests.program import command, csv_bytes, record
+from tests.studies import example_packages
 
 N = 6000
 
@@ -491,6 +492,32 @@ def test_a_judged_result_says_what_it_lacks(tmp_path, monkeypatch):
     lack = "nothing could be recomputed: s.zip/results/rls2_mine: a result does not contain the estimates"
     assert lack in command("check", "s.zip", code=3).stderr
     assert "holds no estimates of its judged filter mine" in command("run", "s.zip", code=3).stderr
+
+
+@pytest.mark.slow
+def test_a_package_of_the_author_is_named_and_its_reader_told_to_install_it(tmp_path, warm):
+    (tmp_path / "site").mkdir()
+    packaged = example_packages.beside(warm, tmp_path / "site", tmp_path)
+    packaged("new-study", "walk52")
+    example_packages.installed(tmp_path / "walk52", tmp_path / "site")
+    packaged("run", "walk52", "-n", "2000", "--no-figures", "-q")
+    packaged("run", "rls2", "-n", "500", "--no-figures", "-q")
+    (name,) = record(tmp_path / "results" / "walk52")["packages"]
+    package = record(tmp_path / "results" / "walk52")["packages"][name]
+    assert "packages" not in record(tmp_path / "results" / "rls2")
+    told = packaged("pack", "results", "-o", "s.zip").stdout
+    assert f"the package that computes it is not packed: {name}=={package['version']}; name its source" in told
+    assert "all intact" in packaged("check", "s.zip").stdout
+    words = f"install the package that computed it: {name} {package['version']} (SHA-256 of its sources: "
+    words += f"{package['sha256']})"
+    away = tmp_path / "away"
+    away.mkdir()
+    shutil.move(tmp_path / "s.zip", away)
+    referee = example_packages.beside(warm, away, away)
+    assert f"s.zip: walk52: nothing could be recomputed: {words}" in referee("check", "s.zip", code=3).stderr
+    told = referee("run", "s.zip", "--no-figures", code=3)
+    assert told.stderr == f"s.zip: walk52: not run: {words}\n"
+    assert "compared  rls2: 6 tables, the same bytes" in told.stdout
 
 
 def test_a_directory_of_results_is_packed_as_a_whole(out, tmp_path):

@@ -17,6 +17,7 @@ from radarsim.api.maintenance.inspection import Inspection
 from radarsim.api.maintenance.pack import README, RECORD, RESULTS
 from radarsim.api.maintenance.packed_code import code_names
 from radarsim.api.maintenance.recompute import WorkBudget
+from radarsim.api.stored_cases import missing_packages
 from radarsim.config.experiment import Experiment
 from radarsim.config.find_files import is_stem
 from radarsim.engine.store.block_file import piece_named
@@ -158,7 +159,7 @@ def _reason_not_to_run(archive: Archive, name: str, place: Path, trust_code: boo
     try:
         load(place)
     except ConfigError as error:
-        return error.lines[0].replace(str(place), f"{archive.path}/{RESULTS}/{name}")
+        return missing_packages(record) or error.lines[0].replace(str(place), f"{archive.path}/{RESULTS}/{name}")
     return ""
 
 

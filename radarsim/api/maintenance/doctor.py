@@ -10,7 +10,13 @@ from typing import Any
 from radarsim.api.case_work import CaseWork
 from radarsim.api.maintenance.inspection import Inspection
 from radarsim.api.maintenance.recompute import Progress, WorkBudget, recompute_result
-from radarsim.api.stored_cases import config_faults, recomputable_experiment, stored_case, stored_experiment
+from radarsim.api.stored_cases import (
+    config_faults,
+    missing_packages,
+    recomputable_experiment,
+    stored_case,
+    stored_experiment,
+)
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores, instruction_set, machine_facts
 from radarsim.engine.store.audit import Audit, audit_blocks
@@ -99,7 +105,8 @@ def _experiment(inspection: Inspection, record: Mapping[str, Any]) -> Experiment
     try:
         experiment = recomputable_experiment(record, inspection.folder)
     except ConfigError as error:
-        inspection.not_checked.append(f"nothing could be recomputed: {error.lines[0]}")
+        reason = missing_packages(record) or error.lines[0]
+        inspection.not_checked.append(f"nothing could be recomputed: {reason}")
         return None
     if any(user_filter.written for case in experiment.cases for user_filter in case.user_filters):
         _refuse_foreign_record(inspection.folder / "run.json")

@@ -28,7 +28,7 @@ A study computed with radarsim {version}, as `radarsim pack` wrote it.
 
 To verify it, or to compute it again:
 
-  pip install radarsim=={version}
+  pip install radarsim=={version}{packages}
   radarsim check FILE.zip
   radarsim run FILE.zip
 
@@ -66,6 +66,10 @@ def pack(results: Sequence[str | os.PathLike[str]], archive: str | os.PathLike[s
             raise ConfigError(f"{folder}: {clashes[0]} is both a file of the result and another that a filter reads")
         if not code and (code_places := code_names(record)):
             notes.append(f"{folder}: the code of its filters is not packed: {', '.join(code_places)}; --code adds it")
+        if packages := _packages(record):
+            notes.append(
+                f"{folder}: the package that computes it is not packed: {', '.join(packages)}; name its source"
+            )
         files |= code_files
         name = record["config"] if is_stem(str(record["config"])) else folder.name
         if name in facts:
@@ -153,7 +157,13 @@ def _facts(record: Mapping[str, Any], blocks: Mapping[str, bytes]) -> dict[str, 
         }
         for name, case in record["cases"].items()
     }
-    return {"study": record["study"], "versions": record.get("versions", {}), "cases": cases}
+    packages = {"packages": record["packages"]} if _packages(record) else {}
+    return {"study": record["study"], "versions": record.get("versions", {}), **packages, "cases": cases}
+
+
+def _packages(record: Mapping[str, Any]) -> list[str]:
+    """The packages of the user's that a result needs, with their versions."""
+    return [f"{name}=={package['version']}" for name, package in record.get("packages", {}).items()]
 
 
 def _readme(facts: Mapping[str, Any]) -> str:
@@ -165,4 +175,5 @@ def _readme(facts: Mapping[str, Any]) -> str:
         span = " to ".join(f"{count:,}" for count in dict.fromkeys((counts[0], counts[-1])))
         lines.append(f"  {name}: {len(result['cases'])} case(s) of {span} realisations, seed {seeds}")
     version = max(str(result["versions"].get("radarsim", "")) for result in facts.values())
-    return README_TEXT.format(version=version, results="\n".join(lines))
+    packages = sorted({package for result in facts.values() for package in _packages(result)})
+    return README_TEXT.format(version=version, packages="".join(f" {p}" for p in packages), results="\n".join(lines))
