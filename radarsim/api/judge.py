@@ -22,6 +22,7 @@ from radarsim.config.error_list import ErrorList, Origin
 from radarsim.config.experiment import Experiment
 from radarsim.config.validate import validate
 from radarsim.errors import ConfigError, DisagreementError, MeasureError, argument
+from radarsim.report import provenance
 from radarsim.studies.user_filters import estimates
 from radarsim.studies.user_filters.filters import CalledFilter, EstimateChunks, StoredEstimates, UserFilter
 
@@ -213,8 +214,9 @@ def _check_name(name: str) -> None:
 def command(
     experiment: Experiment, estimates: str, name: str, overrides: Sequence[str], options: Sequence[str] = ()
 ) -> str:
-    """The command that judges a file again."""
+    """The command that judges a file again, without folders of this machine."""
     verb, config, *further_words = shlex.split(
         repeat_command.command(experiment, overrides, repeat_command.RESULTS, verb="judge")
     )[1:]
+    config, estimates = map(provenance.portable_path, (config, estimates))
     return shlex.join(["radarsim", verb, config, estimates, "--name", name, *options, *further_words])

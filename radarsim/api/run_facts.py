@@ -10,7 +10,7 @@ from radarsim.api.case_work import CaseWork
 from radarsim.api.simulate_cases import SimulatedCases
 from radarsim.language.translate import shorten_names, tr
 from radarsim.studies import registry
-from radarsim.studies.sources import user_packages
+from radarsim.studies.identity import user_packages
 
 
 def run_facts(simulated: SimulatedCases, threads: int, seconds: float) -> dict[str, Any]:

@@ -100,8 +100,12 @@ def path_of(experiment: Experiment) -> str:
     """The file of a config as printable text, without folders of this machine."""
     if experiment.path is None:
         return "a mapping in Python"
-    path = experiment.path if is_portable(experiment.path) else os.path.basename(experiment.path)
-    return os.fsencode(path).decode("utf-8", "backslashreplace")
+    return os.fsencode(portable_path(experiment.path)).decode("utf-8", "backslashreplace")
+
+
+def portable_path(path: str) -> str:
+    """A path; of one that leads out of the working directory the name alone."""
+    return path if is_portable(path) else os.path.basename(path)
 
 
 def is_portable(path: str) -> bool:
@@ -113,7 +117,16 @@ ABSOLUTE_PATH = re.compile(r"(?<![\w.~/:-])(?:/[^\s/,;:'\"`()]+)+/([^\s/,;:'\"`(
 
 
 def without_folders(text: str) -> str:
-    """A text with the names alone of the files that it names by absolute paths."""
+    """A text with the names alone of the files that it names by absolute paths.
+
+    >>> without_folders("/home/an na/P1-904.sums: damaged, see /tmp/notes.txt")
+    'P1-904.sums: damaged, see notes.txt'
+    """
+    path, colon, words = text.partition(": ")
+    if os.path.isabs(path):  # a place at the beginning may have spaces, which end any other
+        text = f"{os.path.basename(path)}{colon}{words}"
+    for folder in (os.getcwd(), os.path.expanduser("~")):
+        text = text.replace(f"{folder.rstrip('/')}/", "") if folder != "/" else text
     return ABSOLUTE_PATH.sub(r"\1", text)
 
 

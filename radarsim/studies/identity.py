@@ -11,13 +11,18 @@ from radarsim.config.experiment import Case
 from radarsim.config.identity import digest, identity_keys, portable_code, world_keys
 from radarsim.engine.blocks import REQUEST_DIGITS
 from radarsim.studies.registry import study
-from radarsim.studies.sources import sources_digest
+from radarsim.studies.sources import UserPackage, computing_packages, sources_digest
 
 
 def identity(case: Case) -> str:
     """What a case's numbers depend on, 64 hexadecimal digits."""
     sources = digest([sources_digest(case), *(user_filter.identity for user_filter in case.user_filters)])
     return request_digest(case)[:REQUEST_DIGITS] + sources[:REQUEST_DIGITS]
+
+
+def user_packages(case: Case) -> dict[str, UserPackage]:
+    """The packages of the user's that compute a case, by the names under which they are installed."""
+    return computing_packages(case)
 
 
 def request_digest(case: Case) -> str:

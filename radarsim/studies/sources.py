@@ -64,7 +64,7 @@ class UserPackage(NamedTuple):
     sha256: str
 
 
-def user_packages(case: Case) -> dict[str, UserPackage]:
+def computing_packages(case: Case) -> dict[str, UserPackage]:
     """The packages of the user's that compute a case, by the names under which they are installed."""
     modules = computing_modules(_first_modules(case))
     if not (tops := _user_packages(modules)):

@@ -486,7 +486,8 @@ def test_a_judged_result_says_what_it_lacks(tmp_path, monkeypatch):
     command("simulate", "rls2", "--realisations", "0:500", "-o", "plots.npz")
     ranges = np.load("plots.npz")["range_m"]
     np.savez("estimates.npz", estimates=np.stack([ranges, np.zeros_like(ranges)], axis=2))
-    command("judge", "rls2", "estimates.npz", "--no-figures", "--quiet")
+    command("judge", "rls2", tmp_path / "estimates.npz", "--no-figures", "--quiet")
+    assert not any(str(tmp_path) in path.read_text() for path in Path("results/rls2_mine").iterdir())
     told = command("pack", "results/rls2_mine", "-o", "s.zip").stdout
     assert "the estimates of its judged filter mine are not in it" in told
     lack = "nothing could be recomputed: s.zip/results/rls2_mine: a result does not contain the estimates"
