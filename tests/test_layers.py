@@ -95,6 +95,11 @@ ROOMS = {
         *("config", *SUMS, "language", "studies.interface", "studies.noise", "studies.plot_arrays"),
         *("studies.random_numbers", "user_code"),
     ),
+    "studies.authoring": (
+        *("config.cross_checks", "config.key_types", "config.marks", "config.model", "config.radial_keys"),
+        *("config.study_keys", "kernels", "physics", "report", "studies.interface", "studies.linear"),
+        *("studies.onefile", "studies.plot_arrays", "studies.stepwise"),
+    ),
     "studies.registry": (
         *("config", "extensions", "report.quantities", "studies.interface", "studies.user_filters"),
         "user_code.errors",

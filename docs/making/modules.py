@@ -24,7 +24,7 @@ def markdown() -> str:
         parts += [f"## {floor}", (inspect.getdoc(package) or "") if room else ""]
         names = [info.name for info in pkgutil.walk_packages(package.__path__, f"radarsim.{floor}.")] if room else []
         for module in map(import_module, names or [package.__name__]):
-            if not holds_keys(module):
+            if not (holds_keys(module) or module.__name__.endswith(".authoring")):  # names of other modules
                 parts += [f"### {module.__name__}", described(module)]
     return "\n\n".join(parts)
 

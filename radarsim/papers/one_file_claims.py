@@ -2,21 +2,16 @@
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from radarsim.config.document import Document
-from radarsim.config.error_list import ErrorList, Origin
-from radarsim.config.experiment import Case
 from radarsim.config.model import Model
-from radarsim.config.scalars import from_python
-from radarsim.config.validate import validate
 from radarsim.errors import ConfigError
 from radarsim.papers import one_file_measures
 from radarsim.papers.claim import Claim, PaperClaims
 from radarsim.papers.claim_files import parse_claims
-from radarsim.papers.interpretations import Choice, ImpossibleInterpretation, Interpretation, PaperInterpretations
+from radarsim.papers.interpretations import Choice, ImpossibleInterpretation, PaperInterpretations
+from radarsim.papers.key_interpretations import KeyInterpretations, with_settings
 from radarsim.papers.measure_call import MeasureCall
 from radarsim.papers.one_file_measures import gain, gain_change, has_values, unknown_key
 from radarsim.papers.paper_cases import ShippedCases
@@ -49,7 +44,7 @@ def interpretations_of(study: OneFile) -> PaperInterpretations | None:
     if study.paper is None or not study.claims_yaml or not declarations(study)[1]:
         return None
     claims, choices = declarations(study)
-    return Interpretations(claims[0].paper, choices, type(study).__module__)
+    return KeyInterpretations(claims[0].paper, choices, type(study).__module__)
 
 
 def claim_faults(study: OneFile, shipped: ShippedCases) -> Sequence[str]:
@@ -65,20 +60,6 @@ def claim_faults(study: OneFile, shipped: ShippedCases) -> Sequence[str]:
 
 def _module_of(study: OneFile) -> Any:
     return sys.modules[type(study).__module__]
-
-
-class Interpretations(PaperInterpretations):
-    """Interpretations whose alternatives set keys of a case, by dotted names; a bare name applies to every filter."""
-
-    def __init__(self, paper: str, choices: tuple[Choice, ...], module: str = ""):
-        self.paper, self.choices, self._module = paper, choices, module
-
-    @property
-    def module(self) -> str:
-        return self._module or super().module
-
-    def changed_case(self, claim: Claim, case: Case, interpretation: Interpretation) -> Case | None:
-        return replace(case, spec=_with_settings(case.spec, self.settings(interpretation)))
 
 
 def _faults_of_claims(
@@ -140,31 +121,7 @@ def _missing_number(measure: MeasureCall, spec: Any) -> Iterator[str]:
 def _setting_fault(spec: Model, values: Mapping[str, Any]) -> str:
     """Why a case cannot have these values; nothing where it can."""
     try:
-        _with_settings(spec, values)
+        with_settings(spec, values)
     except ImpossibleInterpretation as error:
         return str(error)
     return ""
-
-
-def _with_settings(spec: Any, values: Mapping[str, Any]) -> Any:
-    """A config's keys with some values changed; raises ImpossibleInterpretation where they are incompatible."""
-    origin, faults = Origin("interpretation"), ErrorList()
-    data: Any = from_python(spec.model_dump(exclude_none=True), (), origin, faults)
-    for path, value in values.items():
-        *above, last = path.split(".")
-        places = [data] if path.partition(".")[0] in type(spec).model_fields else data[type(spec).bare_keys]
-        try:
-            for step in above:
-                places = [
-                    place[int(step)] if isinstance(place, list) else place.setdefault(step, {}) for place in places
-                ]
-            for place in places:
-                place[last] = value
-        except (LookupError, TypeError, ValueError, AttributeError):
-            raise ImpossibleInterpretation(f"{path}: there is no such key") from None
-    changed = validate(type(spec), Document(data, "interpretation", None, {(): origin}), faults)
-    try:
-        faults.raise_if_any()
-    except ConfigError as error:
-        raise ImpossibleInterpretation(error.lines[0]) from None
-    return changed

@@ -30,7 +30,6 @@ from radarsim.studies.floors.bound import Floor
 from radarsim.studies.linear_design import Matrices, kalman, period, steady
 from radarsim.studies.linear_exact import exact, limit
 from radarsim.studies.linear_problem import problem_of
-from radarsim.studies.linear_recordings import LinearTracker, PlotLikelihood
 from radarsim.studies.onefile import OneFile
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
 from radarsim.studies.recording_interface import Tracker
@@ -38,6 +37,7 @@ from radarsim.studies.recording_interface import Tracker
 if TYPE_CHECKING:
     from radarsim.config.experiment import Case
     from radarsim.kernels import linear_states
+    from radarsim.studies.linear_recordings import PlotLikelihood
 
 
 BLOCK = 4096
@@ -301,6 +301,8 @@ class LinearStudy(OneFile):
         return draw
 
     def tracker(self, case: "Case") -> Tracker:
+        from radarsim.studies.linear_recordings import LinearTracker
+
         return LinearTracker(self, case.spec)
 
     def likelihood(
@@ -308,6 +310,8 @@ class LinearStudy(OneFile):
     ) -> "PlotLikelihood | None":
         if not self.fitted:
             return None
+        from radarsim.studies.linear_recordings import PlotLikelihood
+
         # Gains of a filter's own do not say how likely plots are; where all have such, their motion and plots do.
         filters = case.spec.filters
         kalman_filters = [keys for keys in filters if self.call(self.own_gains, case.spec, keys) is None] or filters

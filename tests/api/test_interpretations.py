@@ -17,7 +17,8 @@ import radarsim
 from radarsim.api.configs import load
 from radarsim.api.simulate_cases import RunOptions
 from radarsim.errors import ConfigError, StoreError, TargetUnmet
-from radarsim.papers import one_file_claims, one_file_measures
+from radarsim.papers import one_file_measures
+from radarsim.papers.authoring import KeyInterpretations
 from radarsim.papers.claim import PaperClaims
 from radarsim.papers.claim_files import parse_claims
 from radarsim.papers.interpretation_runs import InterpretationRuns
@@ -438,7 +439,7 @@ def mine(tmp_path):
     claims, choices = parse_claims(MINE, "claims.yaml", one_file_measures, measures)
     claims = [dataclasses.replace(claim, config=str(file)) for claim in claims]
     paper = PaperClaims(claims, one_file_measures.Evidence, "mine")
-    return JudgingRequest(OpenPaper(one_file_claims.Interpretations("P9", choices), paper, "range_doppler"), claims)
+    return JudgingRequest(OpenPaper(KeyInterpretations("P9", choices), paper, "range_doppler"), claims)
 
 
 def test_claims_about_filters_in_python_are_judged_under_every_interpretation(mine, tmp_path):

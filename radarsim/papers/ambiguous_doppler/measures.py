@@ -2,9 +2,8 @@
 
 from typing import TYPE_CHECKING, Literal
 
-from radarsim.papers.evidence import Curve, MissingEvidence, ratio
-from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.report.statistics import Estimate
+from radarsim.papers.authoring import Curve, Estimate, MissingEvidence, ratio
+from radarsim.papers.authoring import Evidence as GeneralEvidence
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,20 +14,23 @@ import numpy as np
 
 from radarsim.bursts import schedule_design
 from radarsim.config.experiment import Case
-from radarsim.papers.claim import Claim, PaperClaims, Part
-from radarsim.papers.claim_files import load_choices
+from radarsim.papers.authoring import (
+    ChangedResults,
+    Claim,
+    Estimate,
+    Evidence,
+    ImpossibleInterpretation,
+    Interpretation,
+    PaperClaims,
+    PaperInterpretations,
+    Part,
+    exact_number,
+    load_choices,
+)
 from radarsim.papers.discriminator import burst_versions, measures
 from radarsim.papers.discriminator.burst_versions import BURST, MIN_ENERGY_RATIO, PRINTED_PRIOR, Version
 from radarsim.papers.discriminator.measures import COMPONENTS, COMPUTED, PRINTED
-from radarsim.papers.evidence import Evidence, exact_number
-from radarsim.papers.interpretations import (
-    ChangedResults,
-    ImpossibleInterpretation,
-    Interpretation,
-    PaperInterpretations,
-)
 from radarsim.papers.verdict_rule import AGAINST
-from radarsim.report.statistics import Estimate
 
 SHIPPED_NOISE = measures.INTERPRETATIONS[COMPUTED][0]
 OTHER_THRESHOLD = {0.5: 1.0, 1.0: 0.5}

@@ -14,9 +14,8 @@ import numpy as np
 from radarsim.bursts import fisher as bursts_fisher
 from radarsim.bursts import schedule_design
 from radarsim.bursts.burst import balanced_inverse
-from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.papers.evidence import MissingEvidence, exact_number, shipped_spec
+from radarsim.papers.authoring import CaseResult, MissingEvidence, exact_number, shipped_spec
+from radarsim.papers.authoring import Evidence as GeneralEvidence
 from radarsim.report.statistics import Estimate, difference, root_mean_square
 from radarsim.studies.discriminator import lock_ceiling, scenario
 from radarsim.studies.discriminator.kernels.sums import LOCKS

@@ -7,10 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from radarsim.config.experiment import Case
-from radarsim.papers.claim import Claim, PaperClaims
-from radarsim.papers.claim_files import load_choices
-from radarsim.papers.evidence import Evidence
-from radarsim.papers.interpretations import ChangedResults, Interpretation, PaperInterpretations
+from radarsim.papers.authoring import (
+    ChangedResults,
+    Claim,
+    Evidence,
+    Interpretation,
+    PaperClaims,
+    PaperInterpretations,
+    load_choices,
+)
 from radarsim.papers.multimodel import measures
 from radarsim.studies.multimodel import tables
 from radarsim.studies.multimodel.flights import FLIGHTS

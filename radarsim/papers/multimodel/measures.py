@@ -8,10 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.papers.evidence import MissingEvidence, shipped_spec
-from radarsim.report.statistics import Estimate
+from radarsim.papers.authoring import CaseResult, Estimate, MissingEvidence, shipped_spec
+from radarsim.papers.authoring import Evidence as GeneralEvidence
 from radarsim.studies.multimodel import cost, model_bank, tables
 
 BANK_122 = ("uniform 0.05", "accelerated 0.05", "accelerated 30")

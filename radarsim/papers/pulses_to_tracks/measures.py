@@ -1,8 +1,7 @@
 """What is measured for the claims on the chain, from the tables."""
 
-from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.papers.evidence import ratio
-from radarsim.report.statistics import Estimate
+from radarsim.papers.authoring import Estimate, ratio
+from radarsim.papers.authoring import Evidence as GeneralEvidence
 
 
 class Evidence(GeneralEvidence):

@@ -9,15 +9,22 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from radarsim.papers.claim import Claim, PaperClaims, Part
-from radarsim.papers.claim_files import load_choices, with_cases
-from radarsim.papers.evidence import Curve
+from radarsim.papers.authoring import (
+    ChangedResults,
+    Claim,
+    Curve,
+    Estimate,
+    Interpretation,
+    PaperClaims,
+    PaperInterpretations,
+    Part,
+    load_choices,
+    with_cases,
+)
 from radarsim.papers.expected_ranges import same
-from radarsim.papers.interpretations import ChangedResults, Interpretation, PaperInterpretations
 from radarsim.papers.range_doppler import filter_versions, measures
 from radarsim.papers.range_doppler.filter_versions import Form, Start, Version
 from radarsim.papers.range_doppler.measures import RADARS
-from radarsim.report.statistics import Estimate
 from radarsim.system.threads import mapping
 
 FINAL_GAIN_CLAIM = "P1.5"

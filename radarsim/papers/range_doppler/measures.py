@@ -9,11 +9,20 @@ from typing import Any, Literal
 
 import numpy as np
 
-from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import Curve, MissingEvidence, common_times, exact_number, ratio, shipped_spec, subtract
-from radarsim.papers.evidence import Evidence as GeneralEvidence
+from radarsim.papers.authoring import (
+    CaseResult,
+    Curve,
+    Estimate,
+    MissingEvidence,
+    common_times,
+    difference,
+    exact_number,
+    ratio,
+    shipped_spec,
+    subtract,
+)
+from radarsim.papers.authoring import Evidence as GeneralEvidence
 from radarsim.physics.motion import manoeuvre_covariance, transition
-from radarsim.report.statistics import Estimate, difference
 from radarsim.studies.range_doppler import steady_state, tables
 
 RADARS = {1: (25, 5, 10), 2: (250, 15, 10), 3: (250, 15, 5), 4: (50, 1, 10), 5: (50, 1, 5)}  # σ_r, σ_V, Δt

@@ -6,12 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import Evidence as GeneralEvidence
-from radarsim.papers.evidence import MissingEvidence, ratio, shipped_spec
+from radarsim.papers.authoring import CaseResult, Estimate, MissingEvidence, ratio, shipped_spec
+from radarsim.papers.authoring import Evidence as GeneralEvidence
 from radarsim.physics.motion import transition
 from radarsim.report import statistics
-from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar import closed_forms, least_squares
 from radarsim.studies.sonar.tables import textbook
 

@@ -10,16 +10,27 @@ from collections import namedtuple
 from typing import Literal
 
 import numpy as np
-from radarsim.config.key_types import Number, Positive, Probability, key
-from radarsim.config.model import Model
-from radarsim.config.study_keys import Member
-from radarsim.kernels.formula_functions import atan2, cos, sin, wrap_angle
-from radarsim.kernels.small_matrices import congruence, update
-from radarsim.kernels.tracing import sqrt, where
-from radarsim.report.quantities import Component
-from radarsim.studies.interface import Paper
-from radarsim.studies.onefile import Measured
-from radarsim.studies.stepwise import Steps, StepStudy
+from radarsim.studies.authoring import (
+    Component,
+    Measured,
+    Member,
+    Model,
+    Number,
+    Paper,
+    Positive,
+    Probability,
+    Steps,
+    StepStudy,
+    atan2,
+    congruence,
+    cos,
+    key,
+    sin,
+    sqrt,
+    update,
+    where,
+    wrap_angle,
+)
 
 
 class Observer(Model):

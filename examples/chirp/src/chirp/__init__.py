@@ -6,14 +6,22 @@ A linear chirp measures z = r + Δ v: the range, shifted by the velocity times t
 from typing import Annotated, Literal
 
 import numpy as np
-from radarsim.config.key_types import Name, NonNegative, Number, Positive, Probability, key
-from radarsim.config.marks import DisplayMark
-from radarsim.config.model import Model
-from radarsim.config.study_keys import Member
-from radarsim.report.quantities import Component
-from radarsim.studies.interface import Paper
-from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Measured
+from radarsim.studies.authoring import (
+    Component,
+    DisplayMark,
+    LinearStudy,
+    Measured,
+    Member,
+    Model,
+    Motion,
+    Name,
+    NonNegative,
+    Number,
+    Paper,
+    Positive,
+    Probability,
+    key,
+)
 
 SIGN = {"up": (1, 1), "down": (-1, -1), "alternating": (1, -1), "none": (0, 0)}  # of Δ, at even and odd scans
 

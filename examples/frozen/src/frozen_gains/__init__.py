@@ -4,8 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from radarsim.config.key_types import Positive, key, whole_number
-from radarsim.physics.motion import process_noise
+from radarsim.studies.authoring import Positive, key, process_noise, whole_number
 from radarsim.studies.range_doppler.package_filters import GivenGains, Scans
 
 

@@ -6,13 +6,19 @@
 from typing import Literal
 
 import numpy as np
-from radarsim.config.key_types import NonNegative, Number, Positive, key
-from radarsim.config.model import Model
-from radarsim.config.study_keys import Member
-from radarsim.report.quantities import Component
-from radarsim.studies.interface import Paper
-from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Measured
+from radarsim.studies.authoring import (
+    Component,
+    LinearStudy,
+    Measured,
+    Member,
+    Model,
+    Motion,
+    NonNegative,
+    Number,
+    Paper,
+    Positive,
+    key,
+)
 
 
 class Sensor(Model):

@@ -8,16 +8,29 @@ from collections import namedtuple
 from statistics import NormalDist
 from typing import Literal
 
-from radarsim.config.key_types import Positive, key
-from radarsim.config.model import Model
-from radarsim.config.study_keys import Member
-from radarsim.kernels.formula_functions import atan2, cos, exp, log, sin
-from radarsim.kernels.small_matrices import congruence, dot, times, update
-from radarsim.kernels.tracing import maximum, sqrt, where
-from radarsim.report.quantities import Component
-from radarsim.studies.interface import Paper
-from radarsim.studies.onefile import Measured
-from radarsim.studies.stepwise import Steps, StepStudy
+from radarsim.studies.authoring import (
+    Component,
+    Measured,
+    Member,
+    Model,
+    Paper,
+    Positive,
+    Steps,
+    StepStudy,
+    atan2,
+    congruence,
+    cos,
+    dot,
+    exp,
+    key,
+    log,
+    maximum,
+    sin,
+    sqrt,
+    times,
+    update,
+    where,
+)
 
 
 class Radar(Model):

@@ -8,15 +8,21 @@ from collections import namedtuple
 from typing import Literal
 
 import numpy as np
-from radarsim.config.key_types import Number, Positive, key
-from radarsim.config.model import Model
-from radarsim.config.study_keys import Member
-from radarsim.kernels.formula_functions import sin
-from radarsim.kernels.tracing import sqrt, where
-from radarsim.report.quantities import Component
-from radarsim.studies.interface import Paper
-from radarsim.studies.onefile import Measured
-from radarsim.studies.stepwise import Steps, StepStudy
+from radarsim.studies.authoring import (
+    Component,
+    Measured,
+    Member,
+    Model,
+    Number,
+    Paper,
+    Positive,
+    Steps,
+    StepStudy,
+    key,
+    sin,
+    sqrt,
+    where,
+)
 
 PI = 3.141592653589793
 LAST_SQUARED = 30  # the last t at which the square of x is measured

@@ -11,13 +11,21 @@ from typing import Any
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.papers.claim import Claim, PaperClaims, Part
-from radarsim.papers.claim_files import load_choices, with_arguments
-from radarsim.papers.evidence import Evidence, exact_number
-from radarsim.papers.interpretations import ChangedResults, Interpretation, PaperInterpretations
+from radarsim.papers.authoring import (
+    ChangedResults,
+    Claim,
+    Estimate,
+    Evidence,
+    Interpretation,
+    PaperClaims,
+    PaperInterpretations,
+    Part,
+    exact_number,
+    load_choices,
+    with_arguments,
+)
 from radarsim.papers.sonar.manoeuvre import measures
 from radarsim.papers.sonar.measures import Evidence as SonarEvidence
-from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar.manoeuvre import detection_laws
 from radarsim.studies.sonar.manoeuvre.switched_window import switched_window
 

@@ -5,8 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from radarsim.engine.results import CaseResult
-from radarsim.papers.evidence import Curve, MissingEvidence, ratio, shipped_spec
+from radarsim.papers.authoring import CaseResult, Curve, MissingEvidence, ratio, shipped_spec
 from radarsim.papers.sonar.measures import CASE_FINDERS, Evidence, Key
 from radarsim.report.statistics import Z95, Estimate
 from radarsim.studies.sonar.filter_keys import Filter

@@ -8,14 +8,20 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from radarsim.config.key_types import Name, NonNegative, Positive, key
-from radarsim.config.marks import DisplayMark
-from radarsim.config.model import Model
-from radarsim.config.study_keys import Member
-from radarsim.report.quantities import Component
-from radarsim.studies.interface import Paper
-from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Measured
+from radarsim.studies.authoring import (
+    Component,
+    DisplayMark,
+    LinearStudy,
+    Measured,
+    Member,
+    Model,
+    Motion,
+    Name,
+    NonNegative,
+    Paper,
+    Positive,
+    key,
+)
 
 
 # Yours: the keys. A key ends in its unit (_m, _s, _mps, _rad, …) and its description names it; its letter is optional.

@@ -7,15 +7,20 @@ radarsim.studies.stepwise list all further options; radarsim.kernels.tracing, th
 from collections import namedtuple
 from typing import Literal
 
-from radarsim.config.key_types import NonNegative, Positive, key
-from radarsim.config.model import Model
-from radarsim.config.study_keys import Member
-from radarsim.kernels.small_matrices import update
-from radarsim.kernels.tracing import sqrt
-from radarsim.report.quantities import Component
-from radarsim.studies.interface import Paper
-from radarsim.studies.onefile import Measured
-from radarsim.studies.stepwise import Steps, StepStudy
+from radarsim.studies.authoring import (
+    Component,
+    Measured,
+    Member,
+    Model,
+    NonNegative,
+    Paper,
+    Positive,
+    Steps,
+    StepStudy,
+    key,
+    sqrt,
+    update,
+)
 
 
 # Yours: the keys. A key ends in its unit (_m, _s, _mps, _rad, …) and its description names it; its letter is optional.
