@@ -4,10 +4,28 @@ import re
 
 from radarsim.recordings.formats.records import DAY_S, utc_s
 
-TIME_FORMATS = "a time of day, ISO 8601 or DD.MM.YYYY and a time"
+TIME_FORMATS = "a time of day, ISO 8601 or DD.MM.YYYY and a time"  # among others, as 9 Dec 2024
 CLOCK_PATTERN = re.compile(r"(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,:](\d+))?)?")
-DATE_PATTERN = re.compile(r"(\d{1,2})([./])(\d{1,2})\2(\d{4})(?:[ T]+(\S+))?")
-YEAR_FIRST_PATTERN = re.compile(r"(\d{4})([./])(\d{1,2})\2(\d{1,2})(?:[ T]+(\S+))?")
+CLOCK_AFTER = r"(?:[\sT,]+(\S.*))?"
+MERIDIEM_PATTERN = re.compile(r"(\d.*\d)\s*([ap])\.?m\.?", re.IGNORECASE)  # 12:59:30 PM
+DATE_PATTERN = re.compile(r"(\d{1,2})([./-])(\d{1,2})\2(\d{4})" + CLOCK_AFTER)
+YEAR_FIRST_PATTERN = re.compile(r"(\d{4})([./])(\d{1,2})\2(\d{1,2})" + CLOCK_AFTER)
+DAY_AND_NAME_PATTERN = re.compile(r"(\d{1,2})[\s./-]*([^\W\d_]{3,})[\s.,/-]*(\d{4}|\d\d)(?:\s*г\.?)?" + CLOCK_AFTER)
+NAME_AND_DAY_PATTERN = re.compile(r"([^\W\d_]{3,})[\s.-]+(\d{1,2})(?:st|nd|rd|th)?[\s,-]+(\d{4})" + CLOCK_AFTER)
+MONTHS = (  # of each month the names that a cell may have, or the beginning of
+    ("january", "januar", "jänner", "январь", "января"),
+    ("february", "februar", "feber", "февраль", "февраля"),
+    ("march", "märz", "maerz", "mrz", "март", "марта"),
+    ("april", "апрель", "апреля"),
+    ("may", "mai", "май", "мая"),
+    ("june", "juni", "июнь", "июня"),
+    ("july", "juli", "июль", "июля"),
+    ("august", "август", "августа"),
+    ("september", "сентябрь", "сентября"),
+    ("october", "oktober", "октябрь", "октября"),
+    ("november", "ноябрь", "ноября"),
+    ("december", "dezember", "декабрь", "декабря"),
+)
 LEAP_SECOND_PATTERN = re.compile(r"(?<!\d)\d\d:\d\d:60(?!\d)")
 FIRST_DATED_S, LAST_DATED_S = 6.3e8, 4.2e9  # since 1970: recordings of 1990 to 2100
 DAY_NUMBERS = (  # the first and last number of days of these years, and that of 1970
@@ -27,11 +45,41 @@ def second_of_day(match: re.Match[str]) -> float:
     return 3600 * int(hours) + 60 * int(minutes) + float(f"{int(seconds)}.{fraction}")
 
 
+def clock_s(text: str) -> float | None:
+    """Seconds after midnight of a time of day, with AM or PM or without; None of another text. Raises ValueError for an
+    impossible time."""
+    if time := CLOCK_PATTERN.fullmatch(text):
+        return second_of_day(time)
+    half = MERIDIEM_PATTERN.fullmatch(text)
+    if half is None or not (time := CLOCK_PATTERN.fullmatch(half[1])):
+        return None
+    if not 1 <= int(time[1]) <= 12:
+        raise ValueError(text)
+    return second_of_day(time) % (DAY_S / 2) + (DAY_S / 2 if half[2].lower() == "p" else 0.0)
+
+
 def date_s(year: str, month: str, day: str, clock: str) -> float:
     """Seconds from 1970 of a date and a time of day; raises ValueError."""
-    if not (time := CLOCK_PATTERN.fullmatch(clock)):
+    time = clock_s(clock)
+    if time is None:
         raise ValueError(clock)
-    return utc_s(f"{year}-{int(month):02}-{int(day):02}") + second_of_day(time)
+    return utc_s(f"{year}-{int(month):02}-{int(day):02}") + time
+
+
+def named_date_s(text: str) -> float | None:
+    """Seconds from 1970 of a date with the name of its month, as 09-Dec-2024, and a time of day; None where a text is
+    none. Raises ValueError for an impossible date."""
+    day_first, name_first = DAY_AND_NAME_PATTERN.fullmatch(text), NAME_AND_DAY_PATTERN.fullmatch(text)
+    if day_first:
+        day, name, year, clock = day_first.groups(default="0:00")
+    elif name_first:
+        name, day, year, clock = name_first.groups(default="0:00")
+    else:
+        return None
+    month = next((i for i, names in enumerate(MONTHS, 1) if any(m.startswith(name.lower()) for m in names)), None)
+    if month is None:
+        return None
+    return date_s(year if len(year) == 4 else f"20{year}", str(month), day, clock)
 
 
 def day_numbers_of(days: float) -> str:

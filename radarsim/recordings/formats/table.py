@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats import cell_times, columns, records, table_checks
-from radarsim.recordings.formats.cell_times import CLOCK_PATTERN, TIME_FORMATS
+from radarsim.recordings.formats.cell_times import TIME_FORMATS
 from radarsim.recordings.formats.columns import EARTH_COLUMNS, Header
 from radarsim.recordings.formats.sheet import Sheet
 from radarsim.recordings.row_faults import Faults
@@ -23,6 +23,11 @@ RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from th
 MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * columns.KNOT_MPS, 360.0  # of AIS: what is not below them means missing
 MISSING_TEXTS = ("nan", "null", "none", "na", "n/a", "#n/a")
 THOUSANDS_PATTERN = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand or a decimal
+GROUP_SPACES = " \u00a0\u2009\u202f'"
+GROUPED_PATTERN = re.compile(  # 1,234.5, 1.234,5, 1 234,5 and 1,234,567: commas and points of one meaning
+    rf"([-+]?\d{{1,3}}(?:(?:,\d{{3}})+(?=\.)|(?:\.\d{{3}})+(?=,)|(?:[{GROUP_SPACES}]\d{{3}})+|"
+    r"(,|\.)\d{3}(?:\2\d{3})+))(?:[.,](\d+))?"
+)
 MIDNIGHT_S = 3600.0  # a falling time of day has passed midnight if both are as near it; else a file is sorted by track
 STILL_MPS = 1.0  # below it a position may stay the same
 MAX_CELL_VALUES = 10_000  # different cells in a column that may name aircraft
@@ -293,32 +298,36 @@ class Table:
         if cell_times.LEAP_SECOND_PATTERN.search(text):
             self.is_leap_second = True
             return math.nan
-        if day := CLOCK_PATTERN.fullmatch(text):
+        if (time := cell_times.clock_s(text)) is not None:
             self.of_day = "date" not in self.columns
-            return self._at_date(cell_times.second_of_day(day), cells)
+            return self._at_date(time, cells)
         if match := cell_times.YEAR_FIRST_PATTERN.fullmatch(text):
             year, _, month, day_of, clock = match.groups(default="0:00")
             return cell_times.date_s(year, month, day_of, clock)
+        if (named_date := cell_times.named_date_s(text)) is not None:
+            return named_date
         if not (match := cell_times.DATE_PATTERN.fullmatch(text)):
             return records.utc_s(text.removesuffix("UTC").rstrip())
         day_of, sign, month, year, clock = match.groups(default="0:00")
-        if sign == "/" and self._is_month_first(int(day_of), int(month), text):
+        if sign != "." and self._is_month_first(int(day_of), int(month), text):
             day_of, month = month, day_of
         return cell_times.date_s(year, month, day_of, clock)
 
     def _is_month_first(self, first: int, second: int, text: str) -> bool:
-        """Whether the first number of a date with slashes is the month: where no date tells, it is the day."""
+        """Whether the first number of a date with slashes is the month: where no date tells, it is the day, unless a
+        time with AM or PM makes the month as likely."""
         unit = self.columns["t_s"].unit
         if unit in ("dmy", "mdy"):
             return unit == "mdy"
         evidence = "day" if first > 12 else "month" if second > 12 else ""
         self.slashed_dates.setdefault(evidence, text)
-        if evidence == "month" and next(iter(self.slashed_dates)) != "month":
-            name = self.columns["t_s"].name
+        name = self.columns["t_s"].name
+        cure = f"the order is stated by --column t_mdy={shlex.quote(name)} or t_dmy={shlex.quote(name)}"
+        if next(iter(self.slashed_dates)) == "" and cell_times.MERIDIEM_PATTERN.search(text):
+            self._add_fault("t_s", "must show whether the day or the month stands first", repr(text[:60]), cure)
+        elif evidence == "month" and next(iter(self.slashed_dates)) != "month":
             must = f"must have day and month in the order of {next(iter(self.slashed_dates.values()))!r}"
-            self._add_fault(
-                "t_s", must, repr(text[:60]), f"the order is stated by --column t_mdy={name} or t_dmy={name}"
-            )
+            self._add_fault("t_s", must, repr(text[:60]), cure)
         return "month" in self.slashed_dates
 
     def _parse_number(self, cells: list[str], name: str) -> float:
@@ -338,8 +347,12 @@ class Table:
         return value * column.factor
 
     def _with_decimal_point(self, text: str) -> str:
-        """A number with a decimal point."""
-        if not self.sheet.decimal_comma or text.count(",") != 1 or "." in text:
+        """A number with a decimal point, and without separators of thousands where they can be nothing else."""
+        if "," not in text and " " not in text and "'" not in text and text.count(".") < 2 and text.isascii():
+            return text
+        if match := GROUPED_PATTERN.fullmatch(text):
+            return re.sub(r"[^\d+-]", "", match[1]) + (f".{match[3]}" if match[3] else "")
+        if text.count(",") != 1 or "." in text or (THOUSANDS_PATTERN.fullmatch(text) and not self.sheet.decimal_comma):
             return text
         if THOUSANDS_PATTERN.fullmatch(text):
             self.doubtful = self.doubtful or text

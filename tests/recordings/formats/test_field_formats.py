@@ -169,3 +169,64 @@ def test_bytes_of_no_kind_name_the_option(tmp_path):
     (line,) = refused(tmp_path, b"\x89PNG\r\n\x1a\n" + bytes(range(256)))
     assert "its first bytes are of none" in line
     assert line.endswith("if it is one: --from FORMAT")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            "28-Nov-2026 12:59:30",
+            "28 November 2026 12:59:30",
+            "Nov 28, 2026, 12:59:30 PM",
+            "28. November 2026 12:59:30",
+        ),
+        *("28 ноября 2026 г. 12:59:30", "28 нояб. 2026 12:59:30", "28-nov-26 12:59:30", "11/28/2026 12:59:30 PM"),
+        *("28-11-2026 12:59:30", "28/11/2026, 12:59:30\u202fpm", "28.11.2026 12:59:30"),
+    ],
+)
+def test_dates_as_people_write_them(tmp_path, text):
+    table = f'Time;Range [km]\n"{text}";20\n"{text.replace("59:30", "59:32")}";20.1\n'
+    _, columns, _ = imported(tmp_path, table.encode(), Options(zero=0.0))
+    expected = np.datetime64("2026-11-28T12:59:30", "s").astype(int)
+    np.testing.assert_array_equal(columns["t_s"], [expected, expected + 2])
+
+
+@pytest.mark.parametrize(
+    ("month", "name"), [(3, "März"), (5, "Mai"), (10, "Okt"), (12, "Dezember"), (5, "мая"), (1, "янв"), (6, "июня")]
+)
+def test_months_in_german_and_russian(tmp_path, month, name):
+    table = f"Time;Range [km]\n7 {name} 2026 00:00:00;20\n7 {name} 2026 00:00:01;20.1\n"
+    _, columns, _ = imported(tmp_path, table.encode(), Options(zero=0.0))
+    assert columns["t_s"][0] == np.datetime64(f"2026-{month:02}-07", "s").astype(int)
+
+
+def test_an_order_of_day_and_month_that_no_date_shows_is_refused_beside_am_and_pm(tmp_path):
+    table = b"Time,Range [km]\n12/9/2026 11:59:59 PM,20\n12/9/2026 11:59:59.5 PM,20.1\n"
+    (line,) = refused(tmp_path, table)
+    assert "must show whether the day or the month stands first" in line
+    assert "--column t_mdy=Time or t_dmy=Time" in line
+    _, columns, _ = imported(tmp_path, table, Options(columns={"t_mdy": "Time"}, zero=0.0))
+    assert columns["t_s"][0] == np.datetime64("2026-12-09T23:59:59", "s").astype(int)
+
+
+@pytest.mark.parametrize("text", ["13:00:00 PM", "0:30:00 AM", "31 Jun 2026", "28 Smarch 2026", "28-Nov-2026 25:00"])
+def test_times_that_are_none_are_refused_with_their_cell(tmp_path, text):
+    (line,) = refused(tmp_path, f"Time;Range [km]\n{text};20\n".encode())
+    assert "recording:2:1: Time: must be a time in s" in line
+
+
+@pytest.mark.parametrize(
+    ("cell", "metres"),
+    [
+        *(('"1,234.5"', 1234.5), ('"12,5"', 12.5), ('"1,234,567"', 1_234_567), ('"1.234,5"', 1234.5)),
+        *(("1 234.5", 1234.5), ("1\u00a0234", 1234), ("1'234.5", 1234.5), ("1234.5", 1234.5)),
+    ],
+)
+def test_separators_of_thousands_that_can_be_nothing_else(tmp_path, cell, metres):
+    _, columns, _ = imported(tmp_path, f"time,range_m\n0,{cell}\n1,{cell}\n".encode())
+    np.testing.assert_array_equal(columns["range_m"], metres)
+
+
+def test_a_comma_that_may_be_either_is_refused(tmp_path):
+    (line,) = refused(tmp_path, b'time,range_m\n0,"1,234"\n')
+    assert "range_m: must be a number, got '1,234'" in line
