@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api import arguments
-from radarsim.api.configs import load
+from radarsim.api.configs import config_path, load
 from radarsim.api.display import Displayable
 from radarsim.api.repeat_command import RESULTS, command
 from radarsim.api.result import Result
 from radarsim.api.result_content import captions, config_names
-from radarsim.api.result_folder import find_result
+from radarsim.api.result_folder import choose_result, find_result
 from radarsim.api.stored_cases import cases_of_result
 from radarsim.config.experiment import Case, Experiment
+from radarsim.config.find_files import is_stem
 from radarsim.config.identity import digest, identity_keys, world_keys
 from radarsim.errors import ConfigError
 from radarsim.language.translate import translate_names
@@ -41,7 +42,8 @@ FOLDER = "compare"
 
 @dataclass(frozen=True)
 class ComparedRun:
-    """A result: its name, its folder, its run.json and, if known, the config that describes it.
+    """A result: its name, its folder, its run.json and, if known, the config that describes it. note: see
+    `choose_result`.
 
     read_table: gives a table by its name, None where there is none."""
 
@@ -51,6 +53,7 @@ class ComparedRun:
     read_table: "Callable[[str], pd.DataFrame | None]" = field(repr=False)
     experiment: Experiment | None = None
     stored: bool = True
+    note: str = ""
 
     @cached_property
     def cases(self) -> dict[str, Case]:
@@ -147,7 +150,7 @@ def _compare_runs(runs: Sequence[ComparedRun]) -> "tuple[pd.DataFrame, Compariso
     translate = partial(translate_names, names=config_names(case for run in runs for case in _cases(run)))
     sentences = map(translate, comparison_sentences.sentences(comparison_table, shared))
     notes = [*comparison_sentences.pairing_lines(comparison_table), *pairing_notes]
-    warnings = [line for run in runs for line in _stale_tables(run)]
+    warnings = [line for run in runs for line in (*([run.note] if run.note else []), *_stale_tables(run))]
     labelled_sides = [side for sides in _label_sides(sides_of_runs) for side in sides]
     figures = comparison_figures.figures(labelled_sides, comparison_table)
     comparison = Comparison(
@@ -203,7 +206,7 @@ def _find_runs(sources: Sequence[Source], out: Path) -> list[ComparedRun]:
             runs.append(
                 _run_of_result(source)
                 if isinstance(source, Result)
-                else _run_in_folder(Path(source)) or _stored_run(source, out)
+                else _run_in_folder(source, out) or _stored_run(source, out)
             )
         except ConfigError as error:
             faults += error.lines
@@ -225,14 +228,19 @@ def _run_of_result(result: Result) -> ComparedRun:
     return ComparedRun(experiment.stem, Path(experiment.stem), record, result.tables.get, stored=False)
 
 
-def _run_in_folder(path: Path) -> ComparedRun | None:
-    """The result in a folder; None where the path is no folder. Raises ConfigError for a folder without a result."""
-    result = find_result(path)
+def _run_in_folder(source: str | os.PathLike[str], out: Path) -> ComparedRun | None:
+    """The result in a folder, or that of a name; None where the source is neither. Raises ConfigError for a folder
+    without a result."""
+    path = Path(source)
+    result, note = choose_result(source, out, names_config=False)
     if result is None:
         if path.is_dir() and path.name != str(path):
             raise ConfigError(no_result(path))
         return None
-    return ComparedRun(str(result.record["config"]), path, dict(result.record), result.files.table)
+    name = os.fspath(source)
+    experiment = load(name) if is_stem(name) and result.folder != path and config_path(name) else None
+    label = str(result.record["config"])
+    return ComparedRun(label, result.folder, dict(result.record), result.files.table, experiment, note=note)
 
 
 def _stored_run(source: str | os.PathLike[str], out: Path) -> ComparedRun:

@@ -4,11 +4,15 @@ import os
 from functools import cached_property
 from pathlib import Path
 
+from radarsim.api import configs
 from radarsim.api.stored_cases import cases_of_result, stored_experiment
 from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.experiment import Case, Experiment
 from radarsim.config.find_files import is_stem
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, RadarsimError
+from radarsim.language.translate import join_names, tr
+from radarsim.report import provenance
+from radarsim.report.atomic_files import same_file
 from radarsim.report.stored_tables import RECORD, StoredFiles, find_files, is_table, no_result
 
 
@@ -46,12 +50,61 @@ def result_places(source: str | os.PathLike[str], out: str | os.PathLike[str]) -
     return [Path(out) / name, Path(name)] if is_stem(name) else [Path(name)]
 
 
-def result_of(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> ResultFolder:
-    """The result in a folder, or that of a config's name in `out`. Raises ConfigError where there is none."""
-    for folder in result_places(source, out):
-        if (found := find_result(folder)) is not None:
-            return found
+def choose_result(
+    source: str | os.PathLike[str], out: str | os.PathLike[str], names_config: bool = True
+) -> tuple[ResultFolder | None, str]:
+    """The result that a source means: of a name that in `out`, else one here; of a path that alone. And a note where
+    the name could mean something else, too; names_config: also a config of other settings."""
+    for place in result_places(source, out):
+        if (found := find_result(place)) is not None:
+            return found, _choice_note(os.fspath(source), found, names_config)
+    return None, ""
+
+
+def _choice_note(name: str, chosen: ResultFolder, names_config: bool = True) -> str:
+    """What else a name could mean: the result in a folder here, or a config of other settings than the chosen result;
+    empty if nothing."""
+    others = []
+    here = Path(name)
+    if is_stem(name) and (here / RECORD).exists() and not same_file(here, chosen.folder):
+        others.append(f"./{name}")
+    config = configs.config_path(name) if names_config and is_stem(name) else None
+    if config is not None and not _is_of_config(chosen, config):
+        shipped = configs.shipped_file(name)
+        is_shipped = shipped is not None and same_file(shipped, config)
+        others.append(tr("the shipped config") if is_shipped else str(config))
+    if not others:
+        return ""
+    return tr("{name} is the result in {folder}, not {others}", name=name, folder=str(chosen.folder),
+              others=join_names(others))  # fmt: skip
+
+
+def _is_of_config(result: ResultFolder, config: Path) -> bool:
+    """Whether a result has the settings of a config; of one that cannot be read it has others."""
+    try:
+        return provenance.is_same_config(result.record["resolved"], configs.load(config).resolved)
+    except RadarsimError:
+        return False
+
+
+def result_of(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> tuple[ResultFolder, str]:
+    """As `choose_result`. Raises ConfigError where there is no result."""
+    found, note = choose_result(source, out)
+    if found is not None:
+        return found, note
     places = result_places(source, out)
     if len(places) == 1:
         raise ConfigError(no_result(places[0]))
     raise ConfigError(f"{os.fspath(source)}: no result: there is no {RECORD} in {', nor in '.join(map(str, places))}")
+
+
+def config_to_report(name: str, out: str | os.PathLike[str]) -> tuple[str, str]:
+    """The config of which `radarsim report NAME` writes the result, and a note as in `choose_result`: that which the
+    result of this name in `out` keeps, where it is another than the config of this name."""
+    found = find_result(Path(out) / name) if is_stem(name) else None
+    if found is None or found.experiment is None or found.record.get("judged"):
+        return name, ""
+    config = configs.config_path(name)
+    if config is not None and _is_of_config(found, config):
+        return name, ""
+    return str(found.folder), _choice_note(name, found)

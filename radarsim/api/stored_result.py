@@ -1,6 +1,7 @@
 """`radarsim.load`: a stored result, from its blocks, or from its tables alone where these are not there."""
 
 import os
+import warnings
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,7 @@ from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import Config, Overrides
 from radarsim.api.result import Result
 from radarsim.api.result_content import question_text
-from radarsim.api.result_folder import ResultFolder, find_result, result_places
+from radarsim.api.result_folder import ResultFolder, choose_result
 from radarsim.api.stored_runs import stored_result
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError, StoreError
@@ -102,9 +103,10 @@ def load(
 
     config is the folder of a result, or, for results in `out`, a name, a path or the other configs that `run` takes. Of
     a folder or a name without overrides the result is as it stands in its folder, whatever its settings were; where
-    its blocks are not there, from its tables alone, without figures. With a path or with overrides it is the result of
-    that config, of as many realisations as the last run reported unless overrides say. `write` makes tables, figures
-    and report, as `radarsim report` does. Raises ConfigError, with the command to run, if something is missing.
+    its blocks are not there, from its tables alone, without figures. A name means the result in `out`, else that in a
+    folder here, else a config; a Python warning says what else it could mean. With a path or with overrides it is the
+    result of that config, of as many realisations as the last run reported unless overrides say. `write` makes tables,
+    figures and report, as `radarsim report` does. Raises ConfigError, with the command to run, if something is missing.
 
     >>> import radarsim, tempfile
     >>> with tempfile.TemporaryDirectory() as out:
@@ -114,9 +116,11 @@ def load(
     True
     """
     if isinstance(config, str | os.PathLike) and not overrides:
-        for place in result_places(config, out):
-            if (stored := find_result(place)) is not None:
-                return read_result(stored)
+        stored, note = choose_result(config, out)
+        if note:
+            warnings.warn(note, stacklevel=2)
+        if stored is not None:
+            return read_result(stored)
     return stored_result(config, out=out, overrides=overrides)
 
 

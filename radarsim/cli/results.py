@@ -7,6 +7,7 @@ import click
 
 from radarsim.cli import command_group, options
 from radarsim.cli.run import check_replacements, compute_each, refuse_quantity_without_precision
+from radarsim.language.translate import tr
 
 if TYPE_CHECKING:
     from radarsim.api.result import Result
@@ -128,14 +129,16 @@ def report(
 ) -> None:
     """Write tables, figures and report of stored runs.
 
-    Computes nothing.
+    Computes nothing. A name means the result in DIR, with the settings that it has; the path of a config means this
+    config.
 
     \b
     Examples
       radarsim report rls2
       radarsim report rls2 --json --no-figures
     """
-    from radarsim.api import load_experiments, replacement, stored_runs
+    from radarsim.api import load_experiments, replacement, result_folder, stored_runs
+    from radarsim.cli import console
 
     overrides = load_experiments.combine_overrides(overrides, realisations, seed)
 
@@ -146,7 +149,10 @@ def report(
         result.write(out, replace=replace, **drawing.arguments)
         return result
 
-    loaded = load_experiments.load_all(configs, overrides)
+    sources = [(name, "") if overrides else result_folder.config_to_report(name, out) for name in configs]
+    for note in [] if as_json else filter(None, dict(sources).values()):
+        console.print_error_line(tr("note: {words}", words=note))
+    loaded = load_experiments.load_all([source for source, _ in sources], overrides)
     if not replace:
         check_replacements(loaded, out, as_json, ends_early=realisations is None)
     compute_each(loaded, write_stored_result, out, False, as_json)
@@ -169,7 +175,9 @@ def export(result: str, netcdf: str, out: str) -> None:
     from radarsim.api import result_folder, stored_result
     from radarsim.cli import console
 
-    stored = result_folder.result_of(result, out)
+    stored, note = result_folder.result_of(result, out)
+    if note:
+        console.print_error_line(tr("note: {words}", words=note))
     stored_result.read_result(stored).write_netcdf(netcdf)
     console.print_field("netcdf", netcdf)
 

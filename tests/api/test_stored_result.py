@@ -43,7 +43,8 @@ def test_a_folder_suffices(ran, folder):
 
 
 def test_a_name_needs_no_overrides(ran):
-    loaded = radarsim.load("rls2", out=ran.written.folder.parent)
+    with pytest.warns(UserWarning, match="not the shipped config"):
+        loaded = radarsim.load("rls2", out=ran.written.folder.parent)
     assert loaded.curves.equals(ran.curves)
     assert loaded.figure("sigma_r")
 
@@ -51,9 +52,28 @@ def test_a_name_needs_no_overrides(ran):
 def test_a_name_is_of_the_given_directory_before_one_here(ran, tmp_path, monkeypatch):
     shutil.copytree(ran.written.folder, tmp_path / "rls2")
     monkeypatch.chdir(tmp_path)
-    assert radarsim.load("rls2", out=ran.written.folder.parent).figure("sigma_r")
-    assert radarsim.load("./rls2", out=ran.written.folder.parent).figures == ()
-    assert radarsim.load("rls2").figures == ()
+    out = ran.written.folder.parent
+    with pytest.warns(UserWarning, match=rf"rls2 is the result in {out}/rls2, not \./rls2 and the shipped config"):
+        assert radarsim.load("rls2", out=out).figure("sigma_r")
+    assert radarsim.load("./rls2", out=out).figures == ()
+    with pytest.warns(UserWarning, match="rls2 is the result in rls2, not the shipped config"):
+        assert radarsim.load("rls2").figures == ()
+
+
+def test_every_reader_takes_the_same_result_of_a_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for folder, sigma in (("results", 100), (".", 200)):
+        command(
+            "run", "rls2", "--set", f"radar.sigma_range_m={sigma}", "-n", 500, "--out", folder, "-q", "--no-figures"
+        )
+    words = "rls2 is the result in results/rls2, not ./rls2"
+    both = f"note: {words} and the shipped config\n"
+    assert command("report", "rls2", "--no-figures").stderr == both
+    assert command("export", "rls2", "--netcdf", "a.nc").stderr == both
+    assert words in command("compare", "rls2", "./rls2", "--no-figures").stderr
+    assert "sigma_range_m: 100" in radarsim.load("results/rls2").config
+    assert command("report", "./rls2", "--out", ".", "--no-figures").stderr == ""
+    assert "sigma_range_m: 200" in radarsim.load("./rls2").config
 
 
 def test_without_blocks_figures_and_writing_say_what_they_need(ran, tmp_path):
