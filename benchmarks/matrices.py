@@ -18,7 +18,7 @@ from radarsim.config.study_keys import Member
 from radarsim.report.quantities import Component
 from radarsim.studies import registry
 from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Measured
+from radarsim.studies.onefile import MeasuredColumn
 
 SCANS, BLOCK = 15, 8192
 WORK = {  # states, numbers of a plot, process noises, probability of a plot
@@ -65,7 +65,7 @@ def case_of(n: int, D: int, noises: int, probability: float) -> tuple[LinearStud
         name, about, filters, asks = "chain", "A chain.", {"scale": "of Q"}, "How well?"
         components = tuple(Component(f"x{i}", "m") for i in range(min(n, 3)))
         parts, scan_period, detection = {"sensor": Sensor}, "sensor.scan_period_s", "sensor.probability"
-        measured = tuple(Measured(f"z{d}_m", "m") for d in range(D))
+        measured = tuple(MeasuredColumn(f"z{d}_m", "m") for d in range(D))
 
         def motion(self, spec):
             start = np.tril(np.ones((n, n)))[:, : max(noises, 0)]

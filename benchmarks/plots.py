@@ -120,7 +120,7 @@ def measure(pairs: int) -> None:
 
         def ours(plots=plots, case=case, count=count, chunk=chunk) -> None:
             for first in range(0, count, chunk):
-                plots.drawn(case, first, chunk)
+                plots.draw_plots(case, first, chunk)
 
         alone = drawing_alone(name, case, count)
         acts = [ours] if alone is None else [alone, ours]

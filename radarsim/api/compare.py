@@ -65,7 +65,7 @@ class ComparedRun:
 class Comparison(Displayable):
     """A comparison: sentences, notes and warnings, the rows of comparison.csv; the folder and files, if any.
 
-    last: the rows at the last common time; told: the quantities that the terminal shows, with their wording."""
+    last: the rows at the last common time; shown_quantities: those that the terminal shows, with their wording."""
 
     folder: Path | None
     files: tuple[str, ...]
@@ -74,7 +74,7 @@ class Comparison(Displayable):
     warnings: tuple[str, ...]
     rows: tuple[dict[Hashable, Any], ...]
     last: tuple[dict[Hashable, Any], ...]
-    told: tuple[tuple[str, str], ...]
+    shown_quantities: tuple[tuple[str, str], ...]
     figures_by_name: Mapping[str, Figure] = field(default_factory=dict)
 
     @property
@@ -161,7 +161,7 @@ def _compare_runs(runs: Sequence[ComparedRun]) -> "tuple[pd.DataFrame, Compariso
         warnings=tuple(warnings),
         rows=tuple(comparison_table.to_dict("records")),
         last=tuple(comparison_sentences.final_rows(comparison_table).to_dict("records")),
-        told=tuple(
+        shown_quantities=tuple(
             (quantity.value, quantity.words)
             for quantity in comparison_sentences.summary_quantities(comparison_table, shared)
         ),

@@ -95,7 +95,8 @@ def sensitivity(sensitivities: "Sensitivity") -> dict[str, Any]:
 def comparison(compared: "Comparison") -> dict[str, Any]:
     """A comparison: sentences, notes and warnings, the rows of comparison.csv, and the files."""
     document = {
-        name: getattr(compared, name) for name in ("files", "sentences", "notes", "warnings", "rows", "last", "told")
+        name: getattr(compared, name)
+        for name in ("files", "sentences", "notes", "warnings", "rows", "last", "shown_quantities")
     }
     return {"folder": str(compared.folder), **document}
 

@@ -114,9 +114,9 @@ def _difference(record: Mapping[str, Any], experiment: Experiment, judged: Seque
     return ""
 
 
-def _changed_keys(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
+def _changed_keys(stored: Mapping[str, Any], requested: Mapping[str, Any]) -> str:
     """The first keys in which two resolved configs differ, with the values of each."""
-    stored_cases, cases = ({case["case"]: case for case in resolved["cases"]} for resolved in (stored, wanted))
+    stored_cases, cases = ({case["case"]: case for case in resolved["cases"]} for resolved in (stored, requested))
     if stored_cases.keys() != cases.keys():
         names = [*(name for name in cases if name not in stored_cases), *(n for n in stored_cases if n not in cases)]
         return tr("other cases, such as {name}", name=names[0])
@@ -128,16 +128,16 @@ def _changed_keys(stored: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     return ", ".join([*lines[:MAX_NAMED_KEYS], *([tr("{count} more", count=omitted)] if omitted > 0 else [])])
 
 
-def _differences(stored: object, wanted: object, path: str = "") -> Iterator[str]:
+def _differences(stored: object, requested: object, path: str = "") -> Iterator[str]:
     """Lines on the keys in which plain data differ."""
-    if isinstance(stored, dict) and isinstance(wanted, dict):
-        for key in dict.fromkeys((*stored, *wanted)):
-            yield from _differences(stored.get(key), wanted.get(key), f"{path}.{key}".strip("."))
-    elif isinstance(stored, list) and isinstance(wanted, list) and len(stored) == len(wanted):
-        for i, (item, wanted_item) in enumerate(zip(stored, wanted, strict=True)):
-            yield from _differences(item, wanted_item, f"{path}.{i}".strip("."))
-    elif stored != wanted:
-        yield tr("{key} {stored}, not {wanted}", key=path, stored=_value_text(stored), wanted=_value_text(wanted))
+    if isinstance(stored, dict) and isinstance(requested, dict):
+        for key in dict.fromkeys((*stored, *requested)):
+            yield from _differences(stored.get(key), requested.get(key), f"{path}.{key}".strip("."))
+    elif isinstance(stored, list) and isinstance(requested, list) and len(stored) == len(requested):
+        for i, (item, requested_item) in enumerate(zip(stored, requested, strict=True)):
+            yield from _differences(item, requested_item, f"{path}.{i}".strip("."))
+    elif stored != requested:
+        yield tr("{key} {stored}, not {wanted}", key=path, stored=_value_text(stored), wanted=_value_text(requested))
 
 
 def _value_text(value: object) -> str:

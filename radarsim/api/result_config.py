@@ -10,17 +10,17 @@ from radarsim.studies import registry
 
 
 def config_files(
-    experiment: Experiment, results: Sequence[CaseResult] | None = None, taken: Iterable[str] = ()
+    experiment: Experiment, results: Sequence[CaseResult] | None = None, taken_paths: Iterable[str] = ()
 ) -> dict[str, bytes]:
     """config.yaml with the realisations of these results, by default those of the experiment, and its data files, by
-    their paths in a folder; taken: paths that others have there. Empty where no text describes the experiment, or where
-    a data file is gone."""
+    their paths in a folder; taken_paths: paths that others have there. Empty where no text describes the experiment, or
+    where a data file is gone."""
     done = {case.name: case.realisations for case in experiment.cases}
     if results is not None:
         done = {result.name: result.count for result in results}
     try:
         kept_config = complete_config(
-            experiment, done, shipped_stem(experiment), registry.keys(experiment.study), taken
+            experiment, done, shipped_stem(experiment), registry.keys(experiment.study), taken_paths
         )
     except OSError:
         return {}

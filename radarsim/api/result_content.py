@@ -206,7 +206,7 @@ def case_figures(
 
         drawn_results = user_filters_figures.with_user_filters_in_cases(results)
         user_figures = user_filters_figures.figures(
-            results, figure_tables, experiment, figures_by_name, case_study.shown()
+            results, figure_tables, experiment, figures_by_name, case_study.user_filter_components()
         )
         figures_by_name = user_figures | {  # those of user filters first: the answer is about them
             name: figure for name, figure in figures_by_name.items() if name not in user_figures

@@ -149,13 +149,13 @@ def _stored_count(work: CaseWork, case: Case, options: RunOptions) -> int:
 
 def _stored_rest(experiment: Experiment, first: int, options: RunOptions) -> list[tuple[Case, CaseWork, CollectedSums]]:
     """Of the cases from this one on, which a stopped run did not reach, what is stored and must not be lost."""
-    rest = []
+    stored_results = []
     for case in experiment.cases[first:]:
         work = CaseWork(case)
         if options.out is not None and (count := _stored_count(work, case, options)):
             collected = read_stored(work, count, options.out)
-            rest += [] if collected is None else [(case, work, collected)]
-    return rest
+            stored_results += [] if collected is None else [(case, work, collected)]
+    return stored_results
 
 
 def works_by_identity(experiment: Experiment) -> list[tuple[tuple[str, int], CaseWork]]:
@@ -215,7 +215,7 @@ def _collect_case(
     computed = sum(look.computed for look in looks)
     total = replace(
         best,
-        asked=case.realisations,
+        requested=case.realisations,
         computed=computed,
         from_store=max(0, best.count - computed),
         kernel_seconds=sum(look.kernel_seconds for look in looks),

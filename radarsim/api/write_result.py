@@ -98,7 +98,7 @@ def write_files(
     if draw:
         contents["figures/captions.md"] = captions(figures_by_name).encode()
     draw_end = time.perf_counter()
-    kept_config = config_files(experiment, results, taken=(*contents, *provenance.RECORD_FILES))
+    kept_config = config_files(experiment, results, taken_paths=(*contents, *provenance.RECORD_FILES))
     contents |= kept_config
     if data_files := [name for name in kept_config if name != CONFIG_FILE]:
         run = {**run, "data_files": data_files}

@@ -65,7 +65,7 @@ class WindowTables:
             self._add(np.array(ends), pulses / self.pulses)
         return self.known[pulses]
 
-    def drawn(self, pulses: int) -> tuple[int, int, int]:
+    def window_of_drawn_blocks(self, pulses: int) -> tuple[int, int, int]:
         """As `window` where blocks are used as drawn and no tables are needed."""
         return 0, 0, int(np.searchsorted(self.edges, pulses))
 

@@ -122,9 +122,9 @@ def print_comparison(compared: "Comparison") -> None:
     """Differences of stored results at the last common time, and the files."""
     from radarsim.report.comparison import sentences
 
-    compared_rows = [row for row in compared.last if row["quantity"] in dict(compared.told)]
+    compared_rows = [row for row in compared.last if row["quantity"] in dict(compared.shown_quantities)]
     against = {row["against_label"] for row in compared.last}
-    for quantity, words in compared.told if len(compared_rows) <= MAX_ROWS else ():
+    for quantity, words in compared.shown_quantities if len(compared_rows) <= MAX_ROWS else ():
         rows = [
             (
                 f"{row['label']}, {row['filter']}",

@@ -144,8 +144,8 @@ def report(
 
     def write_stored_result(experiment: "Experiment", progress: object) -> "Result":
         counts = {} if replace or realisations is None else replacement.larger_counts(experiment, out)
-        shown = replacement.with_counts(experiment, counts)
-        result = stored_runs.stored_result(shown, out=out, overrides=overrides)
+        stored_experiment = replacement.with_counts(experiment, counts)
+        result = stored_runs.stored_result(stored_experiment, out=out, overrides=overrides)
         result.write(out, replace=replace, **drawing.arguments)
         return result
 

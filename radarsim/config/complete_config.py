@@ -20,7 +20,7 @@ from radarsim.config.user_filter_keys import CODE_KEY, is_code
 from radarsim.config.yaml_text import exact_yaml
 
 CONFIG_FILE = "config.yaml"
-INPUTS = "inputs"  # folder for data files whose own place in the folder is taken, or lies outside it
+INPUTS = "inputs"  # folder for data files whose own place in the folder is taken_paths, or lies outside it
 DESCRIBED_KEYS = ("realisations", "seed")  # common keys whose description stands beside them
 SOURCE_DIGITS = 16  # of the hash of a user filter's code
 
@@ -84,18 +84,18 @@ def rename_configs(content: Content, stem: str | Callable[[str], str]) -> Conten
 
 
 def complete_config(
-    experiment: Experiment, done: Mapping[str, int], like: str, model: type[StudyKeys], taken: Iterable[str] = ()
+    experiment: Experiment, done: Mapping[str, int], like: str, model: type[StudyKeys], taken_paths: Iterable[str] = ()
 ) -> CompleteConfig | None:
     """The config of an experiment, complete.
 
     done: the realisations of each case in the result; like: the shipped config of which it is a version, if any; model:
-    the keys of the study; taken: paths that data files must not have. None where the experiment has no content that can
-    be written out. Raises OSError where a data file cannot be read."""
+    the keys of the study; taken_paths: those that data files must not have. None where the experiment has no content
+    that can be written out. Raises OSError where a data file cannot be read."""
     if experiment.content is None:
         return None
     content = {"name": experiment.stem, **({"like": like} if like else {}), **experiment.content}
     content = _with_realisations(content, experiment, done)
-    names = _file_names(content, taken)
+    names = _file_names(content, taken_paths)
     content = _portable(content, names, experiment.cases)
     files = {name: Path(path).read_bytes() for path, name in names.items()}
     filters = (member for case in experiment.cases for member in case.user_filters)
@@ -122,12 +122,12 @@ def _data_paths(value: object) -> Iterator[DataPath]:
             yield from _data_paths(item)
 
 
-def _file_names(content: Content, taken: Iterable[str]) -> dict[str, str]:
+def _file_names(content: Content, taken_paths: Iterable[str]) -> dict[str, str]:
     """For the path of each data file the name that it has beside the config: as written, where that is free.
 
     The name of a swept file is part of the names of cases, so it changes only where it must."""
     names: dict[str, str] = {}
-    used_names = {name.casefold() for name in (*taken, CONFIG_FILE)}
+    used_names = {name.casefold() for name in (*taken_paths, CONFIG_FILE)}
     for data_path in _data_paths(content):
         if data_path.path in names:
             continue

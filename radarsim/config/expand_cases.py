@@ -129,8 +129,8 @@ class Expander:
         if any(scenario != scenarios[0] for scenarios in self.named_scenarios.values() for scenario in scenarios):
             return None
         scenarios = {stem: scenarios[0] for stem, scenarios in self.named_scenarios.items()}
-        further = {key: document.data.get(key) for key in ("figures", "runs")} | {"scenarios": scenarios}
-        return content | {key: value for key, value in further.items() if value}
+        other_keys = {key: document.data.get(key) for key in ("figures", "runs")} | {"scenarios": scenarios}
+        return content | {key: value for key, value in other_keys.items() if value}
 
     def _expand(self, document: Document, chain: tuple[FilePath, ...], overlays: OverlaidKeys) -> Expansion:
         """A config expanded under the overlays, of which the nearest comes first."""

@@ -26,7 +26,7 @@ class RunCounts:
 
     kernel_seconds is the time inside tasks, summed over the workers; stopped says why there are fewer than wanted."""
 
-    asked: int
+    requested: int
     from_store: int
     computed: int
     seconds: float
@@ -187,7 +187,7 @@ class Dispatch:
             platforms = self._writer.store.platforms
             warnings = (*self._writer.store.warnings, *([mixture_warning(platforms)] if len(platforms) > 1 else []))
         seconds, stopped_by = time.perf_counter() - self.started, {"stopped": stopped, "warnings": warnings}
-        counts = {"asked": self.requested, "from_store": self.from_store, "computed": self.computed}
+        counts = {"requested": self.requested, "from_store": self.from_store, "computed": self.computed}
         return counts | {"seconds": seconds, "kernel_seconds": self.kernel_seconds} | stopped_by
 
 

@@ -95,7 +95,7 @@ class Curve:
         """From scan k on."""
         return self.where(self.k >= k)
 
-    def at(self, k: int) -> Estimate:
+    def at_scan(self, k: int) -> Estimate:
         """The point at scan k."""
         return self.where(self.k == k).point(0)
 
@@ -113,8 +113,8 @@ class Curve:
         self._check_complete()
         return self.point(int(np.nanargmax(self.value)))
 
-    def least(self) -> Estimate:
-        """The least value, with the interval of its own scan."""
+    def smallest(self) -> Estimate:
+        """The smallest value, with the interval of its own scan."""
         self._check_complete()
         return self.point(int(np.nanargmin(self.value)))
 

@@ -10,7 +10,7 @@ from radarsim.report.statistics import student
 
 RANGE_NAMES = (
     *("printed", "between", "about", "above", "below", "at_most", "at_least", "greater", "less", "within", "same"),
-    *("kept", "on_grid"),
+    *("no_loss", "on_grid"),
 )
 
 
@@ -156,7 +156,7 @@ def same(value: float = 0.0, margin: float = 1.0, strict: float | None = None) -
     return ExpectedRange(value, value, f"{value:g} ± {margin:g}", margin, SAME, (value - old, value + old))
 
 
-def kept(margin: float = 1.0, strict: float = 0.5) -> ExpectedRange:
+def no_loss(margin: float = 1.0, strict: float = 0.5) -> ExpectedRange:
     """No loss, in % of σ: a gain, or a loss within the margin."""
     return ExpectedRange(0.0, math.inf, f"≥ 0 ± {margin:g}", margin, SAME, (-strict, math.inf))
 

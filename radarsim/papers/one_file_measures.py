@@ -145,4 +145,4 @@ def limit(evidence: Evidence, case: Any, filter: str, component: str) -> float:
 
 
 def _point(series: Curve, scan: int | None) -> Estimate:
-    return series.last() if scan is None else series.at(scan)
+    return series.last() if scan is None else series.at_scan(scan)

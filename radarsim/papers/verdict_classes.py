@@ -59,8 +59,8 @@ class VerdictClass:
         if row["class"] not in CLASSES:
             raise ValueError(row["class"])
         needed = float(row["needed"]) if row["needed"] else math.nan
-        holds, of = int(row["holds"]), int(row["of"])
-        return cls(row["claim"], row["class"], holds, of, row["depends_on"], needed, row["declared"])
+        holds, count = int(row["holds"]), int(row["of"])
+        return cls(row["claim"], row["class"], holds, count, row["depends_on"], needed, row["declared"])
 
 
 # For each claim that depends on an open choice: its class over all interpretations, None where unknown.

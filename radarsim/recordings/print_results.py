@@ -130,18 +130,18 @@ def print_registration(registration: "Registration", positions_file: str) -> Non
     from radarsim.recordings.registration import sentences
 
     plots = plural("{count} plot", "{count} plots", registration.plots)
-    match_kinds = ", ".join(f"{kind} {count}" for kind, count in registration.by.items())
+    match_kinds = ", ".join(f"{kind} {count}" for kind, count in registration.counts_by_kind.items())
     values = {"plots": plots, "matched": registration.matched, "file": positions_file, "by": match_kinds}
     lines = [
         labelled_line(
             "plots", tr("{matched} of {plots} have a position of their aircraft in {file} (by {by})", **values)
         )
     ]
-    offset_text = tr("{distance} from it (median)", distance=aircraft_match.distance_text(*registration.apart))
+    offset_text = tr("{distance} from it (median)", distance=aircraft_match.distance_text(*registration.median_offsets))
     aircraft = tr("{count} aircraft", count=len(registration.aircraft))
     interpolation_text = tr("positions in between err by less than {most:.2g} m (95 %)", most=registration.bent_m)
     lines += [labelled_line("", f"{aircraft}; {offset_text}; {interpolation_text}")]
-    lines += [labelled_line("", tr("left out: {what}", what=reason)) for reason in registration.left]
+    lines += [labelled_line("", tr("left out: {what}", what=reason)) for reason in registration.left_out]
     lines.append(tr("Biases of the plots with 95 % intervals, {file} taken as right", file=positions_file))
     lines += sentences.registration_lines(registration)
     for line in lines:

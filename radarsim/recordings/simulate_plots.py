@@ -56,11 +56,11 @@ def plot_batches(
     plots, last, case_study = recording_interface(case), first + n, study(case.study)
     world = cache(
         lambda: user_filters_plots.make_world(
-            case_study, case, plots.drawn(case, first, 1), case_study.prepare(case).axes.components
+            case_study, case, plots.draw_plots(case, first, 1), case_study.prepare(case).axes.components
         )
     )
-    shared_fields: dict[str, Any] = {"seed": case.seed, "known": world}
-    return (replace(plots.drawn(case, i, min(size, last - i)), **shared_fields) for i in range(first, last, size))
+    shared_fields: dict[str, Any] = {"seed": case.seed, "make_world": world}
+    return (replace(plots.draw_plots(case, i, min(size, last - i)), **shared_fields) for i in range(first, last, size))
 
 
 def _whole_number(name: str, value: Any, minimum: int) -> int:

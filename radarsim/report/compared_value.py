@@ -69,7 +69,7 @@ class ComparedValue:
 def row_value(row: Row, quantity: Quantity = SIGMA) -> ComparedValue:
     """The exact value of a quantity in a row, else the measured one with its interval."""
     kind: Any = "gain" if quantity.paired else "share" if quantity.kind == "share" else "size"
-    exact = float(row.get(quantity.known, np.nan))
+    exact = float(row.get(quantity.exact_column, np.nan))
     if not np.isnan(exact):
         return ComparedValue(Estimate(exact, exact, exact), True, kind=kind)
     estimate = Estimate(*(float(row[name]) for name in (quantity.value, *quantity.ends)))
@@ -110,7 +110,7 @@ def extreme(rows: "pd.DataFrame", quantity: Quantity, largest: bool = True) -> "
     """The row with the largest or the smallest value, exact values first, and its value.
 
     Of measured values the interval is one that holds for all that were looked at."""
-    exact = rows.get(quantity.known, rows[quantity.value] * np.nan).to_numpy(dtype=float)
+    exact = rows.get(quantity.exact_column, rows[quantity.value] * np.nan).to_numpy(dtype=float)
     decides = np.where(np.isnan(exact), rows[quantity.value].to_numpy(dtype=float), exact)
     row = rows.iloc[int(np.nanargmax(decides) if largest else np.nanargmin(decides))]
     return row, row_value(row, quantity).chosen_among(int(np.isnan(exact).sum()))

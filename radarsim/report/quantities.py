@@ -58,7 +58,7 @@ class Quantity:
 
     last: its precision is that at the last scan or window of each filter. squares: it is made of squared errors, which
     rare large ones dominate. paired: it is a change of σ in per cent of that of another filter, which has none itself.
-    rest: it is 1 minus the column."""
+    is_complement: it is 1 minus the column."""
 
     name: str
     words: str
@@ -73,7 +73,7 @@ class Quantity:
     last: bool = False
     squares: bool = False
     paired: bool = False
-    rest: bool = False
+    is_complement: bool = False
 
     def __post_init__(self) -> None:
         """Raises ConfigError for a name that is impossible as an option."""
@@ -94,7 +94,7 @@ class Quantity:
         return f"{stem}_lo", f"{stem}_hi"
 
     @property
-    def known(self) -> str:
+    def exact_column(self) -> str:
         """The column of its exact value."""
         return self.exact or f"exact_{self.value}"
 
@@ -134,7 +134,9 @@ class Quantity:
 
     def complement(self, name: str, words: str) -> "Quantity":
         """1 minus a share."""
-        return replace(self, name=name, words=words, more_is_better=not self.more_is_better, rest=not self.rest)
+        return replace(
+            self, name=name, words=words, more_is_better=not self.more_is_better, is_complement=not self.is_complement
+        )
 
     def read(self, rows: "pd.DataFrame") -> "tuple[Estimate, np.ndarray]":
         """Values with their intervals, and exact values (rows,) or NaN, from rows of its table. Raises ConfigError
@@ -145,13 +147,13 @@ class Quantity:
 
         if missing := [name for name in (self.value, self.per) if name and name not in rows and len(rows)]:
             raise ConfigError(f"quantity {self.name!r}: {self.table}.csv has no column {missing[0]!r}")
-        names = [self.value, *self.ends, self.known]
+        names = [self.value, *self.ends, self.exact_column]
         value, lo, hi, exact = (
             rows[name].to_numpy(dtype=float) if name in rows else np.full(len(rows), np.nan) for name in names
         )
         if self.ends[0] not in rows:
             lo = hi = exact = value
-        if self.rest:
+        if self.is_complement:
             value, lo, hi, exact = 1 - value, 1 - hi, 1 - lo, 1 - exact
         return Estimate(value, lo, hi), exact
 

@@ -25,7 +25,7 @@ from radarsim.physics.motion import process_noise, transition
 from radarsim.report.quantities import Component, Quantity
 from radarsim.studies.interface import Paper, Study
 from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Measured
+from radarsim.studies.onefile import MeasuredColumn
 from radarsim.studies.plot_arrays import World
 from radarsim.studies.stepwise import Steps, StepStudy
 
@@ -36,7 +36,7 @@ __all__ = [
     "DisplayMark",
     "Flag",
     "LinearStudy",
-    "Measured",
+    "MeasuredColumn",
     "Member",
     "Members",
     "Model",

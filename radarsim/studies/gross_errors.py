@@ -60,9 +60,9 @@ def gross_errors(t: np.ndarray, z: np.ndarray, limit: float) -> np.ndarray:
 def _neighbour_residual(t: np.ndarray, z: np.ndarray, i: int) -> float:
     """The distance of number i from the parabola through the three numbers after it, of the last ones before it: small
     where a target manoeuvres, which moves on smoothly."""
-    others = np.arange(i + 1, i + 4) if i + 3 < len(z) else np.arange(i - 3, i)
-    weights = [np.prod([(t[i] - t[k]) / (t[j] - t[k]) for k in others if k != j]) for j in others]
-    return float(abs(z[i] - np.array(weights) @ z[others]))
+    neighbours = np.arange(i + 1, i + 4) if i + 3 < len(z) else np.arange(i - 3, i)
+    weights = [np.prod([(t[i] - t[k]) / (t[j] - t[k]) for k in neighbours if k != j]) for j in neighbours]
+    return float(abs(z[i] - np.array(weights) @ z[neighbours]))
 
 
 def data_span(tracks: Sequence[Mapping[str, np.ndarray]], measured: Sequence[str]) -> np.ndarray:

@@ -185,7 +185,7 @@ class Study(ABC):
     ) -> "dict[str, Figure]":
         """Descriptions of the figures by the stem of their file, from results and all their tables."""
 
-    def shown(self) -> "Sequence[Component]":
+    def user_filter_components(self) -> "Sequence[Component]":
         """The components with letters and words, for figures of user filters. Default: range and its rates."""
         return ()
 

@@ -132,7 +132,7 @@ class PlotLikelihood:
         if None in stated:
             raise study._fault("fitted", f"{self.keys[stated.index(None)]} is not given")
         self.stated = np.array(stated, dtype=float)
-        self.least = ZERO_SHARE * np.where(self.stated > 0, self.stated, 1.0)
+        self.zero_limits = ZERO_SHARE * np.where(self.stated > 0, self.stated, 1.0)
         none = np.full(self.rows, np.nan)
         self.given_tracks = [
             {"t_s": track["t_s"], **{name: track.get(name, none[: len(track["t_s"])]) for name in self.model.columns}}

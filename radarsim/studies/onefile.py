@@ -8,7 +8,7 @@
         parts = {"sensor": Sensor, "target": Target}
         Filter = Filter
         scan_period = "sensor.scan_period_s"
-        measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)
+        measured = (MeasuredColumn("x_m", "m", ("sensor.sigma_x_m",)),)
         paper = Paper("Kalman 1960", may_grow=("filters",))
         claims_yaml = "…"
 
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     from radarsim.studies.recording_interface import Tracker
 
 
-class Measured(NamedTuple):
+class MeasuredColumn(NamedTuple):
     """A number of a plot: its column, its unit, and the keys of its standard deviation."""
 
     column: str
@@ -100,7 +100,7 @@ class OneFile(Study):
     parts: Mapping[str, type[Model]]
     Filter: type[Member]
     scan_period: str
-    measured: tuple[Measured, ...] = ()
+    measured: tuple[MeasuredColumn, ...] = ()
     paper: Paper | None = None
     claims_yaml: str = ""
     drawing: "Callable[[Case], DrawPlots] | None" = None
@@ -155,7 +155,7 @@ class OneFile(Study):
     @classmethod
     def _tuple_errors(cls) -> Iterator[str]:
         for value in (cls.components, cls.measured):
-            if isinstance(value, Component | Measured):
+            if isinstance(value, Component | MeasuredColumn):
                 yield f"{value!r} must stand in a tuple, ({type(value).__name__}(…),)"
 
     @classmethod
@@ -168,8 +168,8 @@ class OneFile(Study):
             if not (isinstance(part, type) and issubclass(part, base)):
                 yield f"{name} must be a subclass of {base.__module__}.{base.__name__}, got {part!r}"
         for number in cls.measured:
-            if not isinstance(number, Measured):
-                yield f"measured: {number!r} must be Measured(column, unit, keys of its σ)"
+            if not isinstance(number, MeasuredColumn):
+                yield f"measured: {number!r} must be MeasuredColumn(column, unit, keys of its σ)"
             elif isinstance(keys := number.sigma_keys, str):
                 yield f"{number.column}: sigma_keys must be a tuple, ({keys!r},); got {keys!r}"
 
@@ -280,9 +280,9 @@ class OneFile(Study):
     ) -> "dict[str, Figure]":
         from radarsim.report import time_figures
 
-        return time_figures.component_figures(results, tables, self.shown(), experiment)
+        return time_figures.component_figures(results, tables, self.user_filter_components(), experiment)
 
-    def shown(self) -> "list[Component]":
+    def user_filter_components(self) -> "list[Component]":
         from radarsim.report import key_labels
 
         return [

@@ -83,7 +83,7 @@ class SimulatedPlots(RandomPlots):
 
     columns (n, K)  what is measured, by name and unit, not-a-number where missing; (n, K, M) where a scan may have
                     several plots: these come first, the rest is not-a-number, and M is as large as needed
-    truth (n, K, C) the true state, its components by name and unit; beside: further columns, true_…, of either shape
+    truth (n, K, C) the true state, its components by name and unit; further_columns: true_…, of either shape
 
     seed: of the noise; world: what a filter may know beforehand, a `World`. A function for `radarsim.judge` can be
     called with these plots: it reads `plots["range_m"]`, t_s, world. Arrays may be views that cannot be written."""
@@ -92,10 +92,10 @@ class SimulatedPlots(RandomPlots):
     columns: "Mapping[str, np.ndarray]"
     components: tuple[tuple[str, str], ...]
     truth: "np.ndarray"
-    beside: "Mapping[str, np.ndarray]" = field(default_factory=dict)
+    further_columns: "Mapping[str, np.ndarray]" = field(default_factory=dict)
     first: int = 0
     seed: int = 0
-    known: Callable[[], World] | None = None  # the world, made when asked for
+    make_world: Callable[[], World] | None = None  # the world, made when asked for
 
     def __getitem__(self, name: str) -> "np.ndarray":
         return plot_column(self.columns, name)
@@ -103,8 +103,8 @@ class SimulatedPlots(RandomPlots):
     @property
     def world(self) -> World:
         """See the class."""
-        assert self.known is not None  # as in what `radarsim.plots` gives
-        return self.known()
+        assert self.make_world is not None  # as in what `radarsim.plots` gives
+        return self.make_world()
 
     @property
     def n(self) -> int:
@@ -137,20 +137,20 @@ class SimulatedPlots(RandomPlots):
         """All arrays (n, K) or (n, K, M): what is measured, then the truth in columns true_…."""
         names = (true_column(*component) for component in self.components)
         state = {name: self.truth[..., c] for c, name in enumerate(names)}
-        return {**self.columns, **self.beside, **state}
+        return {**self.columns, **self.further_columns, **state}
 
     def table(self) -> "dict[str, np.ndarray]":
         """All realisations one after the other as columns (rows,): `realisation`, `t_s`, what is measured, the truth.
 
         There is one row per scan. Where a scan may have several plots, there is one row per plot, or one without values
-        where a scan has none; the truth is then that in `beside`."""
+        where a scan has none; the truth is then that in `further_columns`."""
         import numpy as np
 
         n, K = self.truth.shape[:2]
         columns = {"realisation": np.arange(self.first, self.first + n)[:, None], "t_s": self.t_s[None]}
         if not self.several:
             return {name: np.broadcast_to(v, (n, K)).flatten() for name, v in (columns | self.arrays()).items()}
-        columns |= {**self.columns, **self.beside}
+        columns |= {**self.columns, **self.further_columns}
         has_row = np.any([np.isfinite(column) for column in self.columns.values()], axis=0)
         has_row[..., 0] = True
         wide = ((name, values if values.ndim == 3 else values[..., None]) for name, values in columns.items())
@@ -158,7 +158,9 @@ class SimulatedPlots(RandomPlots):
 
     def rows(self, i: int) -> "dict[str, np.ndarray]":
         """One of the realisations, counted from 0, with the columns of `table` except its number."""
-        selected = ({name: v[i : i + 1] for name, v in values.items()} for values in (self.columns, self.beside))
+        selected = (
+            {name: v[i : i + 1] for name, v in values.items()} for values in (self.columns, self.further_columns)
+        )
         realisation = SimulatedPlots(
             self.t_s, next(selected), self.components, self.truth[i : i + 1], next(selected)
         ).table()

@@ -69,7 +69,7 @@ class Likelihood(Protocol):
     """The likelihood of recorded plots under a filter, as a function of the config keys that it was designed with.
 
     filter: its name; tracks and rows: numbers of them; keys: dotted names; stated (n,): their values in the config;
-    least (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
+    zero_limits (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
     EXPLANATIONS; usual_s: the usual interval between plots."""
 
     filter: str
@@ -77,7 +77,7 @@ class Likelihood(Protocol):
     rows: int
     keys: tuple[str, ...]
     stated: "np.ndarray"
-    least: "np.ndarray"
+    zero_limits: "np.ndarray"
     explains: tuple[str, ...]
     usual_s: float
 
@@ -158,9 +158,9 @@ class RecordingInterface(ABC):
         """The plots of one realisation, as a run draws them, and the truth in columns true_…; columns (n,).
 
         Default: by `drawing`."""
-        return self.drawn(case, realisation, 1).rows(0)
+        return self.draw_plots(case, realisation, 1).rows(0)
 
-    def drawn(self, case: "Case", first: int, count: int) -> SimulatedPlots:
+    def draw_plots(self, case: "Case", first: int, count: int) -> SimulatedPlots:
         """The plots of realisations first … first + count - 1; the case is prepared only once."""
         with _LOCK:
             draw = next(

@@ -6,7 +6,7 @@
         normals = 4, 0, 1                           # unit normals: of the first state, of a move, of a plot
 
         def world(self, spec): …                    # the numbers of a case that its truth and plots need, a record
-        def known(self, spec, t_s): …               # what is known at times t_s (K,), columns (K,)
+        def known_quantities(self, spec, t_s): …    # what is known at times t_s (K,), columns (K,)
         def begin(self, c, w): …                    # the first state, of the world's numbers c and normals w
         def move(self, x, dt, c, w): …              # the state after dt seconds; (self, x, dt, c, w, t): at time t, s
         def plot(self, x, u, c, w): …               # the numbers of a plot; u: what is known at the scan
@@ -126,7 +126,7 @@ class StepStudy(OneFile):
     move: Callable[..., Any]
     plot: Callable[..., Any]
 
-    def known(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
+    def known_quantities(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
         """Quantities known at times t_s (K,) s: columns (K,), in the order of `known_columns`. Default: nothing."""
         return ()
 
@@ -148,7 +148,7 @@ class StepStudy(OneFile):
         for needed in ("kinds", "normals", "world", "begin", "move", "plot"):
             if not hasattr(cls, needed):
                 yield f"{cls.__name__}.{needed} must be given; see radarsim.studies.stepwise"
-        for name in ("world", "begin", "move", "plot", "known", "truth", "detection", "exact_sigma"):
+        for name in ("world", "begin", "move", "plot", "known_quantities", "truth", "detection", "exact_sigma"):
             if not callable(attribute := getattr(cls, name, len)):
                 yield f"{cls.__name__}.{name} must be a function, got {attribute!r}"[:200]
         normals = getattr(cls, "normals", (0, 0, 0))
@@ -183,7 +183,7 @@ class StepStudy(OneFile):
 
         spec = case.spec
         axes, sums = self.axes(spec, self._exact(spec)), self.sums(spec)
-        known_quantities = self._known(spec, axes.t_s)
+        known_quantities = self._checked_known_quantities(spec, axes.t_s)
         world, detection = record(self.world, spec), self._probability(spec)
         scene = self._scene(world)
         filters = tuple(self._compiled(spec, keys, scene, detection < 1) for keys in spec.filters)
@@ -212,28 +212,31 @@ class StepStudy(OneFile):
             raise user_code_error(self.exact_sigma, f"must give σ {shape}, none negative, got {sigma.shape}")
         return sigma
 
-    def _known(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
+    def _checked_known_quantities(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
         """The time since the scan before, and the known quantities at each, (K, whole eights)."""
         required = (
             f"must give {len(self.known_columns)} columns of {t_s.size} finite numbers, as known_columns says; got "
         )
-        known_quantities, repeated = (self.call(self.known, spec, t_s) for _ in range(2))
+        known_quantities, repeated = (self.call(self.known_quantities, spec, t_s) for _ in range(2))
         if (
             not isinstance(known_quantities, Sequence | np.ndarray)
             or isinstance(known_quantities, str)
             or len(known_quantities) != len(self.known_columns)
         ):
             size = f"{len(known_quantities)}" if isinstance(known_quantities, tuple | list) else repr(known_quantities)
-            raise user_code_error(self.known, f"{required}{size}"[:200])
+            raise user_code_error(self.known_quantities, f"{required}{size}"[:200])
         values, repeated_values = (
-            to_array(self.known, columns, f"{t_s.size} in each column") for columns in (known_quantities, repeated)
+            to_array(self.known_quantities, columns, f"{t_s.size} in each column")
+            for columns in (known_quantities, repeated)
         )
         if values.shape[1:] != (t_s.size,) * bool(len(known_quantities)) or not np.isfinite(values).all():
             raise user_code_error(
-                self.known, f"{required}{values.shape}, {np.sum(~np.isfinite(values))} of them not finite"
+                self.known_quantities, f"{required}{values.shape}, {np.sum(~np.isfinite(values))} of them not finite"
             )
         if not np.array_equal(values, repeated_values):
-            raise user_code_error(self.known, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
+            raise user_code_error(
+                self.known_quantities, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals"
+            )
         columns = [np.diff(t_s, prepend=t_s[0]), *values, *([t_s] if self._moves_by_time else [])]
         padded = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
         padded[:, : len(columns)] = np.transpose(columns)

@@ -8,7 +8,7 @@ from radarsim.physics.motion import process_noise, transition
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.interface import Paper
 from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Measured
+from radarsim.studies.onefile import MeasuredColumn
 
 START = [[250.0**2, 0, 0], [0, 300.0**2, 0], [0, 0, 10.0**2]]
 
@@ -40,8 +40,8 @@ class Matched(LinearStudy):
     components, parts, scan_period = RADIAL, {"radar": Radar, "target": Target}, "radar.scan_period_s"
     Filter = Filter
     measured = (
-        Measured("range_m", "m", ("radar.sigma_range_m",)),
-        Measured("velocity_mps", "m/s", ("radar.sigma_velocity_mps",)),
+        MeasuredColumn("range_m", "m", ("radar.sigma_range_m",)),
+        MeasuredColumn("velocity_mps", "m/s", ("radar.sigma_velocity_mps",)),
     )
     paper = Paper("Gorshkov & Zavizhenets 2017")
 

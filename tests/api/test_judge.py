@@ -848,7 +848,7 @@ def test_a_sweep_shows_the_filter_too():
 
 
 def test_axes_of_a_flight_have_their_words():
-    words = {one.name: one.words for one in registry.study("multimodel").shown()}
+    words = {one.name: one.words for one in registry.study("multimodel").user_filter_components()}
     assert (words["x"], words["y"], words["vy"]) == ("distance north", "height", "rate of climb")
     assert set(words) == {name for name, _ in flight.COMPONENTS}
     with use_language("ru"):

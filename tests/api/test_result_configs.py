@@ -132,7 +132,7 @@ def test_a_data_file_takes_the_place_of_no_table(written, tmp_path):
     (tmp_path / "home").mkdir(exist_ok=True)
     (tmp_path / "home" / "flight.yaml").write_text(f"include: [multimodel_recorded]\ntarget: {{file: '{named}'}}\n")
     experiment = configs.load(tmp_path / "home" / "flight.yaml")
-    files = config_files(experiment, taken=["curves.csv"])
+    files = config_files(experiment, taken_paths=["curves.csv"])
     assert files["inputs/curves.csv"] == track
     assert str(tmp_path) not in files[CONFIG_FILE].decode()
 

@@ -42,7 +42,7 @@ def test_the_velocity_accuracy_for_a_gain(equals, printed):
     found = solve("rls2", "radar.sigma_velocity_mps", GAIN, equals)
     assert found.exact
     assert found.value == pytest.approx(printed, abs=0.05)
-    assert (found.lo, found.hi, found.others) == (found.value, found.value, ())
+    assert (found.lo, found.hi, found.other_values) == (found.value, found.value, ())
     twin = impulse.gains(7, 1e-3, (250.0, found.value), 10.0)[0]
     assert twin == pytest.approx(equals, abs=200 * recursion_rounding(7))  # of two σ, per cent
     closed = abs(found.slope * found.value) * root_search.EXACT_WIDTH
@@ -70,7 +70,7 @@ def test_other_keys_and_quantities_against_the_textbook(key, quantity, equals, s
     found = solve("rls2", key, quantity, equals)
     scans = 11 if quantity.at_s else quantity.at_k or 15
     component = ("r", "Vr", "ar").index(quantity.component)
-    for value in (found.value, *found.others):
+    for value in (found.value, *found.other_values):
         given = RLS2 | {name: of(value) for name, of in setting.items()}
         if quantity.name == "gain":
             attained = impulse.gains(scans, **given)[component]
@@ -87,7 +87,7 @@ def test_all_roots_are_those_of_a_dense_grid():
     grid = np.geomspace(1e-6, 1e-1, 120)
     gains = np.array([impulse.gains(11, x, (250.0, 15.0), 10.0)[2] for x in grid])
     turns = np.flatnonzero(np.diff(np.sign(gains)))
-    values = sorted([found.value, *found.others])
+    values = sorted([found.value, *found.other_values])
     assert len(values) == len(turns) >= 2
     for value, i in zip(values, turns, strict=True):
         assert grid[i] <= value <= grid[i + 1]
@@ -182,7 +182,7 @@ def covered(seeds, realisations, quantity, equals, overrides=(), **given):
     key = "radar.sigma_velocity_mps"
     exact = solve("rls2", key, quantity, equals, overrides=overrides, **given)
     assert exact.exact
-    assert not exact.others
+    assert not exact.other_values
     counts = np.zeros(4, dtype=int)
     for seed in range(seeds):
         seeded = [*overrides, f"seed={seed}"]

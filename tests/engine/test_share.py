@@ -47,7 +47,7 @@ def test_united_by_copying_they_give_the_bytes_of_one_run(tmp_path_factory, real
 
 def test_a_share_is_stored_without_a_total_and_counted_once(tmp_path):
     first = compute_share(WORK, N, (2, 3), store=tmp_path, threads=2)
-    assert (first.asked, first.done, first.computed, first.from_store, first.stopped) == (1664, 1664, 1664, 0, None)
+    assert (first.requested, first.done, first.computed, first.from_store, first.stopped) == (1664, 1664, 1664, 0, None)
     assert not [piece for piece in Store(tmp_path, WORK).pieces() if isinstance(piece, Total)]
     assert held(tmp_path) == 1664
     again = compute_share(WORK, N, (2, 3), store=tmp_path, threads=2)
@@ -72,7 +72,7 @@ def test_a_stopped_share_keeps_what_it_did_and_goes_on(tmp_path, number):
     slow = Fake(pause_s=1e-3)
     cut = compute_share(slow, 16 * 900, (number, 3), store=tmp_path, threads=2, stop=lambda: next(asked, "enough"))
     assert cut.stopped == "enough"
-    assert 0 < cut.done < cut.asked == 16 * 300
+    assert 0 < cut.done < cut.requested == 16 * 300
     assert held(tmp_path) == cut.done
     whole = compute_share(WORK, 16 * 900, (number, 3), store=tmp_path, threads=2)
     assert (whole.done, whole.from_store) == (16 * 300, cut.done)

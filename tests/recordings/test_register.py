@@ -251,7 +251,7 @@ def test_two_recordings(tmp_path, of_day, sites):
     """Positions from 1970 or times of day, seen from the radar or from elsewhere; the correction leaves nothing."""
     files = recordings(tmp_path, of_day=of_day)
     one = register.register_radar(*imported(tmp_path, files, sites))
-    assert (one.plots, one.matched, one.by) == (480, 480, {"address": 480})
+    assert (one.plots, one.matched, one.counts_by_kind) == (480, 480, {"address": 480})
     for bias, true in zip(one.adjustment.biases, SOME, strict=True):
         assert bias.lo < true < bias.hi
         assert bias.hi - bias.lo < 1.2 * (abs(true) + (bias.key == "range_scale") * 1e-3)
@@ -429,7 +429,7 @@ def test_a_radar_that_knows_codes_alone(tmp_path):
         ordered = sorted(records, key=lambda one: one[0])
         file.write_bytes(b"".join(block(category, one) for _, one in ordered))
     one = register.register_radar(*imported(tmp_path, files))
-    assert one.by == {"mode_3a": one.matched}
+    assert one.counts_by_kind == {"mode_3a": one.matched}
     assert one.plots == 480
     assert 440 < one.matched <= 480
     assert len(one.aircraft) == 8
@@ -447,14 +447,14 @@ def test_tables_are_matched_by_what_identifies_their_rows(tmp_path):
     fixes = [line.split(",") for line in adsb.read_text().splitlines()[1:]]
     rows = [",".join([t, name, names[name].lower() + " ", *rest]) for t, name, *rest in fixes]
     adsb.write_text("\n".join(["time,icao24,callsign,lat,lon,geoaltitude", *rows]))
-    assert register.register_radar(*imported(tmp_path, (radar, adsb))).by == {"callsign": 480}
+    assert register.register_radar(*imported(tmp_path, (radar, adsb))).counts_by_kind == {"callsign": 480}
     lone = [[row for row in table if row[1] == "4ca100"] for table in (plots, fixes)]
     for file, header, table in ((radar, "range_m,bearing_rad", lone[0]), (adsb, "lat,lon,geoaltitude", lone[1])):
         file.write_text("\n".join([f"time,{header}", *(",".join([t, *rest]) for t, _, *rest in table)]))
     with pytest.raises(ConfigError, match="0 of 60 plots have a position of their aircraft"):
         register.register_radar(*imported(tmp_path, (radar, adsb)))
     plots, positions = imported(tmp_path, (radar, adsb))
-    assert register.register_radar(plots, f"1={positions}").by == {"address": 60}
+    assert register.register_radar(plots, f"1={positions}").counts_by_kind == {"address": 60}
 
 
 def test_an_aircraft_that_is_another_is_left_out_and_named(tmp_path):
@@ -464,6 +464,6 @@ def test_an_aircraft_that_is_another_is_left_out_and_named(tmp_path):
     radar.write_text(text.replace("4ca101", "x").replace("4ca106", "4ca101").replace("x", "4ca106"))
     one = register.register_radar(*imported(tmp_path, (radar, adsb)))
     assert one.matched == 360
-    assert sorted(line.split(",")[0] for line in one.left) == ["the plots of 4ca101", "the plots of 4ca106"]
+    assert sorted(line.split(",")[0] for line in one.left_out) == ["the plots of 4ca101", "the plots of 4ca106"]
     for bias, true in zip(one.adjustment.biases, SOME, strict=True):
         assert bias.lo < true < bias.hi

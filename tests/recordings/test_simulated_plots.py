@@ -94,7 +94,7 @@ def test_memory_is_that_of_a_chunk():
 
 def test_several_plots_of_a_scan_come_first_and_the_targets_is_known():
     made = radarsim.plots(*CLUTTER[:1], n=200, overrides=CLUTTER[1])
-    r, b, own = made.columns["range_m"], made.columns["bearing_rad"], made.beside["true_target"]
+    r, b, own = made.columns["range_m"], made.columns["bearing_rad"], made.further_columns["true_target"]
     there = np.isfinite(r)
     assert made.several
     assert there[..., -1].any()  # as wide as needed
@@ -102,9 +102,9 @@ def test_several_plots_of_a_scan_come_first_and_the_targets_is_known():
     assert (np.isfinite(b) == there).all()
     assert (np.isfinite(own) == there).all()
     assert (np.nansum(own, axis=-1) <= 1).all()
-    errors = (r - made.beside["true_range_m"][..., None])[own == 1]
+    errors = (r - made.further_columns["true_range_m"][..., None])[own == 1]
     assert abs(errors.mean()) < 5 * errors.std() / np.sqrt(errors.size)
-    np.testing.assert_array_equal(made.truth_of((("b", "rad"),))[..., 0], made.beside["true_bearing_rad"])
+    np.testing.assert_array_equal(made.truth_of((("b", "rad"),))[..., 0], made.further_columns["true_bearing_rad"])
 
 
 def test_a_study_without_plots_says_so():
@@ -149,7 +149,7 @@ class _Own(RecordingInterface):
 
 
 def test_a_study_of_one_realisation_at_a_time_has_several_too():
-    made = _Own().drawn(None, 4, 2)
+    made = _Own().draw_plots(None, 4, 2)
     assert made.components == (("x", "m"), ("Vr", "m/s"))
     np.testing.assert_array_equal(made.columns["x_m"], [[4.5, 5.5, 6.5], [5.5, 6.5, 7.5]])
     np.testing.assert_array_equal(made.truth_of((("Vr", "m/s"),))[..., 0], [[8, 10, 12], [10, 12, 14]])

@@ -88,13 +88,13 @@ def test_series():
     value = np.array([1.0, 3.0, 2.9, 0.5])
     series = Curve(k, 10.0 * k, value, value - 0.2, value + 0.2)
     assert series.largest() == (3.0, 2.8, 3.2)
-    assert series.least().value == 0.5
+    assert series.smallest().value == 0.5
     assert series.when_largest() == (20.0, 20.0, 30.0)
     assert series.when_largest("k") == (2, 2, 3)
     assert series.since(3).first().value == 2.9
-    assert series.at(4) == series.last()
+    assert series.at_scan(4) == series.last()
     with pytest.raises(MissingEvidence):
-        series.at(9)
+        series.at_scan(9)
     half = Curve(k[:2], 20.0 * k[:2], value[:2], value[:2], value[:2])
     a, b = common_times(series, half)
     np.testing.assert_array_equal(a.t, [20, 40])
@@ -127,9 +127,9 @@ def test_all_claims_judged(table):
 # The last one is half a unit of the last digit that is printed, of each number that the value is made of.
 FOUND = [
     ("P1.1", "rls1", "largest", 14.1, 0.05),
-    ("P1.1", "rls1", "least", 8.0, 0.05),
+    ("P1.1", "rls1", "smallest", 8.0, 0.05),
     ("P1.2", "rls1", "largest", 46.4, 0.05),
-    ("P1.2", "rls1", "least", 9.6, 0.05),
+    ("P1.2", "rls1", "smallest", 9.6, 0.05),
     ("P1.3", "rls1", "5th", -2.6, 0.05),
     ("P1.4", "rls3", "^largest range", 44.8, 0.05),
     ("P1.4", "rls2", "^largest range", 34.6, 0.05),
@@ -187,8 +187,8 @@ FOUND = [
     ("P1.33", "rls4, rls2", "RLS 4 minus", 33 - 1.8, 0.55),
     ("P1.34", "rls4", "centimetre", 20, 0),
     ("P1.34", "rls1", "metre", 1 / 3, 0),
-    ("P1.35", "rls1", "least velocity", 9.6, 0.05),
-    ("P1.35", "rls2", "least range", 18.3, 0.05),
+    ("P1.35", "rls1", "smallest velocity", 9.6, 0.05),
+    ("P1.35", "rls2", "smallest range", 18.3, 0.05),
     ("P1.36", "rls2", "relative difference", 0, recursion_rounding()),
     ("P1.36", "rls5", "relative difference", 0, recursion_rounding()),
 ]

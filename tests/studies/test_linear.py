@@ -15,7 +15,7 @@ from radarsim.errors import ConfigError
 from radarsim.report.quantities import Component
 from radarsim.studies.interface import Paper
 from radarsim.studies.linear import LinearStudy, Motion
-from radarsim.studies.onefile import Measured
+from radarsim.studies.onefile import MeasuredColumn
 from tests.tolerances import Z, assert_rounded, column_sizes, rounding, scaled_condition
 
 SCANS = 25
@@ -68,7 +68,7 @@ def study_of(n, D):
             "sensor.probability",
             ("sensor.sigma_m", "sensor.noise"),
         )
-        measured = tuple(Measured(f"z{d}_m", "m", ("sensor.sigma_m",)) for d in range(D))
+        measured = tuple(MeasuredColumn(f"z{d}_m", "m", ("sensor.sigma_m",)) for d in range(D))
         paper = Paper("Kalman 1960")
 
         def motion(self, spec):

@@ -23,7 +23,7 @@ from radarsim.report import tables
 from radarsim.report.quantities import Component
 from radarsim.studies.interface import Paper
 from radarsim.studies.noise import noise_key
-from radarsim.studies.onefile import Measured, OneFile
+from radarsim.studies.onefile import MeasuredColumn, OneFile
 from radarsim.studies.plot_arrays import true_column
 from tests.answers import answer_texts
 from tests.tolerances import assert_rounded
@@ -68,7 +68,7 @@ class Walk(OneFile):
     parts = {"sensor": Sensor, "target": Target}  # noqa: RUF012
     Filter = Smoothing
     scan_period = "sensor.scan_period_s"
-    measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)
+    measured = (MeasuredColumn("x_m", "m", ("sensor.sigma_x_m",)),)
     paper = Paper("Kalman 1960", may_grow=("filters",))
     claims_yaml = """
 paper: walk
@@ -227,9 +227,12 @@ WRONG = {
     "Filter": (Sensor, r"Filter must be a subclass of radarsim\.config\.study_keys\.Member, got .*Sensor"),
     "scan_period": ("sensor.period_s", r"scan_period: there is no key sensor\.period_s"),
     "scan_period ": ("gain", r"scan_period: gain must be a key of a part, PART\.KEY"),
-    "measured": ((Measured("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
-    "measured ": ((Measured("x_m", "m", "sensor.sigma_x_m"),), r"x_m: sigma_keys must be a tuple, \('sensor"),
-    "measured  ": (Measured("x_m", "m"), r"Measured\(column='x_m', .*\) must stand in a tuple, \(Measured\(…\),\)"),
+    "measured": ((MeasuredColumn("x_m", "m", ("sensor.sigma",)),), r"x_m: there is no key sensor\.sigma"),
+    "measured ": ((MeasuredColumn("x_m", "m", "sensor.sigma_x_m"),), r"x_m: sigma_keys must be a tuple, \('sensor"),
+    "measured  ": (
+        MeasuredColumn("x_m", "m"),
+        r"MeasuredColumn\(column='x_m', .*\) must stand in a tuple, \(MeasuredColumn\(…\),\)",
+    ),
     "components ": (Component("x", "m"), r"Component\(name='x', .*\) must stand in a tuple"),
     "paper ": (Paper("Kalman", may_grow="filters"), r"paper: may_grow: must be a tuple, \('filters',\)"),
     "claims_yaml": (
@@ -317,7 +320,7 @@ def failing(what):
         (ValueError("boom"), "ValueError: boom \\("),
         (SystemExit(0), "SystemExit: 0 \\("),
         (UnknownName("no filter 'quikc'; there are slow"), "no filter 'quikc'; there are slow \\("),
-        (lambda evidence: evidence.curve({}, "quick", "x").at(41), "no such scans; there are 1 to 40 \\("),
+        (lambda evidence: evidence.curve({}, "quick", "x").at_scan(41), "no such scans; there are 1 to 40 \\("),
         (lambda evidence: evidence.gain({}, "quick", "x").since(50), "no such scans; there are 1 to 40 \\("),
     ],
 )
@@ -350,7 +353,7 @@ def test_a_name_that_a_measure_of_ones_own_looks_for_in_vain_is_the_reason(made)
 WRONG_NAMES = {
     "components": ((Component("a b", "m"),), "'a b' must be of letters, digits and _"),
     "twice": ((Component("x", "m"), Component("x", "m")), "components: x is there twice"),
-    "measured": ((Measured("t_s", "s"),), "measured: t_s is the time of a plot"),
+    "measured": ((MeasuredColumn("t_s", "s"),), "measured: t_s is the time of a plot"),
     "parts": ({"sensor": Sensor, "scans": Target}, "parts: scans is added to the keys of every study"),
 }
 

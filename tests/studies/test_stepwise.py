@@ -21,7 +21,7 @@ from radarsim.recordings.report import tables
 from radarsim.recordings.tracking_result import START_ESTIMATES, TrackingResult
 from radarsim.report.quantities import Component
 from radarsim.studies import stepwise
-from radarsim.studies.onefile import Measured
+from radarsim.studies.onefile import MeasuredColumn
 from radarsim.studies.stepwise import Steps, StepStudy
 from tests.tolerances import assert_rounded, column_sizes, mean_error, sigma_error
 
@@ -83,7 +83,7 @@ class Walk(StepStudy):
     components = (Component("x", "m"),)
     parts, Filter = {"sensor": Sensor}, Gain
     scan_period = "sensor.scan_period_s"
-    measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)
+    measured = (MeasuredColumn("x_m", "m", ("sensor.sigma_x_m",)),)
     kinds, normals = {"kalman": Kalman, "halves": Halves}, (1, 1, 1)
     known_columns = ("drift_m",)
 
@@ -93,7 +93,7 @@ class Walk(StepStudy):
     def detection(self, spec):
         return spec.sensor.detection_probability
 
-    def known(self, spec, t_s):
+    def known_quantities(self, spec, t_s):
         return (0 * t_s + 7,)
 
     def begin(self, c, w):
@@ -448,7 +448,7 @@ def test_numbers_are_a_record_and_what_is_known_has_its_columns():
     study.kinds = Walk.kinds
     said = "must give 1 columns of 12 finite numbers, as known_columns says; got "
     for given, got in (((1, 2), "2"), ((np.ones(3),), r"\(1, 3\)"), ((np.full(12, np.nan),), "12 of them"), (7, "7")):
-        study.known = lambda spec, t_s, given=given: given
+        study.known_quantities = lambda spec, t_s, given=given: given
         with pytest.raises(ConfigError, match=f"{said}.*{got}"):
             study.prepare(case_of(study))
 

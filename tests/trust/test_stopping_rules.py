@@ -268,7 +268,7 @@ class Synthetic:
             return CollectedSums(
                 n,
                 np.array([0.0, square, 0.0, fourth, fourth]),
-                asked=n,
+                requested=n,
                 from_store=0,
                 computed=n,
                 seconds=0.0,

@@ -121,7 +121,7 @@ def test_errors_are_those_of_a_monte_carlo_of_another_make():
     plan, spec, rng = STUDY.prepare(case), case.spec, np.random.default_rng(3)
     sums = sum(plan.layout.unpack(STUDY.simulate(plan, i, 512))["error"] for i in range(0, many, 512))
     t = plan.axes.t_s
-    own = np.transpose(STUDY.known(spec, t))
+    own = np.transpose(STUDY.known_quantities(spec, t))
     target, line = spec.target, np.array([np.sin(spec.target.bearing_rad), np.cos(spec.target.bearing_rad)])
     errors = []
     for _ in range(n):

@@ -353,7 +353,7 @@ def make_answer(
         exact=exact,
         attained=attained,
         slope=slope,
-        others=other_values,
+        other_values=other_values,
         limit=limit,
         limit_at=limit_at,
         low=question.search_range.low,

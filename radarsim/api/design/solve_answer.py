@@ -21,7 +21,7 @@ class Answer(Displayable):
 
     value is None where the target is not attained; then limit is the nearest attainable value, at limit_at. lo and hi
     bound the value at 95 %, and equal it where exact. slope is the change of the quantity for one unit of the key;
-    others are further values that attain the target. low and high are the searched range, command the run that
+    other_values: further values that attain the target. low and high are the searched range, command the run that
     confirms."""
 
     key: str
@@ -37,7 +37,7 @@ class Answer(Displayable):
     exact: bool
     attained: float | None
     slope: float | None
-    others: tuple[float, ...]
+    other_values: tuple[float, ...]
     limit: float | None
     limit_at: float | None
     low: float
@@ -66,8 +66,8 @@ class Answer(Displayable):
         lines.append(("attains", f"{self.quantity.translated_words}: {self._quantity(attained)}{self._now}"))
         if self.slope is not None:
             lines.append(("slope", self._slope(value, self.slope)))
-        if self.others:
-            lines.append(("also at", ", ".join(with_unit(other_value, self.unit) for other_value in self.others)))
+        if self.other_values:
+            lines.append(("also at", ", ".join(with_unit(other_value, self.unit) for other_value in self.other_values)))
         return lines + [("note", tr(note)) for note in self.notes]
 
     @property

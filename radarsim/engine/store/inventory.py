@@ -13,7 +13,7 @@ CHANCE_LIMIT = 0.2  # probability at which missing blocks that end where shares 
 
 @dataclass(frozen=True)
 class Inventory:
-    """The stored part of `asked` realisations.
+    """The stored part of `requested` realisations.
 
     missing: runs (first, last) of missing realisations. loose: whether there are blocks beyond a gap, or blocks that no
     run reported, as from shares or a killed run; shares then says which shares of how many are missing, as far as the

@@ -29,7 +29,7 @@ class Evidence(GeneralEvidence):
 def velocity_gain(evidence: Evidence, key: str, name: str, scan: int | Literal["last"]) -> Estimate:
     """Gain of a filter in σ of the velocity against range alone at a scan, %."""
     gains = evidence.gain(key, name, "Vr")
-    return gains.at(scan) if isinstance(scan, int) else gains.last()
+    return gains.at_scan(scan) if isinstance(scan, int) else gains.last()
 
 
 def above_at_the_end(evidence: Evidence, key: str, name: str) -> Estimate:

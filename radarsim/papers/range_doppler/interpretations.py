@@ -83,7 +83,7 @@ class Interpretations(PaperInterpretations):
 
 def _lower_end(evidence: measures.Evidence) -> Estimate:
     """The least of the final range gains of RLS 2 and 3, %."""
-    return measures.extreme_gain(evidence, 2, 3, extreme="least", component="r", pick="last")
+    return measures.extreme_gain(evidence, 2, 3, extreme="smallest", component="r", pick="last")
 
 
 @cache

@@ -106,7 +106,7 @@ class Evidence(GeneralEvidence):
         return variances
 
 
-Pick = Literal["largest", "least", "first", "last", "when_largest", "scan_of_largest"] | int  # or the scan itself
+Pick = Literal["largest", "smallest", "first", "last", "when_largest", "scan_of_largest"] | int  # or the scan itself
 
 
 def _as_long_as_the_papers(series: Curve) -> Curve:
@@ -116,7 +116,7 @@ def _as_long_as_the_papers(series: Curve) -> Curve:
 def _picked(series: Curve, pick: Pick) -> Estimate:
     if pick == "scan_of_largest":
         return series.when_largest("k")
-    estimate: Estimate = series.at(pick) if isinstance(pick, int) else getattr(series, pick)()
+    estimate: Estimate = series.at_scan(pick) if isinstance(pick, int) else getattr(series, pick)()
     return estimate
 
 
@@ -129,15 +129,15 @@ def gain(
 
 
 def extreme_gain(
-    evidence: Evidence, *radars: int, extreme: Literal["least", "largest"], component: str, pick: Pick
+    evidence: Evidence, *radars: int, extreme: Literal["smallest", "largest"], component: str, pick: Pick
 ) -> Estimate:
     """The least or the largest of these radars' gains, %."""
     gains = [gain(evidence, radar, component, pick) for radar in radars]
-    return min(gains) if extreme == "least" else max(gains)
+    return min(gains) if extreme == "smallest" else max(gains)
 
 
 def gain_above(
-    evidence: Evidence, *radars: int, component: str, high: int, extreme: Literal["least", "largest"], pick: Pick
+    evidence: Evidence, *radars: int, component: str, high: int, extreme: Literal["smallest", "largest"], pick: Pick
 ) -> Estimate:
     """Gain of the first `high` radars, the least or the largest of them, less the largest of the others, points."""
     upper = extreme_gain(evidence, *radars[:high], extreme=extreme, component=component, pick=pick)
@@ -148,12 +148,12 @@ def lead_at_scans(evidence: Evidence, radar: int, component: str, scans: Collect
     """The least gain of a radar at these scans less its largest at any other, points."""
     gains = evidence.k_gain(radar, component)
     is_given_scan = np.isin(gains.k, list(scans))
-    return difference(gains.where(is_given_scan).least(), gains.where(~is_given_scan).largest())
+    return difference(gains.where(is_given_scan).smallest(), gains.where(~is_given_scan).largest())
 
 
-def least_gain_rise(evidence: Evidence, slow: int, fast: int) -> Estimate:
+def smallest_gain_rise(evidence: Evidence, slow: int, fast: int) -> Estimate:
     """The least difference of range gains, fast − slow, at common times."""
-    return subtract(*common_times(evidence.k_gain(fast, "r"), evidence.k_gain(slow, "r"))).least()
+    return subtract(*common_times(evidence.k_gain(fast, "r"), evidence.k_gain(slow, "r"))).smallest()
 
 
 def time_between_extrema(evidence: Evidence, slow: int, fast: int) -> Estimate:
@@ -246,7 +246,7 @@ def velocity_gain_rise(evidence: Evidence, radar: int) -> Estimate:
     """The largest rise of the velocity gain over an earlier scan's."""
     gains = evidence.k_gain(radar, "Vr")
     gains.last()
-    return max(difference(gains.point(j), gains.where(slice(0, j)).least()) for j in range(1, len(gains.k)))
+    return max(difference(gains.point(j), gains.where(slice(0, j)).smallest()) for j in range(1, len(gains.k)))
 
 
 def velocity_gain_fall(evidence: Evidence, radar: int) -> Estimate:
@@ -272,7 +272,7 @@ def largest_rise(evidence: Evidence, radar: int, observes: tuple[str, ...], comp
     """The largest rise of σ over an earlier scan's from scan `since` on, in % of that; 0 where it never rises."""
     sigma = evidence.sigma(radar, observes, component).since(since)
     sigma.last()
-    worst = max(ratio(sigma.point(j), sigma.where(slice(0, j)).least(), 100) for j in range(1, len(sigma.k)))
+    worst = max(ratio(sigma.point(j), sigma.where(slice(0, j)).smallest(), 100) for j in range(1, len(sigma.k)))
     return Estimate(*(max(part - 100, 0.0) for part in worst))
 
 
@@ -292,7 +292,7 @@ def range_difference(evidence: Evidence, radar: int) -> Curve:
 def final_to_fourth(evidence: Evidence, radar: int, observes: tuple[str, ...]) -> Estimate:
     """σ of range at the end in % of that at the 4th scan."""
     sigma = evidence.sigma(radar, observes, "r")
-    return ratio(sigma.last(), sigma.at(4), scale=100)
+    return ratio(sigma.last(), sigma.at_scan(4), scale=100)
 
 
 def by_variance(

@@ -220,7 +220,7 @@ def over_joint_estimate(evidence: Evidence, key: Key, component: str, n: int) ->
     sigma = np.repeat([sensor.sigma_range_m, sensor.sigma_bearing_rad], n)
     lines = np.kron(np.eye(2), np.column_stack([np.ones(n), np.arange(1 - n, 1)])) / sigma[:, None]
     joint = np.sqrt(np.linalg.inv(lines.T @ lines)[2 * c, 2 * c])
-    sigma_alone = evidence.curve(key, evidence.filter(key, "growing_memory"), component).at(n)
+    sigma_alone = evidence.curve(key, evidence.filter(key, "growing_memory"), component).at_scan(n)
     return Estimate(*(float(end / joint) for end in sigma_alone))
 
 
@@ -295,7 +295,7 @@ def over_optimal(evidence: Evidence, key: Key, kind: str, component: str) -> Est
 def last_over_least(evidence: Evidence, key: Key) -> Estimate:
     """σ of the range of growing memory at the end over its least; taken as independent."""
     curve = evidence.curve(key, evidence.filter(key, "growing_memory"), "r")
-    return ratio(curve.last(), curve.least())
+    return ratio(curve.last(), curve.smallest())
 
 
 def window_gain(evidence: Evidence, key: Key) -> Estimate:

@@ -170,11 +170,11 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
     ]
 
 
-def _rows_of_outliers(likelihood: Likelihood, found: Mapping[str, float]) -> tuple[OutlierRow, ...]:
-    """The rows that are outliers, for the values of keys and explanations found."""
+def _rows_of_outliers(likelihood: Likelihood, fitted_values: Mapping[str, float]) -> tuple[OutlierRow, ...]:
+    """The rows that are outliers, for fitted values of keys and explanations."""
     stated = zip(likelihood.keys, likelihood.stated, strict=True)
-    values = np.array([found.get(key, value) for key, value in stated])
-    law = ErrorLaw(outliers=found[OUTLIERS], correlation=found.get(CORRELATION, 0.0))
+    values = np.array([fitted_values.get(key, value) for key, value in stated])
+    law = ErrorLaw(outliers=fitted_values[OUTLIERS], correlation=fitted_values.get(CORRELATION, 0.0))
     return find_outlier_rows(likelihood, values, law)
 
 
@@ -189,7 +189,7 @@ def _is_distinguished_from_zero(
     fixed = {key: value for key, value in (configured | values).items() if key != name}
     # An interval ends where it first leaves the maximum: in x and y a needle of σ = 0 across and kilometres along,
     # which turns with each measured bearing, explains errors across too.
-    smaller = (float(likelihood.likelihood.least[likelihood.keys.index(name)]), values[name] / 2)
+    smaller = (float(likelihood.likelihood.zero_limits[likelihood.keys.index(name)]), values[name] / 2)
     return any(
         climb(LikelihoodSlice(likelihood, list(fixed), {name: lowest}), fixed)[1] < maximum - HALF_CHI2_95
         for lowest in smaller

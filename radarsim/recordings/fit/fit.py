@@ -117,7 +117,7 @@ class CorrelatedLikelihood:
         self.rows = likelihood.rows
         self.usual_s = likelihood.usual_s
         self.keys, self.stated = (*likelihood.keys, CORRELATION_TIME_KEY), np.append(likelihood.stated, 0.0)
-        self.least = np.append(likelihood.least, ZERO_CORRELATION_TIME * likelihood.usual_s)
+        self.zero_limits = np.append(likelihood.zero_limits, ZERO_CORRELATION_TIME * likelihood.usual_s)
         self.explains = tuple(name for name in likelihood.explains if name not in (CORRELATION, MANOEUVRES))
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:

@@ -33,8 +33,8 @@ def no_progress(evaluations: int, expected: int | None = None) -> None:
 
 def starting_values(likelihood: Likelihood) -> np.ndarray:
     """Starting values of the keys: the configured ones; a key that is zero starts far above what counts as zero."""
-    is_zero = np.asarray(likelihood.stated) <= likelihood.least
-    return np.where(is_zero, FAR_FROM_ZERO * np.asarray(likelihood.least), likelihood.stated)
+    is_zero = np.asarray(likelihood.stated) <= likelihood.zero_limits
+    return np.where(is_zero, FAR_FROM_ZERO * np.asarray(likelihood.zero_limits), likelihood.stated)
 
 
 def single_explanations(likelihood: Likelihood) -> list[str]:
@@ -130,9 +130,9 @@ def rival_of_outliers(likelihood: CountedLikelihood, values: Mapping[str, float]
     if MANOEUVRES not in likelihood.likelihood.explains or CORRELATION in values:
         return None
     configured = dict(zip(likelihood.keys, starting_values(likelihood.likelihood).tolist(), strict=True))
-    least = dict(zip(likelihood.keys, np.asarray(likelihood.likelihood.least).tolist(), strict=True))
+    zero_limits = dict(zip(likelihood.keys, np.asarray(likelihood.likelihood.zero_limits).tolist(), strict=True))
     fixed = {name: value for name, value in values.items() if name not in (OUTLIERS, NEAR, NEAR_WIDTH)}
-    keys = [key for key in likelihood.keys if fixed.get(key, configured[key]) > least[key]]
+    keys = [key for key in likelihood.keys if fixed.get(key, configured[key]) > zero_limits[key]]
     maxima = {}
     for name, shares in ((OUTLIERS, [values[OUTLIERS]]), (MANOEUVRES, RIVAL_STARTS)):
         slice_ = LikelihoodSlice(likelihood, [*keys, name], fixed)

@@ -78,7 +78,7 @@ class LikelihoodSearch:
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, start_point: np.ndarray | None = None):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         self.end_count, self.ends_started_at = 0, 0
-        start, self.lowest = np.log(starting_values(likelihood)), np.log(likelihood.least)
+        start, self.lowest = np.log(starting_values(likelihood)), np.log(likelihood.zero_limits)
         self.highest = start + math.log(INTERVAL_REACH)
         if robust:
             start, self.lowest, self.highest = (
@@ -155,7 +155,7 @@ class LikelihoodSearch:
         """The keys, and the shares of near and far outliers and the width of near ones at the end if allowed for."""
         count = len(self.likelihood.stated)
         keys = np.exp(np.clip(point[:count], -200, 200))
-        keys = np.where(keys <= self.likelihood.least, 0.0, keys)
+        keys = np.where(keys <= self.likelihood.zero_limits, 0.0, keys)
         if not self.robust:
             return keys
         shares = 1 / (1 + np.exp(-point[count:-1]))
@@ -295,15 +295,15 @@ class LikelihoodSearch:
 
     def refine_zero(self) -> bool:
         """Lower the values that count as zero where the likelihood leaps there; return whether any was lowered."""
-        least_before = self.likelihood.least
+        limits_before = self.likelihood.zero_limits
         while leaping_keys := [i for i in range(len(self.likelihood.keys)) if self._has_leap_at_zero(i)]:
             is_zero = self.best <= self.lowest
-            self.likelihood.least = np.array(self.likelihood.least)
-            self.likelihood.least[leaping_keys] *= ZERO_REFINEMENT
+            self.likelihood.zero_limits = np.array(self.likelihood.zero_limits)
+            self.likelihood.zero_limits[leaping_keys] *= ZERO_REFINEMENT
             self.lowest[leaping_keys] += math.log(ZERO_REFINEMENT)
             self.best[is_zero] = self.lowest[is_zero] - FIRST_STEP
             self.top = self._log_likelihood(self.best)
-        return self.likelihood.least is not least_before
+        return self.likelihood.zero_limits is not limits_before
 
     def _has_leap_at_zero(self, i: int) -> bool:
         """Whether the likelihood leaps at zero of a key, and is near the top there."""

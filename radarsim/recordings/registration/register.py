@@ -84,9 +84,9 @@ def register_radar(radar: str, positions_file: str) -> Registration:
         aircraft=_aircraft_residuals(adjustment, path_numbers, matching.names),
         plots=len(t),
         matched=int(is_used.sum()),
-        by=dict(counts_by_kind),
-        apart=median_offsets(matching.offsets[is_used]),
-        left=tuple(_excluded_plots(matching, str(path))),
+        counts_by_kind=dict(counts_by_kind),
+        median_offsets=median_offsets(matching.offsets[is_used]),
+        left_out=tuple(_excluded_plots(matching, str(path))),
         bent_m=float(np.quantile(matching.deviations[is_used], 0.95)),
     )
 

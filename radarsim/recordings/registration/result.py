@@ -59,9 +59,9 @@ class Registration:
     aircraft: tuple[AircraftResiduals, ...]
     plots: int
     matched: int
-    by: dict[str, int]
-    apart: tuple[float, float]  # m and degrees
-    left: tuple[str, ...]
+    counts_by_kind: dict[str, int]
+    median_offsets: tuple[float, float]  # m and degrees
+    left_out: tuple[str, ...]
     bent_m: float
 
 
@@ -74,10 +74,10 @@ def registration_document(registration: Registration) -> dict[str, Any]:
         "sigma_bearing_rad": b,
         "plots": registration.plots,
         "matched": registration.matched,
-        "by": registration.by,
+        "by": registration.counts_by_kind,
         "outliers": registration.adjustment.outliers,
         "clusters": registration.adjustment.clusters,
         "interpolation_m": registration.bent_m,
-        "left_out": registration.left,
+        "left_out": registration.left_out,
         "aircraft": [asdict(aircraft) for aircraft in registration.aircraft],
     }

@@ -223,10 +223,10 @@ def likelihood_ratio_text(gain: float) -> str:
 def finding_text(finding: Finding, filter_name: str) -> str:
     """An error in the configured numbers, its weight, and the cost of a smaller manoeuvre variance."""
     if finding.from_zero:
-        what = rivals_text(finding.name, finding.value, finding.rival)
+        explanation = rivals_text(finding.name, finding.value, finding.rival)
         if finding.rows:
-            what = tr("{what}: {rows}", what=what, rows=outlier_rows_text(finding.rows))
-        fields = {"what": what, "times": likelihood_ratio_text(finding.gain)}
+            explanation = tr("{what}: {rows}", what=explanation, rows=outlier_rows_text(finding.rows))
+        fields = {"what": explanation, "times": likelihood_ratio_text(finding.gain)}
         text = tr("{what}; the plots are then {times} times as likely", **fields)
     else:
         text = tr("{key}: the plots cannot distinguish it from zero; that is no reason to lower it", key=finding.name)
@@ -257,8 +257,8 @@ def rivals_text(name: str, value: float, rival: Rival | None) -> str:
     text = explanation_text(name, value)
     if rival is None:
         return text
-    other = explanation_text(MANOEUVRES, rival.share)
-    return tr("{what}, or {other}: the plots cannot distinguish these", what=text, other=other)
+    rival_text = explanation_text(MANOEUVRES, rival.share)
+    return tr("{what}, or {other}: the plots cannot distinguish these", what=text, other=rival_text)
 
 
 def outlier_rows_text(rows: Sequence[OutlierRow]) -> str:
@@ -271,10 +271,10 @@ def outlier_rows_text(rows: Sequence[OutlierRow]) -> str:
     texts = []
     for column, times in places.items():
         more = len(times) - MAX_NAMED_ROWS
-        named = ", ".join(times[:MAX_NAMED_ROWS])
+        named_times = ", ".join(times[:MAX_NAMED_ROWS])
         if more > 0:
-            named = tr("{named} and {count} more", named=named, count=more)
-        texts.append(tr("{column} at {times}", column=column, times=named))
+            named_times = tr("{named} and {count} more", named=named_times, count=more)
+        texts.append(tr("{column} at {times}", column=column, times=named_times))
     return "; ".join(texts)
 
 

@@ -48,7 +48,7 @@ def comparison_table(pairs: Sequence[Pair]) -> "pd.DataFrame":
 
 def shared_quantities(sides: Iterable[Side]) -> list[Quantity]:
     """The quantities measured by two sides or more; the complement of a share differs by the same amount."""
-    measured = [quantity for side in sides for quantity in side.measured if not quantity.rest]
+    measured = [quantity for side in sides for quantity in side.measured if not quantity.is_complement]
     return [quantity for quantity in dict.fromkeys(measured) if measured.count(quantity) > 1]
 
 

@@ -37,7 +37,7 @@ class PlotLikelihood:
         configured[f"filters.{filter_index}.manoeuvre_variance"] = options.variances[0]
         self.keys, self.stated = tuple(configured), np.array(list(configured.values()), dtype=float)
         one_sigma_variance = (radar.sigma_velocity_mps / radar.scan_period_s ** options.orders[0]) ** 2  # in a scan
-        self.least = np.array([MIN_SIGMA_RATIO] * self.observes + [MIN_VARIANCE_RATIO]) * np.append(
+        self.zero_limits = np.array([MIN_SIGMA_RATIO] * self.observes + [MIN_VARIANCE_RATIO]) * np.append(
             self.stated[: self.observes], self.stated[-1] or one_sigma_variance
         )
         if self.observes == 1:

@@ -121,7 +121,7 @@ class Prior(Model):
             yield check_error("spread_over_potential", "give either spread_over_potential or sigma")
 
     @property
-    def given(self) -> tuple[float, ...]:
+    def standard_deviations(self) -> tuple[float, ...]:
         """The standard deviations as configured, absolute or over the potential ones."""
         return self.sigma or self.spread_over_potential or ()
 
@@ -220,7 +220,7 @@ class Keys(study_keys.StudyKeys):
     @cross_check
     def _prior_fits(self) -> Iterator[CheckError]:
         size = self.truth.parameters
-        if len(self.prior.given) != size:
+        if len(self.prior.standard_deviations) != size:
             name = "spread_over_potential" if self.prior.sigma is None else "sigma"
             yield check_error(
                 f"prior.{name}", f"must have {size} values: phase, Doppler frequency and {size - 2} derivatives"

@@ -48,7 +48,7 @@ def true_phase(spec: Keys, burst: model.Burst) -> Phase:
 
 def forecast(spec: Keys, burst: model.Burst) -> np.ndarray:
     """Standard deviations (size,) of the forecast as the estimators believe them."""
-    sigma = np.array(spec.prior.given) * spec.prior.scale
+    sigma = np.array(spec.prior.standard_deviations) * spec.prior.scale
     if spec.prior.sigma is None:
         sigma = sigma * fisher.spreads(fisher.fisher(burst, len(sigma), burst.duration_s))
     return sigma

@@ -107,7 +107,7 @@ def make_plan(case: Case) -> Plan:
     edges = block_sums.block_edges(all_windows, per_window, 8 if mode == DEMODULATED else 1)
     world = estimators.world(burst, mode, edges, image, phase.turns, phase.reference)
     tables = block_sums.WindowTables(edges, world.mean, per_window)
-    blocks = tables.window if mode == BLOCK_SUMS else tables.drawn
+    blocks = tables.window if mode == BLOCK_SUMS else tables.window_of_drawn_blocks
     designs = [estimator_design(e, w) for e, w in zip(spec.estimators, windows, strict=True)]
     mean_information = dict(zip(all_windows, fisher.fisher_sums(burst, size, all_windows), strict=True))
     records, options = estimators.estimators(designs, blocks, burst, sigma, mean_information, designer)

@@ -85,7 +85,7 @@ class MultiModel(Study):
 
         return figures.figures(results, tables, experiment)
 
-    def shown(self) -> Sequence[Component]:
+    def user_filter_components(self) -> Sequence[Component]:
         from radarsim.studies.multimodel import figures
 
         return figures.COMPONENTS

@@ -41,7 +41,7 @@ class PlotLikelihood:
         names = sigmas(self.spec)["plot"]
         self.keys = (*names, f"filters.{filter_index}.models.{self.hardest}.sigma_acceleration_mps2")
         self.stated = np.array([*self.spec.sensor.sigma, spreads[self.hardest]])
-        self.least = np.append(MIN_VALUE_RATIO * self.stated[:3], MIN_VALUE_RATIO * (self.stated[3] or 1.0))
+        self.zero_limits = np.append(MIN_VALUE_RATIO * self.stated[:3], MIN_VALUE_RATIO * (self.stated[3] or 1.0))
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
         self.span = float(data_span(tracks, self.columns[:1] if "range_m" in self.columns else self.columns).max())
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, layout.START) for columns in tracks]

@@ -27,12 +27,12 @@ COMPONENTS = {"sigma_r": 0, "sigma_Vr": 1, "sigma_ar": 2}
 class FilterInputs(NamedTuple):
     """What filters see: plots of a truth x (K, 3) at scans dt (s) apart.
 
-    drawn: the random truth as `error_recursion.defects` takes it."""
+    random_truth: the random truth as `error_recursion.defects` takes it."""
 
     plots: Plots
     x: np.ndarray
     dt: float
-    drawn: np.ndarray | None = None
+    random_truth: np.ndarray | None = None
 
 
 def manoeuvre_variances(filters: tuple[Filter, ...], filter_inputs: FilterInputs) -> tuple[float, ...]:
@@ -115,7 +115,7 @@ def errors(filter_: Filter, variances: np.ndarray, filter_inputs: FilterInputs) 
                 filter_inputs.x,
                 filter_inputs.dt,
                 ROUGH_PATTERNS,
-                random_truth=filter_inputs.drawn,
+                random_truth=filter_inputs.random_truth,
             )
             for design in designs
         )
@@ -126,7 +126,7 @@ def errors(filter_: Filter, variances: np.ndarray, filter_inputs: FilterInputs) 
 def errors_of_variants(observes: int, start: int, Q: np.ndarray, filter_inputs: FilterInputs) -> np.ndarray:
     """σ (B, K, 3) of filters that differ in Q (3, 3, B), every scan with its plot."""
     plots, sigma = filter_inputs.plots, np.full((Q.shape[2], len(filter_inputs.x), 3), np.nan)
-    defect = defects(filter_inputs.x, filter_inputs.dt, plots, filter_inputs.drawn)
+    defect = defects(filter_inputs.x, filter_inputs.dt, plots, filter_inputs.random_truth)
     sigma[:, : start - 1, :observes] = np.sqrt(plots.sigma**2 + plots.bias**2 + plots.sigma_bias**2)[:observes]
     weights, believed = least_squares_start(observes, start, plots.sigma, filter_inputs.dt)
     first = start_errors(weights, believed, plots, defect, filter_inputs.dt)

@@ -16,13 +16,13 @@ from radarsim.studies.range_doppler.error_recursion import Plots
 class DesignedCase:
     """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
 
-    drawn (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, from `scenario.random_defects`.
+    random_truth (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, from `scenario.random_defects`.
     asked_from_k, roughly: as of the case."""
 
     spec: Keys
     t: np.ndarray
     x: np.ndarray
-    drawn: np.ndarray
+    random_truth: np.ndarray
     plots: Plots
     variances: tuple[float, ...]
     filters: tuple[filter_design.LinearFilter, ...]

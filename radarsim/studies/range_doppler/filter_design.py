@@ -24,7 +24,7 @@ class LinearFilter:
     believed: np.ndarray  #: (K, 3, 3) covariance that the filter claims
     available: np.ndarray  #: (K, 3) which components it estimates
     noise: tuple[float, ...]  #: its Q, packed
-    given: bool = False  #: whether its gains are those of a package, not the Kalman filter's of this Q
+    has_given_gains: bool = False  #: whether its gains are those of a package, not the Kalman filter's of this Q
 
 
 def observation(observes: int) -> np.ndarray:

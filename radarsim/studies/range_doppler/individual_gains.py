@@ -29,7 +29,7 @@ def problem(case: Case, design: DesignedCase, baseline: int) -> missed_block.Pro
         start=np.array([d.start for d in design.filters]),
         Q=np.array([d.noise for d in design.filters]),
         baseline=baseline,
-        given=np.array([d.given for d in design.filters]),
+        has_given_gains=np.array([d.has_given_gains for d in design.filters]),
         gains=np.stack([d.gains for d in design.filters]),
         believed=np.stack(pack(np.stack([d.believed for d in design.filters])), axis=-1),
     )

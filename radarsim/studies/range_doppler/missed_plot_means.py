@@ -44,7 +44,7 @@ MAX_RECENT_MEANS = 128
 def means(design: Design, companions: Sequence[Design], designed_case: DesignedCase) -> Means:
     """The means of one filter over the patterns; the last ones computed are kept."""
     plot_arrays = [part[: design.observes] for part in designed_case.plots[:3]]
-    arrays = (*plot_arrays, designed_case.x, designed_case.drawn)
+    arrays = (*plot_arrays, designed_case.x, designed_case.random_truth)
     companion_designs = tuple((companion.observes, companion.start) for companion in companions)
     settings = designed_case.dt, designed_case.asked_from_k, designed_case.roughly, designed_case.plots.detection
     key = (design, companion_designs, *settings, *(array.tobytes() for array in arrays))
@@ -66,7 +66,7 @@ def compute_means(design: Design, companions: Sequence[Design], designed_case: D
             designed_case.dt,
             max_patterns,
             companions,
-            designed_case.drawn,
+            designed_case.random_truth,
             designed_case.asked_from_k,
             follow_all,
         )

@@ -152,7 +152,7 @@ def design_filter(gains_filter: GivenGains, sigma: np.ndarray, t: np.ndarray) ->
     available[: start - 1, observes:] = False
     believed[: start - 1, range(observes), range(observes)] = sigma[:observes] ** 2
     return LinearFilter(
-        observes, start, weights, gains, believed, available, tuple(map(float, pack(noise(dt)))), given=True
+        observes, start, weights, gains, believed, available, tuple(map(float, pack(noise(dt)))), has_given_gains=True
     )
 
 
@@ -178,7 +178,7 @@ def error_recursion(
 def settled_gain(filter_: LinearFilter) -> np.ndarray:
     """The gain (3, 2) of a filter of a package at its end, not-a-number where it still changes there, or of another."""
     previous_gain, final_gain = filter_.gains[-2:]
-    steady = filter_.given and np.allclose(previous_gain, final_gain, rtol=STEADY_TOLERANCE, atol=0)
+    steady = filter_.has_given_gains and np.allclose(previous_gain, final_gain, rtol=STEADY_TOLERANCE, atol=0)
     return np.where(steady, final_gain, np.nan)
 
 

@@ -46,7 +46,7 @@ class PlotLikelihood:
         sigmas = {"radar.sigma_range_m": radar.sigma_range_m, "radar.sigma_velocity_mps": radar.sigma_velocity_mps}
         configured = dict(list(sigmas.items())[: self.observes]) | {"manoeuvre_variance": variance}
         self.keys, self.stated = tuple(configured), np.array(list(configured.values()), dtype=float)
-        self.least = self.stated * np.array([1e-4] * self.observes + [MIN_MANOEUVRE])
+        self.zero_limits = self.stated * np.array([1e-4] * self.observes + [MIN_MANOEUVRE])
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
         self.columns = tuple(name for name, _ in MEASURED[: self.observes])
         self.span = data_span(tracks, self.columns)

@@ -180,9 +180,11 @@ class ExactErrors:
 
 def exact_values(designed_case: DesignedCase, baseline: int) -> ExactErrors:
     """Of filters that get every plot."""
-    inputs = designed_case.plots, designed_case.x, designed_case.dt, designed_case.drawn
+    inputs = designed_case.plots, designed_case.x, designed_case.dt, designed_case.random_truth
     errors = [
-        package_filters.error_recursion(d, *inputs) if d.given else error_recursion.error_recursion(d, *inputs)
+        package_filters.error_recursion(d, *inputs)
+        if d.has_given_gains
+        else error_recursion.error_recursion(d, *inputs)
         for d in designed_case.filters
     ]
     lasting, covariance = np.stack([E for E, _ in errors]), np.stack([S for _, S in errors])

@@ -293,7 +293,7 @@ class Sonar(Study):
         figures |= SMOOTHING.figures(results, tables, experiment)
         return {name: figure for name, figure in figures.items() if figure}
 
-    def shown(self) -> "Sequence[Component]":
+    def user_filter_components(self) -> "Sequence[Component]":
         from radarsim.studies.sonar import components
 
         return components.COMPONENTS

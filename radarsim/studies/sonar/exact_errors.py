@@ -87,7 +87,7 @@ def consistency(believed: np.ndarray, bias: np.ndarray, covariance: np.ndarray) 
 
 def true_errors(scene: Scene, design: FilterDesign, c: int) -> tuple[np.ndarray, np.ndarray]:
     """Bias (M, K, 3) and covariance (M, K, 3, 3) of the errors of a filter in coordinate c."""
-    t, scans, estimated_sizes = design.plots.t, len(design.plots.t), design.known
+    t, scans, estimated_sizes = design.plots.t, len(design.plots.t), design.estimated_sizes
     truth, sigma = scene.truth[:scans, c], scene.sigma[:scans, c]
     sigma = np.where(np.isfinite(sigma), sigma, 0.0)
     recursion = design.recursion
@@ -118,7 +118,7 @@ def exact_values(
             continue
         design = designs[f][c]
         bias, S = true_errors(scene, design, c)
-        estimated_sizes, n = design.known, design.spec.size
+        estimated_sizes, n = design.estimated_sizes, design.spec.size
         reach = estimated_sizes.shape[1]
         for j in range(n):
             share = probability[:, None] * (estimated_sizes > j)

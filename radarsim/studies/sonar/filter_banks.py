@@ -47,7 +47,7 @@ def shared_bank(specs: Sequence[FilterSpec], designs: Sequence[Sequence[FilterDe
     weights, inverse = np.zeros((F, K, C, 3, longest)), np.zeros((F, K, C, 6))
     detected = np.stack([p.weight[0] > 0 for p in plots], axis=1)
     order = np.cumsum(detected, axis=0) - 1
-    estimated_sizes = np.stack([np.stack([design.known[0] for design in row], axis=1) for row in designs])
+    estimated_sizes = np.stack([np.stack([design.estimated_sizes[0] for design in row], axis=1) for row in designs])
     for f, spec in enumerate(specs):
         for c, design in enumerate(designs[f]):
             if design.recursion is None:
@@ -62,7 +62,7 @@ def shared_bank(specs: Sequence[FilterSpec], designs: Sequence[Sequence[FilterDe
         length=length,
         weights=weights,
         slot=np.where(detected, order % max(longest, 1), -1),
-        known=estimated_sizes,
+        estimated_sizes=estimated_sizes,
         size=np.array([f.size for f in specs]),
         inverse=inverse,
     )

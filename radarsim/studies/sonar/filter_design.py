@@ -165,7 +165,7 @@ class FilterDesign:
     window_rows: tuple[tuple[int, np.ndarray], ...] = ()
 
     @property
-    def known(self) -> np.ndarray:
+    def estimated_sizes(self) -> np.ndarray:
         """The number (M, K) of estimated components: plots at a single time determine a value but no rate."""
         return (np.diagonal(self.covariance, axis1=2, axis2=3) > 0).sum(axis=2)
 

@@ -49,7 +49,7 @@ class PlotLikelihood:
             names.append(f"filters.{number}.manoeuvre_variance")
             configured.append(member.manoeuvre_variance or 0.0)
             smallest.append(MIN_MANOEUVRE_SHARE * (sensor.sigma_range_m / sensor.scan_period_s**self.size) ** 2)
-        self.keys, self.stated, self.least = tuple(names), np.array(configured), np.array(smallest)
+        self.keys, self.stated, self.zero_limits = tuple(names), np.array(configured), np.array(smallest)
         if member.kind == "kalman":
             self.explains = (*self.explains, MANOEUVRES)
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")

@@ -34,7 +34,7 @@ class SharedPlan:
         """The sums of one block, in the order of the layout."""
         sums, _ = self._simulated(first, count, 0)
         sums.believed[:] = count * self.believed
-        sums.estimates[:] = count * (self.bank.known[..., None] > np.arange(3))
+        sums.estimates[:] = count * (self.bank.estimated_sizes[..., None] > np.arange(3))
         return pack_sums(self.layout, sums)
 
     def errors(self, first: int, count: int) -> np.ndarray:
@@ -43,8 +43,8 @@ class SharedPlan:
 
     def _simulated(self, first: int, count: int, error_count: int) -> tuple[shared_gains.Sums, np.ndarray]:
         """The sums of one block, and the errors (F, K, C, S, error_count) of all its realisations or of none."""
-        sums = empty_sums(*self.bank.known.shape)
-        errors = np.empty((*self.bank.known.shape, self.bank.size.max(), error_count))
+        sums = empty_sums(*self.bank.estimated_sizes.shape)
+        errors = np.empty((*self.bank.estimated_sizes.shape, self.bank.size.max(), error_count))
         shared_gains.simulate_block(self.world, self.bank, first, count, self.axes.baseline, sums, errors)
         return sums, errors
 
@@ -62,12 +62,12 @@ def _shared_plan(case: Case, scene: Scene, specs: list[filter_design.FilterSpec]
     size = max(filter_spec.size for filter_spec in specs)
     designs_by_filter = designs(specs, scene, np.maximum(scene.certain, 0)[None])
     bank = filter_banks.shared_bank(specs, designs_by_filter)
-    F, K, C = bank.known.shape
+    F, K, C = bank.estimated_sizes.shape
     covariance = np.array([[design.covariance[0] for design in row] for row in designs_by_filter])
     values = exact_values(scene, designs_by_filter, np.ones(1), size)
     return SharedPlan(
         layout=Layout(**shapes(F, K, C, size)),
-        axes=given_plots_axes(case.spec, scene, specs, values, bank.known),
+        axes=given_plots_axes(case.spec, scene, specs, values, bank.estimated_sizes),
         world=kernel_world(case, scene),
         bank=bank,
         believed=np.diagonal(covariance, axis1=3, axis2=4).transpose(0, 2, 1, 3),

@@ -78,8 +78,10 @@ def filter_from_code(
     arguments, files_of_keys = with_paths(folder, dict(keys.model_extra or {}))
     module_sources = sources(home, module)
     if keys.source is not None and not module_sources.digest.startswith(keys.source):
-        found = module_sources.digest[: len(keys.source)]
-        raise ConfigError(f"{file_of(home, module)} is other code than that of the result: {found}, not {keys.source}")
+        current_digest = module_sources.digest[: len(keys.source)]
+        raise ConfigError(
+            f"{file_of(home, module)} is other code than that of the result: {current_digest}, not {keys.source}"
+        )
     return CodeFilter(
         name=keys.name,
         keys=keys,

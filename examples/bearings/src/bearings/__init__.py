@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from radarsim.studies.authoring import (
     Component,
-    Measured,
+    MeasuredColumn,
     Member,
     Model,
     Number,
@@ -168,7 +168,7 @@ class Bearings(StepStudy):
     components = Component("r", "m", "$r$", "range"), Component("vx", "m/s"), Component("vy", "m/s")
     parts, Filter = {"observer": Observer, "target": Target}, Filter
     scan_period = "observer.scan_period_s"
-    measured = (Measured("bearing_rad", "rad", ("observer.sigma_bearing_rad",)),)
+    measured = (MeasuredColumn("bearing_rad", "rad", ("observer.sigma_bearing_rad",)),)
     known_columns = "own_x_m", "own_y_m", "own_vx_mps", "own_vy_mps"
     kinds = {"cartesian": Cartesian, "pseudolinear": Pseudolinear, "modified_polar": ModifiedPolar}
     normals, world = (3, 0, 1), staticmethod(numbers)
@@ -190,7 +190,7 @@ claims:
     def detection(self, spec):
         return spec.observer.detection_probability
 
-    def known(self, spec, t_s):
+    def known_quantities(self, spec, t_s):
         o = spec.observer
         before, after = np.minimum(t_s, o.turn_s), np.maximum(t_s - o.turn_s, 0)
         course = np.where(t_s < o.turn_s, o.course_rad, o.new_course_rad)

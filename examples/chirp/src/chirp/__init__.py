@@ -10,7 +10,7 @@ from radarsim.studies.authoring import (
     Component,
     DisplayMark,
     LinearStudy,
-    Measured,
+    MeasuredColumn,
     Member,
     Model,
     Motion,
@@ -72,7 +72,7 @@ class Chirp(LinearStudy):
     components = (Component("r", "m", "$r$", "range"), Component("v", "m/s", "$v$", "velocity"))
     parts, Filter = {"radar": Radar, "target": Target}, Filter
     scan_period, detection = "radar.scan_period_s", "radar.detection_probability"
-    measured = (Measured("z_m", "m", ("radar.sigma_range_m",)),)
+    measured = (MeasuredColumn("z_m", "m", ("radar.sigma_range_m",)),)
     fitted = ("radar.sigma_range_m", "target.density_m2ps3")
     paper = Paper("Fitzgerald 1974", may_grow=("filters",))
 

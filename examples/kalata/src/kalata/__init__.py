@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.studies.authoring import (
     Component,
     LinearStudy,
-    Measured,
+    MeasuredColumn,
     Member,
     Model,
     Motion,
@@ -56,7 +56,7 @@ class Kalata(LinearStudy):
     components = (Component("x", "m", "$x$", "position"), Component("v", "m/s", "$v$", "velocity"))
     parts, Filter = {"sensor": Sensor, "target": Target}, Filter
     scan_period = "sensor.scan_period_s"
-    measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)
+    measured = (MeasuredColumn("x_m", "m", ("sensor.sigma_x_m",)),)
     paper = Paper("Kalata 1984", may_grow=("filters",))
 
     def motion(self, spec):

@@ -10,7 +10,7 @@ from typing import Literal
 
 from radarsim.studies.authoring import (
     Component,
-    Measured,
+    MeasuredColumn,
     Member,
     Model,
     Paper,
@@ -205,9 +205,9 @@ class Learned(StepStudy):
     parts, Filter = {"radar": Radar, "target": Target}, Filter
     scan_period = "radar.scan_period_s"
     measured = (
-        Measured("range_m", "m", ("radar.sigma_range_m",)),
-        Measured("azimuth_rad", "rad", ("radar.sigma_azimuth_rad",)),
-        Measured("velocity_mps", "m/s", ("radar.sigma_velocity_mps",)),
+        MeasuredColumn("range_m", "m", ("radar.sigma_range_m",)),
+        MeasuredColumn("azimuth_rad", "rad", ("radar.sigma_azimuth_rad",)),
+        MeasuredColumn("velocity_mps", "m/s", ("radar.sigma_velocity_mps",)),
     )
     kinds = {"converted": Linear, "constant": Constant, "imm": Models}
     normals = 5, 3, 3

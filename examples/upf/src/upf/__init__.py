@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from radarsim.studies.authoring import (
     Component,
-    Measured,
+    MeasuredColumn,
     Member,
     Model,
     Number,
@@ -195,12 +195,12 @@ class Upf(StepStudy):
     components = (Component("x", "1", "$x$", "state"),)
     parts, Filter = {"sensor": Sensor, "target": Target}, Filter
     scan_period = "sensor.scan_period_s"
-    measured = (Measured("y", "1", ("sensor.sigma_y",)),)
+    measured = (MeasuredColumn("y", "1", ("sensor.sigma_y",)),)
     known_columns = ("step",)
     kinds, normals = {"extended": Extended, "unscented": Unscented}, (0, 6, 1)
     paper, world = Paper("van der Merwe 2000", may_grow=("filters",)), staticmethod(numbers)
 
-    def known(self, spec, t_s):
+    def known_quantities(self, spec, t_s):
         return (t_s / spec.sensor.scan_period_s + 1,)
 
     def begin(self, c, w):

@@ -42,7 +42,7 @@ class Problem(NamedTuple):
     start: np.ndarray  #: (F,) plots in its least-squares start
     Q: np.ndarray  #: (F, 6) covariance that a scan adds, packed
     baseline: int  #: the filter that others are compared with
-    given: np.ndarray  #: (F,) 1: its gains are given, and every scan has its plot; else 0
+    has_given_gains: np.ndarray  #: (F,) 1: its gains are given, and every scan has its plot; else 0
     gains: np.ndarray  #: (F, K, 3, 2) of such a filter, not read of others
     believed: np.ndarray  #: (F, K, 6) the covariance that it believes with them, packed
 

@@ -27,7 +27,7 @@ class SharedBank(NamedTuple):
     #: (F, K, C, 3, L) of a window for the slots of a ring, which plot number n enters at slot n modulo L
     weights: np.ndarray
     slot: np.ndarray  #: (K, C) of a scan's plot, -1 where there is none
-    known: np.ndarray  #: (F, K, C) estimated components
+    estimated_sizes: np.ndarray  #: (F, K, C) estimated components
     size: np.ndarray  #: (F,) of the state
     inverse: np.ndarray  #: (F, K, C, 6) of the believed covariance
 
@@ -151,11 +151,11 @@ def add_sums(bank, x, plots, truth, k, n, baseline, sums):
             powers_of_error, paired, joint = error_sums(
                 x[f, c], x[baseline, c], plots[c, 2:], truth[c], bank.inverse[f, k, c], n
             )
-            size = bank.known[f, k, c]
+            size = bank.estimated_sizes[f, k, c]
             for j in range(size):
                 for q in range(4):
                     sums.error[f, k, c, j, q] += powers_of_error[4 * j + q]
-                if j < bank.known[baseline, k, c]:
+                if j < bank.estimated_sizes[baseline, k, c]:
                     sums.paired[f, k, c, j] += paired[j]
             if size == bank.size[f]:
                 for q in range(4):
@@ -167,7 +167,7 @@ def add_ahead(bank, x, plots, truth, k, dt, n, sums):
     """Add the errors at scan k of values extrapolated from scan k - 1, where the state was complete."""
     for f in range(x.shape[0]):
         for c in range(x.shape[1]):
-            if bank.known[f, k - 1, c] == bank.size[f]:
+            if bank.estimated_sizes[f, k - 1, c] == bank.size[f]:
                 powers_of_error = ahead_sums(x[f, c], plots[c, 2:], truth[c, 0], dt, n)
                 for q in range(4):
                     sums.ahead[f, k - 1, c, q] += powers_of_error[q]

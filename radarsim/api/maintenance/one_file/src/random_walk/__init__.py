@@ -12,7 +12,7 @@ from radarsim.studies.authoring import (
     Component,
     DisplayMark,
     LinearStudy,
-    Measured,
+    MeasuredColumn,
     Member,
     Model,
     Motion,
@@ -56,7 +56,7 @@ class Walk(LinearStudy):
     components = (Component("x", "m", "$x$", "position"),)  # the errors shown: name, unit, letter, words
     parts, Filter = {"sensor": Sensor, "target": Target}, Filter
     scan_period = "sensor.scan_period_s"
-    measured = (Measured("x_m", "m", ("sensor.sigma_x_m",)),)  # of a recorded plot: column, unit, keys of its σ
+    measured = (MeasuredColumn("x_m", "m", ("sensor.sigma_x_m",)),)  # of a recorded plot: column, unit, keys of its σ
     fitted = ("sensor.sigma_x_m", "target.sigma_step_m")  # what `radarsim fit` estimates
     paper = Paper("Kalman 1960", may_grow=("filters",))
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from radarsim.studies.authoring import (
     Component,
-    Measured,
+    MeasuredColumn,
     Member,
     Model,
     NonNegative,
@@ -102,7 +102,8 @@ class Walk(StepStudy):
     components = (Component("x", "m", "$x$", "distance"),)  # the errors shown: name, unit, letter, words
     parts, Filter = {"sensor": Sensor, "target": Target}, Filter
     scan_period = "sensor.scan_period_s"
-    measured = (Measured("range_m", "m", ("sensor.sigma_range_m",)),)  # of a recorded plot: column, unit, keys of its σ
+    # of a recorded plot: column, unit, keys of its σ
+    measured = (MeasuredColumn("range_m", "m", ("sensor.sigma_range_m",)),)
     kinds = {"kalman": Kalman, "fixed": FixedGain}
     normals = 1, 1, 1  # unit normals of the start, of a move, of a plot
     paper, world = Paper("Jazwinski 1970", may_grow=("filters",)), staticmethod(numbers)
