@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from radarsim.api.compare import compare
-    from radarsim.api.cost import check
+    from radarsim.api.cost_estimate import check
     from radarsim.api.design.sensitivity import sensitivity
     from radarsim.api.design.solve import solve
     from radarsim.api.design.tune import tune
@@ -62,7 +62,7 @@ _HOMES = {
     "RadarsimError": "errors:RadarsimError",
     "Result": "api.result:Result",
     "chart": "api.doppler_chart:chart",
-    "check": "api.cost:check",
+    "check": "api.cost_estimate:check",
     "claims": "papers.list_claims:claims",
     "compare": "api.compare:compare",
     "interpretations": "papers.judge_interpretations:interpretations",

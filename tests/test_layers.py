@@ -231,7 +231,7 @@ class Place(NamedTuple):
 
 
 def place(module: str) -> Place:
-    """The place of a module by its name without `radarsim.`: `studies.sonar.clutter.kernels.tracker`."""
+    """The place of a module by its name without `radarsim.`: `studies.sonar.clutter.kernels.single_tracks`."""
     names = module.split(".")
     if names[0] != "studies" or len(names) == 1 or names[1] not in STUDIES:
         return Place(room(module))

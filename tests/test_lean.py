@@ -60,7 +60,7 @@ def loaded_with(module):
     return found
 
 
-WITHOUT = "cli", "api.cost", "api.design.solve", "studies.range_doppler.study", "studies.authoring"
+WITHOUT = "cli", "api.cost_estimate", "api.design.solve", "studies.range_doppler.study", "studies.authoring"
 
 
 @pytest.mark.parametrize("module", WITHOUT)

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from radarsim.report import consistency_tables, exact_check, interval_notes, rare_events
 from radarsim.report import tables as common
-from radarsim.report.user_filters import tables
+from radarsim.report.user_filters import tables as user_filters_tables
 from radarsim.studies import registry
-from radarsim.studies.floors import table
+from radarsim.studies.floors import floor_columns
 
 SHARED = (
     common.label_columns,
@@ -23,12 +23,12 @@ SHARED = (
     interval_notes.add_notes,
 )
 SEVERAL = {  # tables that studies have in common
-    "curves": (common.curves, table.with_floors),
+    "curves": (common.curves, floor_columns.with_floors),
     "gains": (common.gains,),
     "consistency": (consistency_tables.normalised_square_columns,),
     "rare": (rare_events.rate_columns,),
-    "failures": (tables.failure_columns,),
-    "nees": (tables.nees_columns, consistency_tables.normalised_square_columns),
+    "failures": (user_filters_tables.failure_columns,),
+    "nees": (user_filters_tables.nees_columns, consistency_tables.normalised_square_columns),
 }
 UNITS = {  # by how a name ends
     **{"_s": "s", "_m": "m", "_mps": "m/s", "_mps2": "m/s²", "_rad": "rad", "_hz": "Hz", "_db": "dB"},

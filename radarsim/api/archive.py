@@ -55,7 +55,7 @@ def write_archive(path: str | os.PathLike[str], contents: Mapping[str, bytes], f
         raise ConfigError(f"{path}: is no archive, and is not replaced")
     manifest = {"format": FORMAT, **facts, "files": {name: _entry(contents[name]) for name in sorted(contents)}}
     with (
-        atomic_files.Writer(path, durable=True) as writer,
+        atomic_files.OutputFile(path, durable=True) as writer,
         zipfile.ZipFile(writer.binary, "w", zipfile.ZIP_STORED, allowZip64=False) as archive,
     ):
         for name, content in ((MANIFEST, provenance.to_json(manifest)), *sorted(contents.items())):

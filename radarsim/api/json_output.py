@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
     from radarsim.api.compare import Comparison
-    from radarsim.api.cost import CostEstimate
+    from radarsim.api.cost_estimate import CostEstimate
     from radarsim.api.design.sensitivity import Sensitivity
     from radarsim.api.design.solve_answer import Answer
     from radarsim.api.design.tuning_result import TuningResult

@@ -35,9 +35,9 @@ def _with_user_filters(case: Case, name: str, table: "Table") -> "Table":
     """A table of a study, with the rows of user filters where a case has any."""
     if not case.user_filters:
         return table
-    from radarsim.report.user_filters import tables
+    from radarsim.report.user_filters import tables as user_filters_tables
 
-    return tables.table_with_user_filters(name, table)
+    return user_filters_tables.table_with_user_filters(name, table)
 
 
 def quantity_table(case: Case, quantity: Quantity) -> "Table":

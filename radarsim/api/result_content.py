@@ -19,7 +19,7 @@ from radarsim.report.row_notes import has_note
 from radarsim.report.sentences import Sentence
 from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.report.wording import estimate
-from radarsim.studies.floors import table
+from radarsim.studies.floors import floor_columns
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import quantities, study
 
@@ -43,7 +43,7 @@ def case_tables(results: Sequence[CaseResult], stem: str = "") -> dict:
         from radarsim.report.user_filters import tables as user_filters_tables
 
         tables_by_name = user_filters_tables.with_user_filters(tables_by_name, results, user_rows)
-    tables_by_name["curves"] = table.with_floors(tables_by_name["curves"], case_study.floors(results))
+    tables_by_name["curves"] = floor_columns.with_floors(tables_by_name["curves"], case_study.floors(results))
     return tables_by_name
 
 

@@ -8,7 +8,7 @@ from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
 
 if TYPE_CHECKING:
-    from radarsim.api.cost import CaseCost, CostEstimate, RequiredRealisations
+    from radarsim.api.cost_estimate import CaseCost, CostEstimate, RequiredRealisations
     from radarsim.config.experiment import Experiment
 
 

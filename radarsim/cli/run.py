@@ -301,7 +301,7 @@ def check(
         raise click.UsageError("--recompute and --trust-code apply to a study.zip")
     _refuse_incompatible(arguments["share"], arguments["precision"], None, None)
     refuse_quantity_without_precision(arguments["of"], arguments["precision"])
-    from radarsim.api import cost, json_output, load_experiments
+    from radarsim.api import cost_estimate, json_output, load_experiments
     from radarsim.cli import print_cost, progress
 
     documents = []
@@ -309,7 +309,7 @@ def check(
     _print_user_code(loaded, as_json)
     for experiment in loaded:
         with progress.Progress(experiment.stem, quiet=as_json) as bar:
-            outlook = cost.check(experiment, progress=bar.update, **arguments)
+            outlook = cost_estimate.check(experiment, progress=bar.update, **arguments)
         documents.append(json_output.cost(experiment, outlook))
         if not as_json:
             print_cost.print_cost(experiment, outlook)

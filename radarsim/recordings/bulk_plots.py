@@ -11,9 +11,9 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError
-from radarsim.recordings.csv_rows import column_texts
+from radarsim.recordings.csv_output import column_texts
 from radarsim.recordings.simulate_plots import plot_batches
-from radarsim.report.atomic_files import Writer
+from radarsim.report.atomic_files import OutputFile
 from radarsim.studies.plot_arrays import SimulatedPlots
 
 NUMBERS_PER_DRAW = 200_000  # drawn at a time: what fits into the caches of a processor
@@ -26,7 +26,7 @@ def write_realisations(
     """Write the plots of n realisations of an experiment's one case from number `first` on, in the format that the
     path's ending names, CSV by default. Returns those of the first ones.
 
-    Raises ConfigError as `plot_batches`, or where a format's package is missing; errors of `Writer`."""
+    Raises ConfigError as `plot_batches`, or where a format's package is missing; errors of `OutputFile`."""
     write = BULK_WRITERS.get(Path(path).suffix.lower(), write_csv)
     first_plots = next(plot_batches(experiment, n, first, chunk=2))
     size = max(8, NUMBERS_PER_DRAW // sum(array[0].size for array in first_plots.arrays().values()))
@@ -36,12 +36,12 @@ def write_realisations(
             yield batch
             progress(batch.first - first + batch.n, n)
 
-    with Writer(path, {"the config": experiment.path}) as file:
+    with OutputFile(path, {"the config": experiment.path}) as file:
         write(file, first_plots, batches, n)
     return first_plots
 
 
-def write_npz(file: Writer, first_plots: SimulatedPlots, batches: PlotSource, n: int) -> None:
+def write_npz(file: OutputFile, first_plots: SimulatedPlots, batches: PlotSource, n: int) -> None:
     """`seed`, `t_s` (K,), `realisation` (n,), and each array (n, K) or (n, K, M); (1, K) where all have the same. One
     array after the other, so that the plots are drawn as often as there are arrays."""
     widest = (
@@ -67,14 +67,14 @@ def write_npz(file: Writer, first_plots: SimulatedPlots, batches: PlotSource, n:
                     member.write(values.tobytes())
 
 
-def write_csv(file: Writer, first_plots: SimulatedPlots, batches: PlotSource, n: int) -> None:
+def write_csv(file: OutputFile, first_plots: SimulatedPlots, batches: PlotSource, n: int) -> None:
     """The rows of all realisations, with the number of each in the column `realisation`."""
     file.write([tuple(first_plots.table())])
     for batch in batches():
         file.write(zip(*map(column_texts, batch.table().values()), strict=True))
 
 
-def write_parquet(file: Writer, first_plots: SimulatedPlots, batches: PlotSource, n: int) -> None:
+def write_parquet(file: OutputFile, first_plots: SimulatedPlots, batches: PlotSource, n: int) -> None:
     """The same rows as numbers."""
     try:
         import pyarrow

@@ -43,7 +43,7 @@ def simulate(
     """
     from radarsim.api import load_experiments, run_facts
     from radarsim.cli import console, progress
-    from radarsim.recordings import bulk_plots, csv_rows, simulate_plots
+    from radarsim.recordings import bulk_plots, csv_output, simulate_plots
 
     if None not in (realisation, realisations):
         raise click.UsageError("--realisation and --realisations do not go together: give one of them")
@@ -51,7 +51,7 @@ def simulate(
     number = realisation or 0
     if realisations is None and Path(output).suffix.lower() not in bulk_plots.BULK_WRITERS:
         columns = simulate_plots.simulate_realisation(loaded, number)
-        csv_rows.write_columns(columns, output, loaded.path)
+        csv_output.write_columns(columns, output, loaded.path)
         rows = plural("{count} row", "{count} rows", len(columns["t_s"]))
         written = f"{rows}: {', '.join(columns)}"
     else:
@@ -214,12 +214,12 @@ def track(
 
     from radarsim.api import load_experiments, result_config, run_facts
     from radarsim.cli import console, progress
-    from radarsim.recordings import csv_rows, print_results
+    from radarsim.recordings import csv_output, print_results
     from radarsim.recordings import track as recordings_track
     from radarsim.recordings.fit import advice
     from radarsim.recordings.report import innovation_tests, page
     from radarsim.report import output_labels
-    from radarsim.report.atomic_files import Writer
+    from radarsim.report.atomic_files import OutputFile
 
     (loaded,) = load_experiments.load_all([config], overrides)
     read = {"the plots": plots, "the config": loaded.path}
@@ -228,12 +228,12 @@ def track(
     def sink(piece: "Track", name: str | None) -> None:
         nonlocal started
         if not started:
-            write([csv_rows.track_header(piece, name is not None)])
+            write([csv_output.track_header(piece, name is not None)])
             started = True
-        write(csv_rows.track_rows(piece, name))
+        write(csv_output.track_lines(piece, name))
 
     with contextlib.ExitStack() as stack:
-        write = stack.enter_context(Writer(output, read)).write if output else print_results.print_rows
+        write = stack.enter_context(OutputFile(output, read)).write if output else print_results.print_rows
         counter = stack.enter_context(progress.CountedProgress("tracking", "rows"))
         followed = recordings_track.track_plots(loaded, plots, sink, arguments["threads"], counter.update)
     folder = arguments["report"]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 from radarsim.api.configs import Config, Overrides, load
 from radarsim.api.display import Displayable
 from radarsim.errors import ConfigError
-from radarsim.recordings import csv_rows, simulate_plots
+from radarsim.recordings import csv_output, simulate_plots
 from radarsim.recordings import read_plots as recordings_read_plots
 from radarsim.recordings import track as recordings_track
 from radarsim.recordings.fit import fit as fit_fit
@@ -119,8 +119,8 @@ def track(config: Config, recorded: RecordingSource, overrides: Overrides = ()) 
     header: list[str] = []
 
     def sink(piece: Any, name: str | None) -> None:
-        header[:] = csv_rows.track_header(piece, name is not None)
-        rows.extend(csv_rows.track_rows(piece, name))
+        header[:] = csv_output.track_header(piece, name is not None)
+        rows.extend(csv_output.track_lines(piece, name))
 
     experiment = load(config, overrides)
     _with_file(recorded, lambda path: recordings_track.track_plots(experiment, path, sink))

@@ -12,14 +12,14 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError, PlotFault
 from radarsim.recordings import read_plots
 from radarsim.recordings.rounding_guard import RoundingGuard
+from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
-from radarsim.recordings.track_rows import split_by_track
 from radarsim.recordings.tracking_result import ErrorSums, InnovationTally, TrackingResult
 from radarsim.studies.recording_interface import Track
 from radarsim.system.threads import mapping
 
 if TYPE_CHECKING:
-    from radarsim.recordings.track_rows import TrackRows
+    from radarsim.recordings.rows_by_track import TrackRows
 
 
 class TrackFollower:

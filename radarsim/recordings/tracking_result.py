@@ -7,8 +7,8 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.recordings.positions import PlotPositions, ThinnedRows
+from radarsim.recordings.rows_by_track import join_tracks, select_rows
 from radarsim.recordings.study_part import recording_interface
-from radarsim.recordings.track_rows import join_tracks, select_rows
 from radarsim.studies.plot_arrays import true_column
 from radarsim.studies.recording_interface import Track
 

@@ -313,7 +313,7 @@ def same_file(path: str | os.PathLike, other_path: str | os.PathLike) -> bool:
         return False
 
 
-class Writer:
+class OutputFile:
     """A file at a path given by the user, CSV or bytes: written completely or not at all, or a stream, directly.
 
     sources: files that are read, by their names in messages; a path to one of them raises ConfigError, and so does a

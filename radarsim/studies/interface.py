@@ -169,9 +169,9 @@ class Study(ABC):
 
     def floors(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
         """The floors of these results and the bounds of smoothing, row by row as in `curves`."""
-        from radarsim.studies.floors import table
+        from radarsim.studies.floors import floor_columns
 
-        return table.floors(self, results)
+        return floor_columns.floors(self, results)
 
     def table(self, name: str, results: "Sequence[CaseResult]", column: str = "") -> "pd.DataFrame | None":
         """The table of a name that has this column; None if there is none. A common one is made without the others."""

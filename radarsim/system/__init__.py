@@ -1,1 +1,1 @@
-"""The machine: whether threads may be started, and files to which only the user may write."""
+"""The machine: whether threads may be started, directories, and files to which only the user may write."""

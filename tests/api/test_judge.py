@@ -24,7 +24,7 @@ from radarsim.language.translate import tr
 from radarsim.report import interval_notes, page_sentences
 from radarsim.report import tables as common
 from radarsim.report.drawing.model import Line
-from radarsim.report.user_filters import tables
+from radarsim.report.user_filters import tables as user_filters_tables
 from radarsim.report.user_filters.tables import ROUNDING
 from radarsim.studies import registry
 from radarsim.studies.multimodel import study as flight
@@ -761,7 +761,7 @@ def test_nees_of_a_right_covariance_covers_one():
         case = replace(experiment.cases[0], user_filters=(member,), realisations=400)
         work = CaseWork(case)
         found = case_results.case_result(case, work, collect(work, 400, threads=0))
-        rows = common.join_columns([tables.nees_columns(found)])
+        rows = common.join_columns([user_filters_tables.nees_columns(found)])
         inside.append(((rows["nees_lo"] < 1) & (rows["nees_hi"] > 1)).mean())
     assert 0.93 < np.mean(inside) < 0.97
 

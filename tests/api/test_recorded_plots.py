@@ -5,7 +5,7 @@ import pytest
 
 import radarsim
 from radarsim.api.configs import load
-from radarsim.recordings import csv_rows, simulate_plots
+from radarsim.recordings import csv_output, simulate_plots
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def test_simulate_gives_the_plots_of_the_command(table):
 
 def test_a_table_is_tracked_and_fitted_as_its_file_is(table, tmp_path):
     path = tmp_path / "plots.csv"
-    csv_rows.write_columns({name: table[name].to_numpy() for name in table}, path)
+    csv_output.write_columns({name: table[name].to_numpy() for name in table}, path)
     pd.testing.assert_frame_equal(radarsim.read_plots(path), table)
     for act in (radarsim.track, radarsim.fit):
         pd.testing.assert_frame_equal(act("rls2", table), act("rls2", path))

@@ -20,7 +20,7 @@ from radarsim.cli.command_group import main
 from radarsim.config import find_files
 from radarsim.config.identity import identity_keys
 from radarsim.errors import ConfigError
-from radarsim.recordings import csv_rows, read_plots, simulate_plots, study_part, track, track_rows
+from radarsim.recordings import csv_output, read_plots, rows_by_track, simulate_plots, study_part, track
 from radarsim.recordings.report import innovation_tests
 from radarsim.studies.range_doppler import tracking
 from tests.program import command
@@ -66,7 +66,7 @@ def test_track_over_a_simulated_file_makes_the_errors_of_the_study(tmp_path, con
     one = loaded(config, RUNS[config])
     columns = simulate_plots.simulate_realisation(one, realisation)
     path = tmp_path / "plots.csv"
-    csv_rows.write_columns(columns, path)
+    csv_output.write_columns(columns, path)
     case, track = plot_files.track(one, path)
     work = CaseWork(case)
     sums = work.plan.layout.unpack(work.simulate(realisation, 1))
@@ -95,7 +95,7 @@ def test_a_file_in_pieces_gives_the_same_track(tmp_path, config):
         pieces = [
             tracker.feed({name: column[i : i + size] for name, column in wanted.items()}) for i in range(0, 300, size)
         ]
-        parts = track_rows.join_tracks(pieces)
+        parts = rows_by_track.join_tracks(pieces)
         scale = np.where(whole.sigma > 0, whole.sigma, 1.0)
         assert np.array_equal(np.isfinite(parts.estimate), np.isfinite(whole.estimate))
         assert np.nanmax(np.abs(parts.estimate - whole.estimate) / scale) < track_rounding(whole)
@@ -150,7 +150,7 @@ def test_velocities_alone_never_start_a_track_of_ranges(monkeypatch):
 def followed(tmp_path, config, overrides, stated=()):
     one = loaded(config, overrides)
     path = tmp_path / "plots.csv"
-    csv_rows.write_columns(simulate_plots.simulate_realisation(one), path)
+    csv_output.write_columns(simulate_plots.simulate_realisation(one), path)
     return track.track_plots(loaded(config, (*overrides, *stated)), path)
 
 

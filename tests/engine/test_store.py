@@ -7,7 +7,6 @@ import shutil
 import threading
 import time
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from radarsim.engine import executors, machine
 from radarsim.engine.blocks import Node, Partial, Total
 from radarsim.engine.collect import collect, compute_share, read_stored
 from radarsim.engine.store import writer as store_writer
-from radarsim.engine.store.block_file import decode, is_directory, piece_named
+from radarsim.engine.store.block_file import decode, piece_named
 from radarsim.engine.store.store import Store
 from radarsim.engine.sums import Sums
 from radarsim.errors import NonFiniteError, StoreError
@@ -312,21 +311,6 @@ def test_a_writer_looks_again_at_what_it_wrote(tmp_path):
     (store.path / "L00-0.sums").unlink()
     writer.finish(pieces)
     assert store.pieces() == set(pieces)
-
-
-def test_a_directory_that_may_not_be_looked_at_is_not_taken_for_none(monkeypatch, tmp_path):
-    assert is_directory(tmp_path)
-    assert not is_directory(tmp_path / "none")
-    (tmp_path / "file").touch()
-    assert not is_directory(tmp_path / "file")
-    assert not is_directory(tmp_path / "file" / "below")
-
-    def closed(*_, **__):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(Path, "stat", closed)
-    with pytest.raises(PermissionError):
-        is_directory(tmp_path)
 
 
 @pytest.mark.parametrize("umask", [0o000, 0o077, 0o777])

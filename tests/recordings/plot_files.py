@@ -3,9 +3,9 @@
 import numpy as np
 
 from radarsim.errors import ConfigError
-from radarsim.recordings import csv_rows, read_plots, track_rows
+from radarsim.recordings import csv_output, read_plots, rows_by_track
 from radarsim.recordings import track as recordings_track
-from radarsim.report.atomic_files import Writer
+from radarsim.report.atomic_files import OutputFile
 
 
 def read(path, choices):
@@ -18,9 +18,9 @@ def track(experiment, source):
     followed = recordings_track.track_plots(experiment, source, lambda track, name: parts.append(track))
     if len(followed.tracks) > 1:
         raise ConfigError(f"{source}: one track wanted, got {len(followed.tracks)}")
-    return followed.case, track_rows.join_tracks(parts)
+    return followed.case, rows_by_track.join_tracks(parts)
 
 
 def write(track, path):
-    with Writer(path) as file:
-        file.write([csv_rows.track_header(track), *csv_rows.track_rows(track)])
+    with OutputFile(path) as file:
+        file.write([csv_output.track_header(track), *csv_output.track_lines(track)])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from radarsim.api.load_experiments import load_all
-from radarsim.recordings import csv_rows, simulate_plots, study_part, track
+from radarsim.recordings import csv_output, simulate_plots, study_part, track
 from radarsim.recordings.fit.folded_doppler import SPAN_SEARCH_STEPS, detect_folding, folding_message
 from radarsim.recordings.print_results import print_track
 from radarsim.recordings.report.innovation_tests import FITS, FOLD_LOST, MAYBE_TOO_SMALL, innovation_tests
@@ -62,7 +62,7 @@ def test_the_span_is_that_of_the_config_or_of_the_plots(flown, span):
 
 def test_track_and_fit_notice_folded_velocities(flown, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    csv_rows.write_columns(folded(flown), "folded.csv")
+    csv_output.write_columns(folded(flown), "folded.csv")
     for config, span in (
         (options(*KNOWING), "the config's span is 60.0 m/s"),
         (options(), "the plots suggest a span of"),
@@ -81,7 +81,7 @@ def test_track_and_fit_notice_folded_velocities(flown, tmp_path, monkeypatch):
 @pytest.mark.parametrize("known", [KNOWING, KNOWING[:1]], ids=["rate known", "rate not known"])
 def test_the_settings_that_are_named_unfold_them(flown, tmp_path, monkeypatch, known):
     monkeypatch.chdir(tmp_path)
-    csv_rows.write_columns({name: column[:40] for name, column in folded(flown).items()}, "folded.csv")
+    csv_output.write_columns({name: column[:40] for name, column in folded(flown).items()}, "folded.csv")
     words = ["track", "rls2", "folded.csv", "-o", "track.csv", *options(*known)]
     (settings,) = re.findall(r"the same command with (.*)$", command(*words).stdout, re.M)
     assert ("repetition_rate_hz" in settings) == (known != KNOWING)
@@ -100,7 +100,7 @@ def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path,
     """The nearest fold of realisation 0 is wrong; beside filters that fit it is known, alone it is one of three."""
     monkeypatch.setenv("COLUMNS", "80")
     (config,) = load_all(["ambiguous_rls2"])
-    csv_rows.write_columns(simulate_plots.simulate_realisation(config), tmp_path / "plots.csv")
+    csv_output.write_columns(simulate_plots.simulate_realisation(config), tmp_path / "plots.csv")
     found = track.track_plots(config, tmp_path / "plots.csv")
     verdicts = {one.filter: one.verdict for one in innovation_tests(found) if one.tests}
     assert verdicts.pop("nearest fold") == FOLD_LOST

@@ -9,7 +9,7 @@ import pytest
 from radarsim.api.load_experiments import load_all
 from radarsim.errors import ConfigError
 from radarsim.physics.motion import transition
-from radarsim.recordings import csv_rows, simulate_plots, study_part, track, tracking_result
+from radarsim.recordings import csv_output, simulate_plots, study_part, track, tracking_result
 from radarsim.recordings.fit import advice, fit, newton_steps, profile_search, row_sample
 from radarsim.recordings.fit.likelihood_slice import no_progress
 from radarsim.recordings.report import sentences
@@ -334,7 +334,7 @@ def test_intervals_cover():
 def advised(tmp_path, columns, config=None):
     """What `radarsim track` advises of a file of plots."""
     path = tmp_path / "advised.csv"
-    csv_rows.write_columns(columns, path)
+    csv_output.write_columns(columns, path)
     followed = track.track_plots(config or loaded(), path, threads=1)
     return advice.advise(followed), followed
 
@@ -524,7 +524,7 @@ def test_a_fit_allows_for_what_is_plain_and_shows_the_plain_answer(tmp_path):
     """Outliers; errors that last; a bias, which is only told; nothing."""
     cases = (({"share": 0.08}, "outliers: "), ({"correlation": 0.6}, f"{fit.CORRELATION_TIME_KEY}: "))
     for options, expected in (*cases, ({"bias_mps": 30.0}, "the intervals are not valid"), ({}, None)):
-        csv_rows.write_columns(recording(np.random.default_rng(1), **options), tmp_path / "plots.csv")
+        csv_output.write_columns(recording(np.random.default_rng(1), **options), tmp_path / "plots.csv")
         text = command("fit", "rls2", tmp_path / "plots.csv").stdout
         for sign in ("outliers: ", f"{fit.CORRELATION_TIME_KEY}: ", "the intervals are not valid"):
             assert (sign in text) == (sign == expected)
@@ -585,7 +585,7 @@ def test_the_interval_of_a_correlation_time_covers():
 
 
 def test_a_recording_without_correlation_does_not_tell_it_from_zero(tmp_path):
-    csv_rows.write_columns(recording(np.random.default_rng(2)), tmp_path / "plots.csv")
+    csv_output.write_columns(recording(np.random.default_rng(2)), tmp_path / "plots.csv")
     text = command("fit", "rls2", tmp_path / "plots.csv", "--correlated").stdout
     (line,) = (line for line in text.splitlines() if line.startswith(fit.CORRELATION_TIME_KEY))
     assert "[0.000, " in line
@@ -635,7 +635,7 @@ def test_the_best_filter_is_that_which_foretells_best():
 @pytest.fixture
 def source(tmp_path):
     path = tmp_path / "plots.csv"
-    csv_rows.write_columns(recording(np.random.default_rng(7)), path)
+    csv_output.write_columns(recording(np.random.default_rng(7)), path)
     return path
 
 
@@ -693,7 +693,7 @@ def test_what_cannot_be_fitted_is_refused(source, arguments, expected):
 def test_a_filter_without_a_likelihood_says_so(tmp_path):
     path = tmp_path / "plots.csv"
     (sonar,) = load_all(["sonar_smoothing"], ())
-    csv_rows.write_columns(simulate_plots.simulate_realisation(sonar), path)
+    csv_output.write_columns(simulate_plots.simulate_realisation(sonar), path)
     with pytest.raises(
         ConfigError, match="filter: window 5 does not say how likely plots are, which fit needs; must be one of "
     ):
@@ -702,7 +702,7 @@ def test_a_filter_without_a_likelihood_says_so(tmp_path):
 
 def test_too_short_a_track_is_refused(tmp_path):
     path = tmp_path / "plots.csv"
-    csv_rows.write_columns({name: column[:9] for name, column in recording(np.random.default_rng(9)).items()}, path)
+    csv_output.write_columns({name: column[:9] for name, column in recording(np.random.default_rng(9)).items()}, path)
     with pytest.raises(ConfigError, match="must have a track of at least 10 rows"):
         fit.fit_plots(loaded(), path)
 
@@ -711,7 +711,7 @@ def monitor(tmp_path, *values):
     """Plots of a fixed transponder: ranges in steps of 1/256 NM, some of the second value."""
     rng, path = np.random.default_rng(3), tmp_path / "monitor.csv"
     range_m = rng.choice(values, 300, p=[0.7, 0.3][: len(values)] if len(values) > 1 else None)
-    csv_rows.write_columns(
+    csv_output.write_columns(
         {"t_s": 4.0 * np.arange(300), "range_m": range_m, "velocity_mps": np.full(300, np.nan)}, path
     )
     return path
@@ -777,7 +777,7 @@ def test_recordings_that_tell_nothing_end_in_an_answer_or_a_line(tmp_path, confi
     }
     t, z = EMPTY[name](columns.pop("t_s"), np.stack(list(columns.values()), axis=1))
     for more in ({}, {"track": np.full(len(t), 7)}):
-        csv_rows.write_columns({"t_s": t, **dict(zip(columns, z.T, strict=True)), **more}, tmp_path / "plots.csv")
+        csv_output.write_columns({"t_s": t, **dict(zip(columns, z.T, strict=True)), **more}, tmp_path / "plots.csv")
         with contextlib.suppress(ConfigError):
             fit.fit_plots(experiment, tmp_path / "plots.csv")
         with contextlib.suppress(ConfigError):

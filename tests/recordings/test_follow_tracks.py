@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.api.load_experiments import load_all
 from radarsim.errors import ConfigError
-from radarsim.recordings import read_plots, simulate_plots, track, track_rows
+from radarsim.recordings import read_plots, rows_by_track, simulate_plots, track
 from radarsim.recordings.report import sentences
 from tests.tolerances import assert_rounded
 
@@ -38,7 +38,7 @@ def tracks_of(path, config="rls2"):
     """What was found, and the estimates (F, n, C) by track."""
     parts = {}
     followed = track.track_plots(loaded(config), path, lambda track, name: parts.setdefault(name, []).append(track))
-    return followed, {name: track_rows.join_tracks(own).estimate for name, own in parts.items()}
+    return followed, {name: rows_by_track.join_tracks(own).estimate for name, own in parts.items()}
 
 
 def test_each_track_is_followed_by_itself(tmp_path, realisations):

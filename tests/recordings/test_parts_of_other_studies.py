@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarsim.api.load_experiments import load_all
-from radarsim.recordings import csv_rows, simulate_plots, study_part
+from radarsim.recordings import csv_output, simulate_plots, study_part
 from tests.studies import example_packages
 
 FILES = {
@@ -72,7 +72,7 @@ def place(tmp_path):
     example_packages.metadata(tmp_path / "site", "frozen", "1", {"frozen": "frozen:STUDY"})
     (tmp_path / "mine.yaml").write_text(CONFIG)
     columns = simulate_plots.simulate_realisation(load_all(["rls2"], ())[0])
-    csv_rows.write_columns({name: np.asarray(column) for name, column in columns.items()}, tmp_path / "plots.csv")
+    csv_output.write_columns({name: np.asarray(column) for name, column in columns.items()}, tmp_path / "plots.csv")
     return tmp_path
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from radarsim.errors import ConfigError, StoreError
-from radarsim.recordings import csv_rows, read_plots
-from radarsim.report.atomic_files import Writer
+from radarsim.recordings import csv_output, read_plots
+from radarsim.report.atomic_files import OutputFile
 from radarsim.studies.recording_interface import Track
 from tests.recordings import plot_files
 
@@ -168,7 +168,7 @@ def test_an_existing_file_keeps_its_mode_and_a_new_one_heeds_the_umask(tmp_path)
     mask = os.umask(0o077)
     try:
         for path in (old, new):
-            csv_rows.write_columns({"t_s": np.zeros(1)}, path)
+            csv_output.write_columns({"t_s": np.zeros(1)}, path)
     finally:
         os.umask(mask)
     assert [stat.S_IMODE(path.stat().st_mode) for path in (old, new)] == [0o640, 0o600]
@@ -177,7 +177,7 @@ def test_an_existing_file_keeps_its_mode_and_a_new_one_heeds_the_umask(tmp_path)
 def test_a_link_stays_and_its_file_is_replaced(tmp_path):
     (tmp_path / "real.csv").write_text("before")
     (tmp_path / "link.csv").symlink_to("real.csv")
-    csv_rows.write_columns({"t_s": np.zeros(1)}, tmp_path / "link.csv")
+    csv_output.write_columns({"t_s": np.zeros(1)}, tmp_path / "link.csv")
     assert (tmp_path / "link.csv").is_symlink()
     assert (tmp_path / "real.csv").read_text() == "t_s\n0.0\n"
 
@@ -186,17 +186,17 @@ def test_a_stream_is_written_through_and_stays(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    csv_rows.write_columns({"t_s": np.zeros(1)}, pipe)
+    csv_output.write_columns({"t_s": np.zeros(1)}, pipe)
     assert os.read(reader, 100) == b"t_s\n0.0\n"
     os.close(reader)
     assert stat.S_ISFIFO(pipe.stat().st_mode)
-    csv_rows.write_columns({"t_s": np.zeros(1)}, "/dev/null")
+    csv_output.write_columns({"t_s": np.zeros(1)}, "/dev/null")
     assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
 
 
 def test_what_is_no_file_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="must be a file, got a directory"):
-        csv_rows.write_columns({"t_s": np.zeros(1)}, tmp_path)
+        csv_output.write_columns({"t_s": np.zeros(1)}, tmp_path)
 
 
 def test_a_fault_on_the_way_leaves_the_old_file_and_nothing_beside_it(tmp_path):
@@ -204,7 +204,7 @@ def test_a_fault_on_the_way_leaves_the_old_file_and_nothing_beside_it(tmp_path):
     path.write_text("before")
 
     def interrupted():
-        with Writer(path) as file:
+        with OutputFile(path) as file:
             file.write([("half",)])
             raise RuntimeError
 
@@ -219,5 +219,5 @@ def test_the_recorded_plots_are_never_the_output(tmp_path, name):
     source.write_text("before")
     (tmp_path / "link.csv").symlink_to("plots.csv")
     with pytest.raises(ConfigError, match="must be another file than the plots"):
-        Writer(tmp_path / name, {"the plots": source})
+        OutputFile(tmp_path / name, {"the plots": source})
     assert source.read_text() == "before"

@@ -7,7 +7,7 @@ import pytest
 
 from radarsim.api.configs import load
 from radarsim.errors import ConfigError
-from radarsim.recordings import csv_rows, rounding_guard, simulate_plots, study_part, track_rows
+from radarsim.recordings import csv_output, rounding_guard, rows_by_track, simulate_plots, study_part
 from radarsim.recordings.rounding_guard import RoundingGuard, differing_rows
 from tests.recordings import plot_files
 from tests.tolerances import rounding
@@ -56,7 +56,7 @@ def exact(observes: int, start: int, steps: list[int], unseen=()) -> np.ndarray:
 def file_with(tmp_path, steps):
     t = np.concatenate([10.0 * np.arange(SCANS), 10.0 * (SCANS - 1) + np.cumsum(steps)])
     columns = {"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t}
-    csv_rows.write_columns(columns, tmp_path / "plots.csv")
+    csv_output.write_columns(columns, tmp_path / "plots.csv")
     return tmp_path / "plots.csv"
 
 
@@ -108,7 +108,7 @@ def test_other_studies_print_nothing_that_is_lost(tmp_path, config, overrides, g
     columns = simulate_plots.simulate_realisation(one)
     middle = len(columns["t_s"]) // 2
     columns["t_s"][middle:] += gap
-    csv_rows.write_columns({n: c for n, c in columns.items() if not n.startswith("true_")}, tmp_path / "plots.csv")
+    csv_output.write_columns({n: c for n, c in columns.items() if not n.startswith("true_")}, tmp_path / "plots.csv")
     if lost:
         with pytest.raises(ConfigError, match=r"plots\.csv:.* t_s: "):
             plot_files.track(one, tmp_path / "plots.csv")
@@ -139,7 +139,7 @@ def test_tracks_differ_by_sigma_estimate_or_an_impossible_sigma(tmp_path):
     _, track = plot_files.track(load("rls2"), file_with(tmp_path, [10]))
     assert not differing_rows(track, track).any()
     for name, value in (("sigma", np.nan), ("sigma", 0.0), ("estimate", np.nan), ("estimate", 7.0)):
-        other = track_rows.select_rows(track, np.arange(SCANS + 1))
+        other = rows_by_track.select_rows(track, np.arange(SCANS + 1))
         getattr(other, name)[1, 9, 0] = value
         assert differing_rows(other, track).nonzero()[0].tolist() == [9]
         assert differing_rows(track, other).nonzero()[0].tolist() == [9]

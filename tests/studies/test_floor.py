@@ -15,7 +15,7 @@ from radarsim.physics.motion import transition
 from radarsim.physics.targets import fly_by_in_space
 from radarsim.studies import registry
 from radarsim.studies.floors import bound as floors_bound
-from radarsim.studies.floors import missed_plots, moving, static, table
+from radarsim.studies.floors import floor_columns, missed_plots, moving, static
 from radarsim.studies.floors.bound import ENUMERATION, LAGS, REDUCTION, Bound, Floor
 from radarsim.studies.range_doppler.floor import derivatives
 from radarsim.studies.sonar import target_motion
@@ -408,12 +408,12 @@ def test_rows_keep_their_order_and_notes_where_floors_are_joined():
     known = pd.DataFrame(
         {"case": "a", "filter": "f", "component": "r", "k": [1, 2], "floor": [0.5, 0.25], "kind": "CRB"}
     )
-    both = table.with_floors(curves, known)
+    both = floor_columns.with_floors(curves, known)
     assert list(both["floor"].fillna(0)) == [0.25, 0, 0.5]
     assert list(both["floor_kind"]) == ["CRB", "", "CRB"]
     assert list(both.columns)[-4:] == ["believed_sigma", "floor", "floor_kind", "note"]
     assert both[curves.columns].equals(curves)
-    assert table.with_floors(curves, known[:0])["floor"].isna().all()
+    assert floor_columns.with_floors(curves, known[:0])["floor"].isna().all()
 
 
 def test_solve_answers_what_accuracy_a_floor_takes():

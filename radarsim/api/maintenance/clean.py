@@ -10,10 +10,10 @@ from pathlib import Path
 from radarsim.api.stored_cases import stored_cases
 from radarsim.config.experiment import Experiment
 from radarsim.engine.blocks import REQUEST_DIGITS
-from radarsim.engine.store.block_file import is_directory
 from radarsim.engine.store.store import removable_files
 from radarsim.errors import ConfigError, StoreError
 from radarsim.studies.identity import identity, request_digest
+from radarsim.system.directories import is_directory
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,11 @@ from radarsim.api.stored_cases import (
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores, instruction_set, machine_facts
 from radarsim.engine.store.audit import Audit, audit_blocks
-from radarsim.engine.store.block_file import is_directory
 from radarsim.engine.store.store import is_other_source, other_sources
 from radarsim.errors import ConfigError
 from radarsim.report import provenance
 from radarsim.report.stored_tables import find_files, no_result
+from radarsim.system.directories import is_directory
 from radarsim.system.private_files import foreign_owner
 
 

@@ -13,10 +13,11 @@ from radarsim.api.maintenance.packed_code import code_names, packed_code
 from radarsim.config.find_files import is_stem
 from radarsim.engine.blocks import Node, Partial, Piece, Total
 from radarsim.engine.store.audit import Audit, audit_blocks
-from radarsim.engine.store.block_file import Damage, block_path, decode, is_directory, read_file
+from radarsim.engine.store.block_file import Damage, block_path, decode, read_file
 from radarsim.errors import ConfigError, StoreError
 from radarsim.report import atomic_files
 from radarsim.report.index_page import INDEX_NAME
+from radarsim.system.directories import is_directory
 
 RESULTS = "results"
 README = "README.txt"

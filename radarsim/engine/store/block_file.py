@@ -94,12 +94,3 @@ def read_file(path: Path) -> bytes:
         if fault := entry_fault(path, status):
             raise UntrustedFileError(errno.EPERM, fault, str(path))
         return file.read()
-
-
-def is_directory(path: Path) -> bool:
-    """Whether a directory exists; raises OSError where access is denied. Path.is_dir raises that only up to Python
-    3.13: later it returns False without access."""
-    try:
-        return stat.S_ISDIR(path.stat().st_mode)
-    except (FileNotFoundError, NotADirectoryError):
-        return False

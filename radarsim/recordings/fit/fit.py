@@ -32,9 +32,9 @@ from radarsim.recordings.fit.likelihood_slice import (
 )
 from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, FittedKey, LikelihoodSearch
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
+from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
-from radarsim.recordings.track_rows import split_by_track
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.missed_scans import without_empty_rows
 from radarsim.studies.recording_interface import Likelihood

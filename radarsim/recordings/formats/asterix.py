@@ -10,6 +10,7 @@ from radarsim.errors import ConfigError
 from radarsim.language.translate import NUMBER_PLACEHOLDER, term, tr
 from radarsim.recordings.formats import asterix_layout, captures
 from radarsim.recordings.formats import records as formats_records
+from radarsim.recordings.formats.asterix_categories import Category, Category001, RecordStore
 from radarsim.recordings.formats.asterix_decode import (
     MARK_TEXTS,
     MARKS,
@@ -22,7 +23,6 @@ from radarsim.recordings.formats.asterix_decode import (
     tracks_062,
 )
 from radarsim.recordings.formats.asterix_layout import DamagedRecord, Profile
-from radarsim.recordings.formats.asterix_records import Category, Category001, RecordStore
 from radarsim.recordings.formats.asterix_survey import survey_radars
 from radarsim.recordings.track_names import TrackNames
 

@@ -17,7 +17,7 @@ from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
 from radarsim.language.translate import term, tr
 from radarsim.recordings import target_speed
-from radarsim.recordings.csv_rows import column_texts
+from radarsim.recordings.csv_output import column_texts
 from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
 from radarsim.recordings.formats.asterix import Asterix
@@ -32,7 +32,7 @@ from radarsim.recordings.formats.table import Table
 from radarsim.recordings.grouping import rows_by_name
 from radarsim.recordings.target_speed import FastestLegs, TrackPositions
 from radarsim.recordings.time_spans import MIN_DATED_S
-from radarsim.report.atomic_files import Writer
+from radarsim.report.atomic_files import OutputFile
 
 MAX_SITE_DISTANCE_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
 NO_SITE_FAULT = (
@@ -93,7 +93,7 @@ def _import_rows(
         has_truth = bool(options.site or options.sites) and (options.truth or not _lacks_full_times(reader))
         truth = AircraftTruth(path, options) if has_truth else None
         work = _Import(format_, reader, options, truth, all_at_once)
-        with Writer(output, {"the recording": path, "the truth": options.truth}) as file:
+        with OutputFile(output, {"the recording": path, "the truth": options.truth}) as file:
             first = True
             for rows in work.rows():
                 if first:

@@ -10,7 +10,7 @@ import pytest
 import radarsim
 from radarsim.api.configs import load
 from radarsim.errors import ConfigError, PlotFault
-from radarsim.recordings import csv_rows
+from radarsim.recordings import csv_output
 from radarsim.recordings.fit import fit
 from radarsim.report import interval_notes, statistics
 from radarsim.studies import registry
@@ -267,7 +267,7 @@ def test_remainder_depends_on_the_folded_velocity_only():
 def test_too_many_folds_are_reported_with_their_row(tmp_path, change, words):
     experiment = load("ambiguous_rls4", ["filters=[{name: memory, doppler: folded, manoeuvre_variance: 1e-3}]"])
     t = np.arange(15) * 10.0
-    csv_rows.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
+    csv_output.write_columns({"t_s": t, "range_m": 1e5 + 0 * t, "velocity_mps": 0 * t} | change, tmp_path / "plots.csv")
     with warnings.catch_warnings(action="error"), pytest.raises(ConfigError) as error:
         plot_files.track(experiment, tmp_path / "plots.csv")
     assert words in str(error.value)

@@ -19,10 +19,10 @@ from radarsim.kernels.compiler import inline, kernel, kernel_part
 from radarsim.kernels.lane_matrices import get3, put3
 from radarsim.kernels.lanes import address, full, get, put, row, where_greater
 from radarsim.studies.multimodel.kernels import layout
-from radarsim.studies.multimodel.kernels.families import merge_gpb1, step
 from radarsim.studies.multimodel.kernels.hypothesis import merge, mixed_mean
 from radarsim.studies.multimodel.kernels.layout import Rules
 from radarsim.studies.multimodel.kernels.merging_rules import put_shares
+from radarsim.studies.multimodel.kernels.multimodel_filters import merge_gpb1, step
 from radarsim.studies.multimodel.kernels.plots import noise_at_prediction
 
 

@@ -95,7 +95,7 @@ def _tracks_and_gates(
     gates = [
         _gate_outline(gate, specs[f])
         for n in order[:1]
-        for k, gate in zip(histories[n].scans, histories[n].gates, strict=True)
+        for k, gate in zip(histories[n].scans, histories[n].predictions, strict=True)
         if not k % GATE_INTERVAL_SCANS
     ]
     return f, [track_curves[n] for n in order], [gate for gate in gates if np.isfinite(gate[0]).all()]

@@ -19,7 +19,7 @@ class TrackHistory:
     """A track: its lane (chunk, index), its state under the rules, and the estimates at each of its scans.
 
     scans holds the numbers of the scans; states (n, 4) r, vr, b, vb with variances (n, 4), NaN for rates not yet known;
-    scores (n,); gates (n, 5) the predicted position and the covariance of its innovation."""
+    scores (n,); predictions (n, 5) the predicted position and the covariance of its innovation."""
 
     lane: tuple[int, int]
     state: int = track_rules.TENTATIVE
@@ -33,7 +33,7 @@ class TrackHistory:
     states: list[np.ndarray] = field(default_factory=list)
     variances: list[np.ndarray] = field(default_factory=list)
     scores: list[float] = field(default_factory=list)
-    gates: list[np.ndarray] = field(default_factory=list)
+    predictions: list[np.ndarray] = field(default_factory=list)
 
 
 class MultiTracker:
@@ -65,9 +65,9 @@ class MultiTracker:
             track_update.update(chunk, dt, self.conditions.period, self.conditions.sigma, self.manoeuvre, joint, rows)
         for track, gate in zip(self.alive, predicted, strict=True):
             self._judge(track)
-            track.gates.append(gate)
+            track.predictions.append(gate)
         for track in new:
-            track.gates.append(np.full(5, np.nan))
+            track.predictions.append(np.full(5, np.nan))
         self.alive += new
         for track in self.alive:
             self._record(track, scan)

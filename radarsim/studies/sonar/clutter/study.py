@@ -22,7 +22,7 @@ from radarsim.studies.sonar.clutter.kernels import track_sums as kernels_track_s
 from radarsim.studies.sonar.clutter.kernels.false_plots import Field
 from radarsim.studies.sonar.clutter.kernels.rare_end_laws import EndLaws
 from radarsim.studies.sonar.clutter.kernels.rare_ends import END_KINDS, EndSums, simulate_ends
-from radarsim.studies.sonar.clutter.kernels.tracker import Trackers, workspace
+from radarsim.studies.sonar.clutter.kernels.single_tracks import Trackers, workspace
 from radarsim.studies.sonar.clutter.target_detections import detected_plots
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.exact_errors import exact_values

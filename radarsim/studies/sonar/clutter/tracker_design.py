@@ -9,7 +9,7 @@ import numpy as np
 
 from radarsim.studies.sonar.clutter.kernels.false_plots import Cells, Field
 from radarsim.studies.sonar.clutter.kernels.gate import KNOWN, NEAREST, OPEN_GATE, PDA
-from radarsim.studies.sonar.clutter.kernels.tracker import Trackers
+from radarsim.studies.sonar.clutter.kernels.single_tracks import Trackers
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.scene import lateral_scale
 from radarsim.studies.sonar.sensor_keys import Sector

@@ -11,6 +11,13 @@ from radarsim.kernels.compiler import kernel, kernel_part
 from radarsim.kernels.lanes import address
 from radarsim.studies.sonar.clutter.kernels.false_plots import draw_uniform_positions
 from radarsim.studies.sonar.clutter.kernels.gate import KNOWN
+from radarsim.studies.sonar.clutter.kernels.single_tracks import (
+    Scan,
+    Target,
+    reset_tracks,
+    step_tracker,
+    tracks_of_tracker,
+)
 from radarsim.studies.sonar.clutter.kernels.track_rules import (
     BEST,
     CONFIRMED_SCANS,
@@ -30,7 +37,6 @@ from radarsim.studies.sonar.clutter.kernels.track_sums import (
     add_ratio,
     add_scores,
 )
-from radarsim.studies.sonar.clutter.kernels.tracker import Scan, Target, reset_tracks, step_tracker, tracks_of_tracker
 from radarsim.studies.sonar.kernels.chunks import CHUNK, copy_row
 from radarsim.studies.sonar.kernels.plots import detect
 from radarsim.studies.sonar.kernels.sums import Course, add_ahead, rows_of

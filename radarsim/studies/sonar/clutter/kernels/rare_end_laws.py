@@ -32,7 +32,7 @@ from radarsim.kernels.compiler import inline, kernel_part
 from radarsim.kernels.lanes import address
 from radarsim.kernels.random import uniforms
 from radarsim.studies.sonar.clutter.kernels import association as kernels_association
-from radarsim.studies.sonar.clutter.kernels import false_plots, track_rules, tracker
+from radarsim.studies.sonar.clutter.kernels import false_plots, single_tracks, track_rules
 from radarsim.studies.sonar.clutter.kernels import gate as kernels_gate
 from radarsim.studies.sonar.clutter.kernels.outside_gate import probability_outside_gate
 from radarsim.studies.sonar.clutter.kernels.rare_boxes import MAX_BOX_MEAN, MAX_RATIO, associate_in_box, gate_box
@@ -150,7 +150,7 @@ def stretch_plots(laws, k, n, z, sigma, sampling, out):
 @inline
 def tracker_laws(ends, trackers, f):
     """The laws of tracker f."""
-    stretched, rule = (ends.young[f], ends.direction[f], ends.stretch[f]), tracker.association_rule(trackers, f)
+    stretched, rule = (ends.young[f], ends.direction[f], ends.stretch[f]), single_tracks.association_rule(trackers, f)
     return TrackerLaws(
         ends.shares[f], ends.length[f], ends.undetected[f], *stretched, rule, trackers.n[f] + YOUNG_SCANS
     )

@@ -1,4 +1,4 @@
-"""The table of floors."""
+"""The table of floors, and their columns in the table of curves."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any

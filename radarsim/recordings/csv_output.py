@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from radarsim.report.atomic_files import Writer
+from radarsim.report.atomic_files import OutputFile
 from radarsim.studies.recording_interface import Track
 
 
@@ -20,7 +20,7 @@ def track_header(track: Track, has_track_name: bool = False) -> tuple[str, ...]:
     return (*name_column, *columns, *(f"probability_{m + 1}" for m in range(models)), *score_columns)
 
 
-def track_rows(track: Track, name: str | None = None) -> Iterator[tuple[str, ...]]:
+def track_lines(track: Track, name: str | None = None) -> Iterator[tuple[str, ...]]:
     """Rows of a track: t_s, filter, component, unit, estimate, sigma, the models' probabilities, number and score.
 
     name: of the recorded track, put first."""
@@ -65,7 +65,7 @@ def column_texts(column: np.ndarray) -> Iterator[str]:
 def write_columns(
     columns: Mapping[str, np.ndarray], path: str | os.PathLike, config: str | os.PathLike | None = None
 ) -> None:
-    """Write columns (n,) of numbers as CSV, an empty cell for NaN, never over the config; errors as of `Writer`."""
-    with Writer(path, {"the config": config}) as file:
+    """Write columns (n,) of numbers as CSV, an empty cell for NaN, never over the config; errors as of `OutputFile`."""
+    with OutputFile(path, {"the config": config}) as file:
         file.write([tuple(columns)])
         file.write(zip(*map(column_texts, columns.values()), strict=True))
