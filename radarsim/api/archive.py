@@ -36,7 +36,8 @@ DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip can hold
 MODE = stat.S_IFREG | 0o644
 UNIX = 3
 PART = re.compile(r"\w(?:[\w+=. -]*[\w+=-])?")  # of a path
-DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(10))}  # of Windows
+PORTS = (*map(str, range(10)), *"¹²³")
+DEVICES = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in PORTS)}  # of Windows
 
 END = struct.Struct("<4s4H2LH")  # end of the central directory
 ENTRY_BYTES = 46  # of the central directory, before the name
@@ -228,7 +229,8 @@ class Archive:
             raise self._refusal(f"{name!r}: is a link or no regular file")
         if info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size:
             raise self._refusal(f"{name!r}: is compressed")
-        if info.flag_bits & ~UTF8_FLAG or info.extra or info.comment or info.file_size > MAX_FILE_BYTES:
+        has_more_fields = info.flag_bits & ~UTF8_FLAG or info.extra or info.comment or info.volume
+        if has_more_fields or info.file_size > MAX_FILE_BYTES:
             raise self._refusal(f"{name!r}: is encrypted, too large or has fields that are not read")
         self._file.seek(offset)
         header = self._file.read(HEADER.size)

@@ -31,14 +31,12 @@ def stored_experiment(record: Mapping, folder: Path) -> Experiment | None:
 def missing_packages(record: Mapping) -> str:
     """The packages that a result names and that are not installed, with versions, as a phrase that says what to do;
     empty where there is none."""
-    packages = record.get("packages")
     missing = []
-    for name, package in packages.items() if isinstance(packages, dict) else ():
+    for name, package in record.get("packages", {}).items():
         try:
-            importlib.metadata.version(str(name))
-        except importlib.metadata.PackageNotFoundError:
-            details = package if isinstance(package, dict) else {}
-            missing.append(f"{name} {details.get('version')} (SHA-256 of its sources: {details.get('sha256')})")
+            importlib.metadata.version(name)
+        except (importlib.metadata.PackageNotFoundError, ValueError):
+            missing.append(f"{name} {package['version']} (SHA-256 of its sources: {package['sha256']})")
     return f"install the package that computed it: {', '.join(missing)}" if missing else ""
 
 

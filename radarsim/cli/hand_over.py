@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from radarsim.api.archive import Archive
     from radarsim.config.experiment import Experiment
 
+MAX_UNANNOUNCED = 10**7  # realisations of a result in an archive that are run without a word
 trust_code_option = click.option(
     "--trust-code", is_flag=True, help="Run the code of user filters that a study.zip brings; read it before."
 )
@@ -32,7 +33,8 @@ def pack(results: tuple[str, ...], archive: str, code: bool, as_json: bool) -> N
 
     RESULT is a folder such as results/rls2, or a directory of such folders. The file holds config, tables, figures and
     report, the stored blocks behind them, versions and hashes; equal results give equal bytes. Whoever gets it verifies
-    it with `radarsim check FILE.zip`, and computes it anew with `radarsim run FILE.zip`.
+    it with `radarsim check FILE.zip`, and computes it anew with `radarsim run FILE.zip`. Not in it: packages of yours,
+    which are named, and files of `claims --also`.
 
     \b
     Examples
@@ -120,6 +122,16 @@ def named_by_results(
         experiment if archive is None else replace(experiment, path=str(Path(out) / experiment.stem / CONFIG_FILE))
         for experiment, (_, archive) in zip(experiments, sources, strict=True)
     ]
+
+
+def print_large_runs(experiments: "Sequence[Experiment]", sources: "Sequence[tuple[str, Archive | None]]") -> None:
+    """Say how long the large results of archives take, before any is run: somebody else has chosen their number."""
+    from radarsim.api import cost
+    from radarsim.cli import console
+
+    for experiment, (_, archive) in zip(experiments, sources, strict=True):
+        if archive is not None and sum(case.realisations for case in experiment.cases) > MAX_UNANNOUNCED:
+            console.print_error_line(tr("note: {words}", words=f"{experiment.stem}: {cost.check(experiment).total}"))
 
 
 def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: bool, as_json: bool) -> None:

@@ -106,6 +106,8 @@ def run(
         names = [name for name, _ in sources]
         loaded = _load_experiments(names, overrides, None if precision is None else (precision, of), decide)
         loaded = hand_over.named_by_results(loaded, sources, out)
+        if not quiet:
+            hand_over.print_large_runs(loaded, sources)
         if not (shard or replace):
             ends_early = precision is not None or decide
             check_replacements(loaded, out, quiet, ends_early)

@@ -151,6 +151,13 @@ def _check_record(record: Any) -> None:
             raise ValueError(f"lacks `{key}`")
         if not isinstance(record[key], kind):
             raise ValueError(f"`{key}` must be {words}, got {_shown(record[key])}")
+    for name, version in _object(record.get("versions", {}), "`versions`").items():
+        if not isinstance(version, str):
+            raise ValueError(f"`versions` of {name} must be a text, got {_shown(version)}")
+    for name, package in _object(record.get("packages", {}), "`packages`").items():
+        details = _object(package, f"`packages` of {name}")
+        if not all(isinstance(details.get(key), str) for key in ("version", "sha256")):
+            raise ValueError(f"`packages` of {name} must have version and sha256, got {_shown(package)}")
     for name, case in record["cases"].items():
         done = _object(case, f"case {name}").get("done")
         if type(done) is not int or done < 0:

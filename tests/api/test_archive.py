@@ -12,6 +12,7 @@ import pytest
 from radarsim.api import archive
 from radarsim.api.archive import Archive, write_archive
 from radarsim.errors import ConfigError, RadarsimError, StoreError
+from tests.program import command
 
 CONTENTS = {
     "results/a/curves.csv": b"k,sigma\n1,2\n",
@@ -111,6 +112,84 @@ def test_any_other_zip_is_refused(path, kind):
     rewritten(path, HOSTILE[kind])
     with pytest.raises(ConfigError, match=r"s\.zip: not as `radarsim pack` writes it: .*; nothing is read"):
         Archive(path)
+
+
+def patched(offset, value, form="<H", at=b"PK\1\2", last=True):
+    """The archive with a number changed in the list of files, or behind it, of the last such place."""
+
+    def alter(content):
+        place = content.rindex(at) if last else content.index(at)
+        struct.pack_into(form, content, place + offset, value)
+        return content
+
+    return alter
+
+
+def renamed(old, new):
+    """The archive with other bytes of equal number in all names of an entry."""
+
+    def alter(content):
+        assert len(old) == len(new)
+        assert old in content
+        return bytearray(bytes(content).replace(old, new))
+
+    return alter
+
+
+def with_zip64_end(content):
+    """The list of files also given by a 64-bit end, which says that there are more of them."""
+    end = content.rindex(b"PK\5\6")
+    record = struct.pack("<4sQ2H2L4Q", b"PK\6\6", 44, 45, 45, 0, 0, 2**40, 2**40, 2**40, 0)
+    locator = struct.pack("<4sLQL", b"PK\6\7", 0, end, 1)
+    return content[:end] + record + locator + content[end:]
+
+
+NAME = b"README.txt"
+HOSTILE_BYTES = {
+    "encrypted": patched(8, 1),
+    "strongly encrypted": patched(8, 0x41),
+    "sizes behind the content": patched(8, 8),
+    "names of another encoding": patched(8, 0x2000),
+    "compressed by LZMA": patched(10, 14),
+    "a method that nobody knows": patched(10, 99),
+    "on a second disk": patched(34, 1),
+    "sizes of 64 bits": patched(20, 0xFFFFFFFF, "<L"),
+    "a place of 64 bits": patched(42, 0xFFFFFFFF, "<L"),
+    "a list of 64 bits": with_zip64_end,
+    "another count of files": patched(8, 2, at=b"PK\5\6"),
+    "no files": patched(10, 0, at=b"PK\5\6"),
+    "a list elsewhere": patched(16, 7, "<L", at=b"PK\5\6"),
+    "a program before it": lambda content: bytearray(b"#!/bin/sh\n") + content,
+    "a zip in its tail": lambda content: content + content,
+    "a remark": lambda content: content[:-2] + b"\4\0evil",
+    "a zero in a name": renamed(NAME, b"README.tx\0"),
+    "a path of two halves": renamed(NAME, b"README.\0/x"),
+    "a name that turns around": renamed(NAME, "RE\u202etxt12".encode()[:10]),
+    "bytes that are no text": renamed(NAME, b"README.t\xff\xfe"),
+    "a tilde": renamed(NAME, b"~/.profile"),
+    "a network path": renamed(NAME, b"//host/abc"),
+    "a stream of Windows": renamed(NAME, b"README:evl"),
+    "a device": renamed(NAME, b"COM1.x.txt"),
+    "another device": renamed(NAME, "com¹.txtx".encode()[:10]),
+    "a point at the end": renamed(NAME, b"README.tx."),
+    "another name in the list": patched(46, 0x41, "<B"),
+    "a link": patched(38, (stat.S_IFLNK | 0o777) << 16, "<L"),
+    "a folder": patched(38, (stat.S_IFDIR | 0o777) << 16, "<L"),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE_BYTES)
+def test_any_other_bytes_are_refused(path, kind, tmp_path):
+    path.write_bytes(HOSTILE_BYTES[kind](bytearray(path.read_bytes())))
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises((ConfigError, StoreError), match="nothing is read"):
+        Archive(path)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_an_archive_in_an_archive_is_a_file_of_no_result(path, tmp_path):
+    write_archive(tmp_path / "outer.zip", {"study.zip": path.read_bytes()}, {"results": {"a": {}}})
+    assert "nothing is read" in command("check", tmp_path / "outer.zip", code=2).stderr
 
 
 def test_a_name_twice_is_refused(path):

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import tempfile
@@ -258,6 +259,19 @@ def test_a_forged_number_of_realisations_does_not_run_for_ever(study):
     told = command("check", study, code=3)
     assert "rls2: not computed again: 1,000,000,000,000 realisations are more than is computed here" in told.stderr
     assert told.stdout.splitlines()[-1].endswith(f"0 of {10**12:,} realisations computed again (0 %)")
+
+
+def test_a_large_run_is_announced(study, tmp_path):
+    repacked(study, lambda contents: forge_number(contents, 10**12))
+    told = command("run", study, "--time-limit", 0.01, "--no-figures", "--out", tmp_path / "again", code=3).stderr
+    assert re.match(r"note: rls2: 1 case, 1,000,000,000,000 realisations, about \d+:\d\d:\d\d on", told)
+
+
+@pytest.mark.parametrize("changes", [{"versions": "0.3"}, {"versions": {"radarsim": 3}}, {"packages": {"a": "1.0"}}])
+def test_a_record_of_another_shape_is_damaged(study, changes):
+    repacked(study, lambda contents: with_record(contents, **changes))
+    told = command("check", study, code=4).stderr
+    assert f"run.json: is no record of a run: `{next(iter(changes))}`" in told
 
 
 def test_results_of_other_versions_may_have_other_columns(study):
