@@ -88,9 +88,9 @@ def doctor(result: str | None, recompute: int, as_json: bool) -> None:
 
     RESULT is a folder such as results/rls2. Every output is checked against run.json, every stored block against its
     checksum, every total against its blocks. --recompute recomputes the N smallest pieces of each case, or a case
-    without usable blocks from the config, and compares the tables. If there is damage, each file is named and the exit code is
-    4: `radarsim run` computes what is missing, `radarsim report` rewrites tables. What could not be checked is said
-    last: exit code 3.
+    without usable blocks from the config, and compares the tables. If there is damage, each file is named and the exit
+    code is 4: `radarsim run` computes what is missing, `radarsim report` rewrites tables. What could not be checked is
+    said last: exit code 3.
 
     \b
     Examples
