@@ -11,14 +11,23 @@ from radarsim.engine.results import CaseResult
 from radarsim.extensions import extension_figures, extensions
 from radarsim.language.current import ENGLISH, current_language
 from radarsim.language.translate import tr, translate_names
-from radarsim.report import answer_warnings, caption_remarks, coinciding_lines, interval_notes, panel_layout, sentences
+from radarsim.report import (
+    answer_warnings,
+    caption_remarks,
+    coinciding_lines,
+    compared_value,
+    gain_sentences,
+    interval_notes,
+    panel_layout,
+    sentences,
+)
 from radarsim.report import tables as common
 from radarsim.report.drawing.model import Figure, reworded
 from radarsim.report.math_text import plain_text
+from radarsim.report.quantities import GAIN
 from radarsim.report.row_notes import has_note
 from radarsim.report.sentences import Sentence
 from radarsim.report.user_filters import rows as user_filters_rows
-from radarsim.report.wording import estimate
 from radarsim.studies.floors import floor_columns
 from radarsim.studies.interface import Study
 from radarsim.studies.registry import quantities, study
@@ -176,8 +185,8 @@ def _gains_against(result: CaseResult, tables_by_name: Mapping[str, "pd.DataFram
     last = last.groupby("filter", sort=False).tail(1)
     if not len(last):
         return []
-    keys = ("gain_percent", "gain_lo", "gain_hi")
-    texts = [f"{row['filter']} {estimate((row[key] for key in keys), '%', '.3g')}" for row in last.to_dict("records")]
+    gains_by_filter = [(row["filter"], compared_value.row_value(row, GAIN)) for _, row in last.iterrows()]
+    texts = [f"{name} {gain_sentences.percent_text(gain, result.count)}" for name, gain in gains_by_filter]
     text = tr(
         "{case}, gain in {component} against {base} at {t} s: {filters}.",
         case=result.name,
@@ -186,7 +195,7 @@ def _gains_against(result: CaseResult, tables_by_name: Mapping[str, "pd.DataFram
         t=f"{last['t_s'].max():g}",
         filters="; ".join(texts),
     )
-    return [Sentence(text, sentences.intervals("gains", "gain", last))]
+    return [Sentence(text, tuple(interval for _, gain in gains_by_filter for interval in gain.intervals))]
 
 
 def case_figures(

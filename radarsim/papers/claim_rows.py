@@ -158,7 +158,7 @@ def decisive_value_words(row: Mapping) -> str:
         return "–"
     if exact is None:
         return measured_words(row)
-    return tr("{value} exactly", value=f"{four_digits(exact)} {unit_after(exact, row['unit'])}".rstrip())
+    return tr("{value} (exact)", value=f"{four_digits(exact)} {unit_after(exact, row['unit'])}".rstrip())
 
 
 def unit_after(value: float, unit: str) -> str:

@@ -179,7 +179,7 @@ def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
         words.append(measured_words(row) + tr("; expected {words}", words=expected_words(row["expected"])))
     if (exact := cell_number(row["exact"])) is not None:
         words.append(
-            tr("exactly {value}", value=four_digits(exact) if exact == round(exact) else format_if_known(exact))
+            tr("{value} (exact)", value=four_digits(exact) if exact == round(exact) else format_if_known(exact))
         )
     if miss := cell_number(row["miss"]):
         words.append(tr("off by {miss:.3g} margins", miss=miss))

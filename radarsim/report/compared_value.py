@@ -106,6 +106,40 @@ def sigma_value(row: Row, tables_by_name: "Mapping[str, pd.DataFrame]") -> Compa
     return measured
 
 
+def sigma_gain(row: Row, other: Row, tables_by_name: "Mapping[str, pd.DataFrame]") -> Estimate:
+    """The gain in σ of a row of `curves` over another one of the same case, component and scan, per cent.
+
+    Exact where both are; else the narrowest of what is measured on its own and of gains over a common baseline, taken
+    as independent of each other: as they are not, the interval is too wide rather than too narrow."""
+    first, second = row_value(row), row_value(other)
+    if first.is_exact and second.is_exact:
+        gain = 100 * (1 - first.value / second.value)
+        return Estimate(gain, gain, gain)
+    gains = tables.select_rows(tables_by_name["gains"], **{name: row[name] for name in ("case", "component", "k")})
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pairs = [[Estimate(*np.log(np.asarray(value.estimate, dtype=float))) for value in (first, second)]]
+    for baseline in dict.fromkeys(gains["baseline"]):
+        rows = {gain_row["filter"]: gain_row for _, gain_row in gains[gains["baseline"] == baseline].iterrows()}
+        pairs.append([_log_ratio(each["filter"], baseline, rows) for each in (row, other)])
+    differences = [statistics.difference(*pair) for pair in pairs]
+    known = [difference for difference in differences if difference.hi >= difference.lo]
+    if not known:
+        return Estimate(np.nan, -np.inf, np.inf)
+    ratio = min(known, key=lambda difference: float(difference.hi - difference.lo))
+    return Estimate(*(float(-100 * np.expm1(ratio[i])) for i in (0, 2, 1)))
+
+
+def _log_ratio(name: str, baseline: str, gain_rows: Mapping[str, Row]) -> Estimate:
+    """The logarithm of a filter's σ over its baseline's, from rows of `gains`; not-a-number without one."""
+    if name == baseline:
+        return Estimate(0.0, 0.0, 0.0)
+    if name not in gain_rows:
+        return Estimate(np.nan, np.nan, np.nan)
+    gain = row_value(gain_rows[name], GAIN).estimate
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return Estimate(*(float(np.log1p(-gain[i] / 100)) for i in (0, 2, 1)))
+
+
 def extreme(rows: "pd.DataFrame", quantity: Quantity, largest: bool = True) -> "tuple[pd.Series[Any], ComparedValue]":
     """The row with the largest or the smallest value, exact values first, and its value.
 

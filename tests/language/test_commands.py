@@ -147,11 +147,11 @@ def test_every_reason_that_the_sources_give_is_known():
 def test_units_that_count_have_the_form_of_their_number():
     found = {"measured": 1.0, "exact": 1.0, "judged_lo": "", "judged_hi": "", "lo": 0.0, "hi": 3.0, "unit": "scans"}
     assert [unit_after(n, "scans") for n in (1, 2, 0.5)] == ["scan", "scans", "scans"]
-    assert decisive_value_words(found) == "1 scan exactly"
+    assert decisive_value_words(found) == "1 scan (exact)"
     with use_language("ru"):
         said = [unit_after(n, "scans") for n in (1, -2, 5, 1.5, 21, float("inf"))]
         assert said == ["обзор", "обзора", "обзоров", "обзора", "обзор", "обзора"]
-        assert decisive_value_words(found) == "1 обзор точно"
+        assert decisive_value_words(found) == "1 обзор (точно)"
         assert expected_words("about 2 to 5", "plots").endswith(" 5 отметок")
         assert expected_words("0.5", "%") == "0,5 %"
         assert expected_words("few") == tr("few")

@@ -129,7 +129,7 @@ def test_figures_have_all_sides_on_common_axes_and_sentences_the_exact_change(er
     assert len([mark for mark in apart.marks if isinstance(mark, Line)]) == 2
     looks = {(m.style.colour, m.style.dash) for m in values.marks}
     assert len(looks) == 4
-    assert sentences.sentences(made)[1].endswith("], exactly 0 %.")
+    assert sentences.sentences(made)[1].endswith(": 0 % (exact).")
     assert sentences.percent_text(2886.76) == "29.9 times"
 
 

@@ -69,6 +69,17 @@ def test_sigma_beside_an_exact_rival_is_the_exact_one_times_the_paired_ratio():
     assert compared_value.sigma_value(rows["some"], tables).text("m") == "139.3 m [134, 144]"  # of other realisations
 
 
+def test_two_sigmas_are_compared_by_what_is_known_best():
+    rows = {row["filter"]: row for _, row in CURVES.iterrows()}
+    tables = {"curves": CURVES, "gains": GAINS}
+    gain = compared_value.sigma_gain(rows["base"], rows["mine"], tables)
+    assert 0 < gain.lo < gain.value < gain.hi < 1.1  # unpaired, 161.3 [152, 171.8] against 154.7 decides nothing
+    reverse = compared_value.sigma_gain(rows["mine"], rows["base"], tables)
+    np.testing.assert_allclose(reverse, [-0.707, -0.999, -0.416])
+    exact = compared_value.sigma_gain(rows["base"], rows["base"], tables)
+    assert (exact.lo, exact.hi) == (0.0, 0.0)
+
+
 def test_an_extreme_is_the_exact_one_or_says_that_it_was_chosen():
     rows = pd.DataFrame({"gain_percent": [33.8, 30.0], "gain_lo": [31.1, 28.0], "gain_hi": [36.7, 32.0]})
     row, value = compared_value.extreme(rows, GAIN)
@@ -112,4 +123,4 @@ def test_values_that_noise_orders_are_not_distinguished():
     assert compared_value.are_distinguished(close[0], close[2])
     exact = [ComparedValue(Estimate(v, v, v), True) for v in (1.0, 1.0)]
     assert not compared_value.are_distinguished(*exact)
-    assert SIGMA.known == "exact_sigma"
+    assert SIGMA.exact_column == "exact_sigma"

@@ -70,11 +70,18 @@ def _sentence(words: str, row: dict[Any, Any]) -> str:
         label=row["label"],
         filter=row["filter"],
         what=subject,
-        value=f"{value_text(row['value'])} {unit}".rstrip(),
-        against=f"{value_text(row['against'])} {unit}".rstrip(),
+        value=_value(row, "value", "exact", unit),
+        against=_value(row, "against", "against_exact", unit),
         other=partner,
-        change=change + (tr(", exactly {value}", value=exact) if exact else ""),
+        change=tr("{value} (exact)", value=exact) if exact else change,
     )
+
+
+def _value(row: dict[Any, Any], measured: str, exact: str, unit: str) -> str:
+    """The exact value of a side where both have one, as their difference then is; else the measured one."""
+    if row["exact"] == row["exact"] and row["against_exact"] == row["against_exact"]:
+        return tr("{value} (exact)", value=f"{value_text(row[exact])} {unit}".rstrip())
+    return f"{value_text(row[measured])} {unit}".rstrip()
 
 
 def change_texts(row: dict[Any, Any]) -> tuple[str, str]:

@@ -9,7 +9,8 @@ import numpy as np
 from radarsim.config.experiment import Case, Experiment
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, plural, tr
-from radarsim.report import case_selection, key_labels, rare_events, sentences, tables, wording
+from radarsim.report import case_selection, compared_value, key_labels, rare_events, sentences, tables, wording
+from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.studies.ambiguous_doppler.kernels.layout import OFF_BY_HALF_SPAN_SUM
 from radarsim.studies.ambiguous_doppler.study import prepare, simulate
@@ -92,15 +93,26 @@ def _reported_filters(result: Result) -> list[str]:
 def _largest_errors(result: Result, tables_by_name: TablesByName) -> "pd.DataFrame":
     """The row of each filter's largest σ of range over the scans; the first plot is common.
 
-    decides: σ, exact where it is known exactly"""
+    decides: σ, exact where it is known exactly; looks: measured values among which it was chosen"""
     curves = tables.select_rows(tables_by_name["curves"], case=result.name, component="r")
     curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
-    curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"))
+    looks = curves["exact_sigma"].isna().groupby(curves["filter"]).transform("sum")
+    curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"), looks=looks)
     return curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
 
 
+def _largest_sigma(row: "pd.Series[Any]") -> ComparedValue:
+    """σ of a row of `_largest_errors`; of measured ones with an interval for all scans."""
+    return compared_value.row_value(row).chosen_among(int(row["looks"]))
+
+
 def _sigma_m(row: "pd.Series[Any]") -> str:
-    return wording.estimate((row["sigma"], row["sigma_lo"], row["sigma_hi"]), tr("m"))
+    return _largest_sigma(row).text(tr("m"))
+
+
+def _scans_remark(rows: "Iterable[pd.Series[Any]]") -> str:
+    """That intervals hold for all scans at once, where a largest value was measured."""
+    return " " + tr("(intervals for all scans at once)") if any(_largest_sigma(row).looks > 1 for row in rows) else ""
 
 
 def _least_error_of_all(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
@@ -121,10 +133,13 @@ def _least_error_of_all(results: Sequence[Result], tables_by_name: TablesByName)
         return []
     best_row, _ = worst_rows[ranked[0]]
     other_row, other_case = worst_rows[other_kind[0]]
+    if not compared_value.are_distinguished(_largest_sigma(best_row), _largest_sigma(other_row)):
+        return []
     text = plural(
-        "{best} keeps σ of the range after the first plot within {least}; {kind}, {other}, comes to {most} ({where}).",
+        "{best} keeps σ of the range after the first plot within {least}; {kind}, {other}, comes to {most} "
+        "({where}){scans}.",
         "{best} keeps σ of the range after the first plot within {least} in all {count} cases; {kind}, {other}, "
-        "comes to {most} ({where}).",
+        "comes to {most} ({where}){scans}.",
         len(combining),
         best=ranked[0],
         least=_sigma_m(best_row),
@@ -132,8 +147,9 @@ def _least_error_of_all(results: Sequence[Result], tables_by_name: TablesByName)
         other=other_kind[0],
         most=_sigma_m(other_row),
         where=key_labels.plain_case_label(other_case),
+        scans=_scans_remark((best_row, other_row)),
     )
-    return [Sentence(text, sentences.intervals("curves", "sigma", best_row, other_row))]
+    return [Sentence(text, (*_largest_sigma(best_row).intervals, *_largest_sigma(other_row).intervals))]
 
 
 def _orders_sentence(result: Result, tables_by_name: TablesByName) -> list[Sentence]:
@@ -147,7 +163,8 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName) -> list[Sente
         tr("{filter}, {sigma} at scan {k}", filter=row["filter"], sigma=_sigma_m(row), k=row["k"])
         for _, row in worst.iterrows()
     ]
-    clauses = [tr("largest σ of the range after the first plot: {filters}", filters="; ".join(errors))]
+    scans = _scans_remark(row for _, row in worst.iterrows())
+    clauses = [tr("largest σ of the range after the first plot: {filters}", filters="; ".join(errors)) + scans]
     axes = result.axes
     best_order, best_combination = (
         float(np.min(np.max(sigma[axes.combines, 1:, 0], axis=1))) for sigma in (axes.best_order, axes.best_combination)
@@ -164,7 +181,8 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName) -> list[Sente
     elif np.isfinite(best_order):
         clauses.append(tr("with the trajectory known, the best order of each scan gives {best:.4g} m", best=best_order))
     text = f"{key_labels.plain_case_label(result)}: {'; '.join(clauses)}."
-    return [Sentence(text, sentences.intervals("curves", "sigma", worst))]
+    intervals = [interval for _, row in worst.iterrows() for interval in _largest_sigma(row).intervals]
+    return [Sentence(text, tuple(intervals))]
 
 
 class _CaseComparison(NamedTuple):

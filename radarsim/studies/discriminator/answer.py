@@ -7,8 +7,18 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import plural, shorten_names, tr
-from radarsim.report import case_selection, key_labels, rare_events, sentences, tables, wording
+from radarsim.language.translate import plural, shorten_names, term, tr
+from radarsim.report import (
+    case_selection,
+    compared_value,
+    key_labels,
+    rare_events,
+    sentences,
+    statistics,
+    tables,
+    wording,
+)
+from radarsim.report.quantities import LOCK, Quantity
 from radarsim.report.sentences import Sentence
 from radarsim.studies.discriminator.kernels.sums import LOCKS
 from radarsim.studies.discriminator.tables import last_locks
@@ -18,6 +28,7 @@ if TYPE_CHECKING:
 
 
 TablesByName = Mapping[str, "pd.DataFrame"]
+LOSS = Quantity("loss", term("rate of lost locks"), "rare", "rate")  # a size, as rare ones differ by factors
 
 
 def question(experiment: Experiment) -> str:
@@ -60,16 +71,17 @@ def _worst_against_design(results: Sequence[CaseResult], tables_by_name: TablesB
     if not losses:
         return []
     times, designed, row = max(losses, key=lambda loss: loss[0])
+    rate = compared_value.row_value(row, LOSS).chosen_among(len(losses))
     text = tr(
-        "{estimator} loses lock in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts where it was designed for "
-        "{designed:.3g}, {times:.3g} times as often, the most of {count} cases.",
+        "{estimator} loses lock in {rate} of the bursts where it was designed for {designed:.3g}, {times:.3g} times as "
+        "often, the most of {count} cases (interval for all of them).",
         estimator=row["filter"],
+        rate=rate.text(form=".3g"),
         designed=designed,
         times=times,
         count=len(losses),
-        **rare_events.rate_fields(row),
     )
-    return [Sentence(text, sentences.intervals("rare", "rate", row))]
+    return [Sentence(text, rate.intervals)]
 
 
 def _case_sentences(result: CaseResult, tables_by_name: TablesByName) -> list[Sentence]:
@@ -101,14 +113,17 @@ def _first_estimator(result: CaseResult, row: "pd.Series[Any]", name: str) -> Se
         return Sentence(text, _lock_intervals(row))
     plain_bursts = max(result.sums["locks"][0, k - 1, LOCKS.index("lock")], 1)
     bound = result.axes.posterior_sigma[0, k - 1] / result.axes.exact_sigma[0, k - 1]
-    ratio = np.sqrt(result.sums["error"][0, k - 1, :, 1] / plain_bursts) / bound
-    fields |= {"least": ratio.min(), "most": ratio.max()}
+    moments = np.asarray(result.sums["error"])[0, k - 1]
+    sigma = statistics.root_mean_square(moments[:, 1], moments[:, 3], plain_bursts, looks=len(moments))
+    lowest, highest = int((sigma.value / bound).argmin()), int((sigma.value / bound).argmax())
+    ratios = {"least": lowest, "most": highest}
+    fields |= {name: wording.estimate((end[i] / bound[i] for end in sigma), form=".3f") for name, i in ratios.items()}
     if result.spec.rare is not None:
         text = plural(
-            "{estimator}: {count} window; σ of the locked over the bound (forecast included) {least:.3f} to "
-            "{most:.3f}, of {plain:,} bursts without importance sampling.",
-            "{estimator}: {count} windows; σ of the locked over the bound (forecast included) {least:.3f} to "
-            "{most:.3f}, of {plain:,} bursts without importance sampling.",
+            "{estimator}: {count} window; σ of the locked over the bound (forecast included) {least} to {most}, "
+            "of {plain:,} bursts without importance sampling.",
+            "{estimator}: {count} windows; σ of the locked over the bound (forecast included) {least} to {most}, "
+            "of {plain:,} bursts without importance sampling.",
             k,
             plain=int(plain_bursts),
             **fields,
@@ -116,9 +131,9 @@ def _first_estimator(result: CaseResult, row: "pd.Series[Any]", name: str) -> Se
         return Sentence(text)
     text = plural(
         "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
-        "(forecast included) {least:.3f} to {most:.3f}.",
+        "(forecast included) {least} to {most}.",
         "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
-        "(forecast included) {least:.3f} to {most:.3f}.",
+        "(forecast included) {least} to {most}.",
         k,
         **fields,
     )
@@ -132,12 +147,13 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
     cases.sort(key=lambda result: rows[result.name]["lock_rate"])
     extremes = (cases[0], cases[-1])
     lowest, highest = (
-        f"{_lock_rate(rows[result.name])} ({key_labels.without_markup(key_labels.swept_description(result))})"
+        f"{_lock_rate(rows[result.name], len(cases))} ({case_name})"
         for result in extremes
+        if (case_name := key_labels.without_markup(key_labels.swept_description(result)))
     )
     text = plural(
         "{estimator}: locked in {least} to {most}; {count} case of {realisations}.",
-        "{estimator}: locked in {least} to {most}; {count} cases of {realisations}.",
+        "{estimator}: locked in {least} to {most}; {count} cases of {realisations} (intervals for all of them).",
         len(cases),
         estimator=name,
         least=lowest,
@@ -147,9 +163,9 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
     return Sentence(text, _lock_intervals(*(rows[result.name] for result in extremes)))
 
 
-def _lock_rate(row: "pd.Series[Any]") -> str:
-    """A share of bursts with its interval."""
-    return wording.share(*(100 * row[name] for name in ("lock_rate", "lock_lo", "lock_hi")))
+def _lock_rate(row: "pd.Series[Any]", looks: int = 1) -> str:
+    """A share of bursts with its interval; of one that was chosen among several, with one that holds for all."""
+    return wording.share(*(100 * end for end in compared_value.row_value(row, LOCK).chosen_among(looks).estimate))
 
 
 def _lock_intervals(*rows: "pd.Series[Any]") -> tuple[sentences.MeasuredInterval, ...]:

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language.translate import join_names, tr
-from radarsim.report import case_selection, key_labels, sentences, tables, wording
+from radarsim.language.translate import join_names, term, tr
+from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
+from radarsim.report.quantities import Quantity
 from radarsim.report.sentences import Sentence
 from radarsim.studies.pulses_to_tracks.tables import Result
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 TablesByName = Mapping[str, "pd.DataFrame"]
-RATIO = ("over_ideal", "over_ideal_lo", "over_ideal_hi")
+RATIO = Quantity("over_ideal", term("σ over that of the idealisation"), "idealisations", "paired_over_ideal")
 MAX_RATIO_OF_IDEAL = 1.05  # σ over its idealisation's, up to which the idealisation holds
 
 
@@ -66,13 +67,17 @@ def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName)
     case_names = dict(
         zip((result.name for result in results), case_selection.distinct_case_names(results), strict=True)
     )
-    final = final[final["case"].isin(case_names)].dropna(subset=["over_ideal"])
-    worst = final.sort_values("over_ideal", kind="stable").groupby("filter", sort=False).tail(1)
+    final = final[final["case"].isin(case_names)].dropna(subset=[RATIO.value])
+    worst = final.sort_values(RATIO.value, kind="stable").groupby("filter", sort=False).tail(1)
     if not len(worst):
         return []
-    ratios = [f"{row['filter']} {_ratio(row)} ({case_names[row['case']]})" for row in worst.to_dict("records")]
+    ratios = [
+        f"{row['filter']} {_ratio(row, looks=len(results))} ({case_names[row['case']]})"
+        for row in worst.to_dict("records")
+    ]
     text = tr(
-        "σ of the range at the last scan over its idealisation's, at worst of {count} cases: {found}.",
+        "σ of the range at the last scan over its idealisation's, at worst of {count} cases: {found} (intervals for "
+        "all cases).",
         count=len(results),
         found="; ".join(ratios),
     )
@@ -88,8 +93,8 @@ def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Senten
     filters = [name for f, name in enumerate(axes.filters) if axes.ideal[f] >= 0]
     case_sentences = []
     if len(filters) > 1:
-        clause = _nearest_and_furthest(result, tables_by_name, filters)
-        case_sentences.append(clause.with_text(f"{case}: {clause.text}."))
+        for clause in _nearest_and_furthest(result, tables_by_name, filters):
+            case_sentences.append(clause.with_text(f"{case}: {clause.text}."))
     for name in filters:
         clause = _locks_and_ratio(result, tables_by_name, name)
         case_sentences.append(clause.with_text(f"{case}, {name}: {clause.text}."))
@@ -112,20 +117,27 @@ def _burst_sentence(result: Result, case: str, sigma: float) -> Sentence:
     return Sentence(text)
 
 
-def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters: Sequence[str]) -> Sentence:
-    """The filters whose last σ of the range is nearest to their idealisation's and furthest from it."""
+def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters: Sequence[str]) -> list[Sentence]:
+    """The filters whose last σ of the range is nearest to their idealisation's and furthest from it.
+
+    None where they cannot be distinguished."""
     final = tables.select_rows(tables_by_name["idealisations"], case=result.name, component="r")
     final = final.groupby("filter", sort=False).tail(1)
-    final = final[final["filter"].isin(filters)].sort_values("over_ideal", kind="stable").iloc[[0, -1]]
+    final = final[final["filter"].isin(filters)].sort_values(RATIO.value, kind="stable").iloc[[0, -1]]
     nearest, furthest = final.to_dict("records")
+    values = [compared_value.row_value(row, RATIO).chosen_among(len(filters)) for row in (nearest, furthest)]
+    if not compared_value.are_distinguished(*values):
+        return []
     text = tr(
-        "with {best} σ of the range at the last scan is {near} times its idealisation's, with {worst} {far} times",
+        "with {best} σ of the range at the last scan is {near} times its idealisation's, with {worst} {far} times"
+        "{chosen}",
         best=nearest["filter"],
-        near=_ratio(nearest),
+        near=_ratio(nearest, looks=len(filters)),
         worst=furthest["filter"],
-        far=_ratio(furthest),
+        far=_ratio(furthest, looks=len(filters)),
+        chosen=values[0].choice_remark(),
     )
-    return Sentence(text, _ratio_intervals(final))
+    return [Sentence(text, _ratio_intervals(final))]
 
 
 def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:
@@ -136,7 +148,7 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
     locked = tr("at least {share} of the bursts of a scan lock", share=share)
     ratios = tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
     final = ratios.iloc[-1]
-    if final["over_ideal_hi"] <= MAX_RATIO_OF_IDEAL:
+    if final[RATIO.ends[1]] <= MAX_RATIO_OF_IDEAL:
         ratio = tr(
             "σ of the range at the last scan is that of its idealisation, {ratio} times", ratio=_ratio(final, ".4g")
         )
@@ -145,9 +157,9 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
     return Sentence(f"{locked}; {ratio}", (*sentences.intervals("locks", "lock", worst), *_ratio_intervals(final)))
 
 
-def _ratio(row: "Mapping[Any, Any] | pd.Series[Any]", form: str = ".3g") -> str:
-    return wording.estimate((row[key] for key in RATIO), form=form)
+def _ratio(row: "Mapping[Any, Any] | pd.Series[Any]", form: str = ".3g", looks: int = 1) -> str:
+    return compared_value.row_value(row, RATIO).chosen_among(looks).text(form=form)
 
 
 def _ratio_intervals(rows: "pd.DataFrame | pd.Series[Any]") -> tuple[sentences.MeasuredInterval, ...]:
-    return sentences.intervals("idealisations", "over_ideal", rows)
+    return sentences.intervals("idealisations", "paired_over_ideal", rows)

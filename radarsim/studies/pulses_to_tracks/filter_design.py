@@ -123,7 +123,20 @@ def _filter_arrays(
         whole_burst=whole_burst,
         sigma=sigma,
         baseline=names.index(spec.baseline) if spec.baseline else 0,
+        ideals=np.array([idealisation(spec, options) for options in spec.filters]),
     )
+
+
+def idealisation(spec: Any, options: Any) -> int:
+    """The number of the filter with ideal errors that is otherwise the same; −1: there is none, or it is the filter."""
+    if not options.takes or options.estimator == "fisher_bound":
+        return -1
+    for i, candidate in enumerate(spec.filters):
+        keys = ("observes", "manoeuvre_variance", "process_noise")
+        is_same = all(getattr(candidate, key) == getattr(options, key) for key in keys)
+        if is_same and candidate.estimator == "fisher_bound" and candidate.derivatives == options.derivatives:
+            return i
+    return -1
 
 
 def _window_records(

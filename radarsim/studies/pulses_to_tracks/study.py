@@ -150,22 +150,10 @@ def axes(
         bound=bound,
         takes=np.array([options.takes for options in spec.filters]),
         energy_db=10.0 * np.log10([energy_ratio(options, options.duration_s) for options in bursts]),
-        ideal=np.array([idealisation(spec, options) for options in spec.filters]),
+        ideal=arrays.ideals,
         lost_squares=losses,
         max_loss_probability=max_losses,
     )
-
-
-def idealisation(spec: Any, options: Any) -> int:
-    """The number of the filter with ideal errors that is otherwise the same; −1: there is none, or it is the filter."""
-    if not options.takes or options.estimator == "fisher_bound":
-        return -1
-    for i, candidate in enumerate(spec.filters):
-        keys = ("observes", "manoeuvre_variance", "process_noise")
-        is_same = all(getattr(candidate, key) == getattr(options, key) for key in keys)
-        if is_same and candidate.estimator == "fisher_bound" and candidate.derivatives == options.derivatives:
-            return i
-    return -1
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:

@@ -153,6 +153,7 @@ def _ideal(result: Result) -> report_tables.Columns:
 
     ideal: name of the idealisation, a filter that is otherwise the same
     over_ideal ±: σ over the exact σ of that
+    paired_over_ideal ±: σ over the measured σ of that, in the same bursts
     """
     axes = result.axes
     indices = f, k, c = report_tables.row_index(
@@ -161,6 +162,11 @@ def _ideal(result: Result) -> report_tables.Columns:
     moments = np.asarray(result.sums["error"])[indices]
     sigmas = statistics.errors(moments, np.full(f.size, float(result.count))).sigma
     exact = axes.exact_sigma[axes.ideal[f], k, c]
+    ideal_moments = np.asarray(result.sums["error"])[axes.ideal[f], k, c]
+    gain = statistics.gain(
+        *(moments[:, 1], moments[:, 3], ideal_moments[:, 1], ideal_moments[:, 3]),
+        *(np.asarray(result.sums["paired_ideal"])[indices], np.full(f.size, float(result.count))),
+    )
     return {
         **report_tables.label_columns(
             result,
@@ -170,6 +176,7 @@ def _ideal(result: Result) -> report_tables.Columns:
             **report_tables.component_columns(result, c),
         ),
         "over_ideal": statistics.Estimate(*(value / exact for value in sigmas)),
+        "paired_over_ideal": statistics.Estimate(*(1 - gain[i] / 100 for i in (0, 2, 1))),
     }
 
 

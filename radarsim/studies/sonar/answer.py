@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import shorten_names, tr
-from radarsim.report import case_selection, consistency_tables, key_labels, sentences, tables, wording
+from radarsim.report import case_selection, compared_value, consistency_tables, key_labels, sentences, tables, wording
+from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.axes import SonarAxes
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
@@ -43,7 +44,7 @@ def answer(results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[st
 
     First what the question is about: the bias of the conversion, or what correlated errors do to a filter's own σ."""
     reported, remark = case_selection.select_reported(results)
-    sigma = [_final_sigma(result, tables_by_name["curves"]) for result in reported]
+    sigma = [_final_sigma(result, tables_by_name) for result in reported]
     optimistic = _most_optimistic(results, tables_by_name)
     if _has_correlated_errors([result.spec for result in results]):
         return [*optimistic, *sigma, *map(Sentence, remark)]
@@ -85,38 +86,35 @@ def _bias_fields(results: Sequence[CaseResult[SonarAxes]], row: "pd.Series[Any]"
     }
 
 
-def _final_sigma(result: CaseResult[SonarAxes], curves: "pd.DataFrame") -> Sentence:
-    """The filters with the least and the largest σ at the end of a case."""
+def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd.DataFrame]") -> Sentence:
+    """The filters with the least and the largest σ at the end of a case, unless noise decides which they are."""
     component = result.axes.components[0][0]
-    rows = tables.select_rows(curves, case=result.name, component=component)
+    rows = tables.select_rows(tables_by_name["curves"], case=result.name, component=component)
     final = rows[rows["k"] == rows["k"].max()]
     # By exact values where all are known, so that filters of equal accuracy are not ranked by their noise.
     order = final["exact_sigma"] if final["exact_sigma"].notna().all() else final["sigma"]
     order = order.round(SIGMA_DECIMALS)
     lowest, highest = (final.loc[order == extreme] for extreme in (order.min(), order.max()))
+    values = [compared_value.sigma_value(rows.iloc[0], tables_by_name) for rows in (lowest, highest)]
     fields = {
         "quantity": COMPONENTS_BY_NAME[component].words,
         "t_s": final["t_s"].iloc[0],
-        "least": _filters_and_sigma(lowest),
-        "most": _filters_and_sigma(highest),
+        "least": _filters_and_sigma(lowest, values[0]),
+        "most": _filters_and_sigma(highest, values[1]),
     }
-    if order.nunique() > 1:
+    if order.nunique() == 1:
+        text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)
+    elif compared_value.sigma_gain(lowest.iloc[0], highest.iloc[0], tables_by_name).lo > 0:
         text = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **fields)
     else:
-        text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)
-    return Sentence(
-        case_selection.after_swept_values(result, text),
-        sentences.intervals("curves", "sigma", lowest.iloc[0], highest.iloc[0]),
-    )
+        text = tr("σ of the {quantity} after {t_s:g} s: {least}, and {most}, not distinguished.", **fields)
+    intervals = [interval for value in values for interval in value.intervals]
+    return Sentence(case_selection.after_swept_values(result, text), tuple(intervals))
 
 
-def _filters_and_sigma(rows: "pd.DataFrame") -> str:
+def _filters_and_sigma(rows: "pd.DataFrame", sigma: ComparedValue) -> str:
     """Filters of equal σ, and it with the interval."""
-    row = rows.iloc[0]
-    sigma = wording.estimate(
-        (row[key] for key in ("sigma", "sigma_lo", "sigma_hi")), key_labels.unit_label(row["unit"])
-    )
-    return f"{shorten_names(list(rows['filter']))}, {sigma}"
+    return f"{shorten_names(list(rows['filter']))}, {sigma.text(key_labels.unit_label(rows['unit'].iloc[0]))}"
 
 
 def _most_optimistic(

@@ -193,7 +193,7 @@ def run_filter(world, filters, f, first, work, errors, sums):
 
 @kernel_part
 def add_pairs(errors, base, paired):
-    """Add e² times the baseline's; errors and base (K, n, 3)."""
+    """Add e² times another filter's; errors and base (K, n, 3)."""
     for k in range(errors.shape[0]):
         for i in range(errors.shape[1]):
             for c in range(3):
@@ -207,6 +207,8 @@ def run_block(world, filters, first, work, errors, sums):
         run_filter(world, filters, f, first, work, errors[f], sums)
     for f in range(filters.filters.size):
         add_pairs(errors[f], errors[filters.baseline], sums.paired[f])
+        if filters.ideals[f] >= 0:
+            add_pairs(errors[f], errors[filters.ideals[f]], sums.paired_ideal[f])
 
 
 def simulate_block(world, filters, sums, first, count) -> np.ndarray:

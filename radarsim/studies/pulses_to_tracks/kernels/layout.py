@@ -77,6 +77,7 @@ class Filters(NamedTuple):
     whole_burst: np.ndarray  #: (F, K) index of the window of the whole burst without forecast
     sigma: np.ndarray  #: (F, K, 2) Fisher bounds of velocity and acceleration
     baseline: int  #: number of the filter that gains are relative to
+    ideals: np.ndarray  #: (F,) numbers of their idealisations; −1: none
 
 
 class Hypotheses(NamedTuple):
@@ -128,6 +129,7 @@ class Sums(NamedTuple):
 
     error: np.ndarray  #: (F, K, 3, 4) e, e², e³, e⁴ of range, velocity, acceleration
     paired: np.ndarray  #: (F, K, 3) e² times the baseline's
+    paired_ideal: np.ndarray  #: (F, K, 3) e² times the idealisation's
     #: (F, K, 2, 2, 2) e², e⁴ of the burst's velocity and acceleration: over bursts that locked, over all
     measured: np.ndarray
     locks: np.ndarray  #: (F, K, COUNTS) see above
@@ -143,6 +145,7 @@ def shapes(filters: int, scans: int) -> dict[str, tuple[int, ...]]:
     return {
         "error": (*scans_shape, 3, 4),
         "paired": (*scans_shape, 3),
+        "paired_ideal": (*scans_shape, 3),
         "measured": (*scans_shape, 2, 2, 2),
         "locks": (*scans_shape, COUNTS),
         "ages": (*scans_shape, AGES),

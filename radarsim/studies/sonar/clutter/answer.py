@@ -3,11 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import tr
-from radarsim.report import key_labels, rare_events, sentences, tables, wording
+from radarsim.report import case_selection, key_labels, rare_events, sentences, tables, wording
 from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.tables import ENDED_TRACK_EVENT, FALSE_TRACK_EVENT
@@ -15,6 +13,8 @@ from radarsim.studies.sonar.config import Keys
 
 if TYPE_CHECKING:
     import pandas as pd
+
+MAX_CASES = 3  # each with a sentence on its trackers
 
 
 def question(specs: Sequence[Keys]) -> str:
@@ -26,41 +26,30 @@ def question(specs: Sequence[Keys]) -> str:
 
 
 def answer(results: Sequence[CaseResult[ClutterAxes]], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
-    """Of the case in which tracks end most often: the tracker that keeps them longest, the others, what is rare.
+    """Of each case, of many of the first and the last: the time to a confirmed track of each tracker, how long it keeps
+    it, false tracks per hour; then what is rare.
 
-    Of each: the time to a confirmed track, track life, false tracks per hour."""
-    events = tables_by_name.get("rare")
-    ranked = _ranked_trackers(tables_by_name["tracking"], events)
-    case_name = ranked.groupby("case", sort=False)["ends"].min().idxmax()
-    result = next(result for result in results if result.name == case_name)
-    sought = None if events is None else events[(events["case"] == case_name) & events["sought"]]
-    longest, *other_trackers = (
-        _tracker_clause(row, sought) for _, row in tables.select_rows(ranked, case=case_name).iterrows()
-    )
-    case = key_labels.without_markup(key_labels.swept_description(result)) or key_labels.plain_case_label(result)
-    text = tr("Longest track life: {tracker}.", tracker=longest.text)
-    if len(results) > 1:
-        text = tr("Longest track life in the hardest case, {case}: {tracker}.", case=case, tracker=longest.text)
-    answer = [longest.with_text(text)]
-    if other_trackers:
-        clauses = sentences.join("; ", other_trackers)
-        answer.append(clauses.with_text(tr("The others there: {trackers}.", trackers=clauses.text)))
+    Trackers are not ranked, nor cases called hard, by the life of tracks: tracks kept on false plots live long too."""
+    events, tracking = tables_by_name.get("rare"), tables_by_name["tracking"]
+    reported, remark = case_selection.select_reported(results, MAX_CASES)
+    answer = []
+    for result in reported:
+        sought = None if events is None else events[(events["case"] == result.name) & events["sought"]]
+        rows = tables.select_rows(tracking, case=result.name)
+        clauses = sentences.join("; ", [_tracker_clause(row, sought) for _, row in rows.iterrows()])
+        case = key_labels.without_markup(key_labels.swept_description(result))
+        answer.append(clauses.with_text(f"{case}: {clauses.text}." if case else f"{clauses.text}."))
+        answer += _sentences_on_rare_events(sought)
+    return [*answer, *map(Sentence, remark)]
+
+
+def _sentences_on_rare_events(sought: "pd.DataFrame | None") -> list[Sentence]:
+    """From which events importance sampling has the rates of a case."""
+    answer = []
     for event, make_sentence in ((FALSE_TRACK_EVENT, _false_tracks_sought), (ENDED_TRACK_EVENT, _ended_tracks_sought)):
         if sought is not None and (sought["event"] == event).any():
             answer.append(make_sentence(sought[sought["event"] == event]))
     return answer
-
-
-def _ranked_trackers(tracking: "pd.DataFrame", events: "pd.DataFrame | None") -> "pd.DataFrame":
-    """The rows of `tracking` by how often tracks end, which `ends` gives, then by false tracks.
-
-    Ends by importance sampling where they are known of every tracker."""
-    ends = tracking["ends_per_hour"].fillna(np.inf)
-    if events is not None:
-        ended = events[events["sought"] & (events["event"] == ENDED_TRACK_EVENT)]
-        rates = tracking.merge(ended[["case", "filter", "rate"]], "left", ["case", "filter"])["rate"]
-        ends = ends if rates.isna().any() else rates
-    return tracking.assign(ends=ends).sort_values(["ends", "false_tracks_per_hour"], kind="stable")
 
 
 def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import term, tr
-from radarsim.report import case_selection, key_labels, sentences, tables, wording
+from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
+from radarsim.report.quantities import Quantity
 from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+ALARM = Quantity("alarm", term("probability of an alarm"), "detections", "probability", "exact", kind="share")
+ALARM_ENDS = {"lo": "probability_lo", "hi": "probability_hi"}
 USES = {
     "course": term("course"),
     "speed": term("speed"),
@@ -58,7 +61,7 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
     final_rows = [last_test_of_phase(usual_rows(case_rows, name), "manoeuvre") for name in usual_detectors(result)]
     ranked = sorted(
         (
-            rows.assign(decides=tables.exact_first(rows, "probability", "exact")).iloc[0]
+            rows.assign(decides=tables.exact_first(rows, "probability", "exact")).rename(columns=ALARM_ENDS).iloc[0]
             for rows in final_rows
             if len(rows)
         ),
@@ -67,29 +70,25 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
     if not ranked:
         return []
     extremes = ranked[:: len(ranked) - 1 or 1]
-    texts = [
-        f"{row['filter']}, {wording.estimate((row[key] for key in ('probability', 'lo', 'hi')), form='.3g')}"
-        for row in extremes
-    ]
-    if len(texts) == 1:
+    values = [compared_value.row_value(row, ALARM).chosen_among(len(ranked)) for row in extremes]
+    texts = [f"{row['filter']}, {value.text(form='.3g')}" for row, value in zip(extremes, values, strict=True)]
+    if len(texts) == 1 or not compared_value.are_distinguished(*values):
         text = tr(
-            "alarms a test at the end of the manoeuvre, at about {usual:g} false alarms: {one}.",
+            "probability of an alarm in a test at the end of the manoeuvre, at about {usual:g} false alarms a test: "
+            "{one}.",
             usual=USUAL_FALSE_ALARM_RATE,
-            one=texts[0],
+            one="; ".join(texts),
         )
     else:
         text = tr(
-            "alarms a test at the end of the manoeuvre, at about {usual:g} false alarms: most with {most}, least with "
-            "{least}.",
+            "probability of an alarm in a test at the end of the manoeuvre, at about {usual:g} false alarms a test: "
+            "most with {most}, least with {least}.",
             usual=USUAL_FALSE_ALARM_RATE,
             most=texts[-1],
             least=texts[0],
         )
-    return [
-        Sentence(
-            case_selection.after_swept_values(result, text), sentences.intervals("detections", "probability", *extremes)
-        )
-    ]
+    intervals = [interval for value in values for interval in value.intervals]
+    return [Sentence(case_selection.after_swept_values(result, text), tuple(intervals))]
 
 
 def _sigma_of_uses(
