@@ -101,6 +101,25 @@ class LastDigits:
         return self.of(*arguments, **explained) * (1 + 1e-13 * self.rng.normal())
 
 
+class Jumping(LastDigits):
+    """A likelihood that jumps, as one over a list of hypotheses of which some are dropped."""
+
+    def __call__(self, *arguments, **explained):
+        return np.round(self.of(*arguments, **explained), 3)
+
+
+def test_a_likelihood_that_jumps_is_searched_no_longer():
+    one, counts = likelihood(recording(np.random.default_rng(1))), []
+    for of in (one, Jumping(one)):
+        done = []
+        found = fit.fit_keys(of, (OUTLIERS,), lambda evaluations, expected, done=done: done.append(evaluations))
+        counts.append((done[-1], found))
+    (smooth, sound), (jumping, rough) = counts
+    assert jumping < 2 * smooth
+    for here, there in zip(sound.keys[:2], rough.keys[:2], strict=True):
+        assert there.value == pytest.approx(here.value, rel=0.02)
+
+
 def flown(*overrides, realisation=0):
     """Plots of the config's own target, without manoeuvre: the manoeuvre variance may as well be zero."""
     columns = simulate_plots.simulate_realisation(loaded(*overrides), realisation)

@@ -202,7 +202,8 @@ class LikelihoodSearch:
         simplex_evaluations: Sequence[int] = SIMPLEX_EVALUATIONS,
     ) -> tuple[np.ndarray, float]:
         """The maximum reached from a start, one coordinate held or none, and the log-likelihood there: by Newton steps,
-        until one gains less than `close`; where they fail, by a simplex for a while."""
+        until one gains less than `tolerance`; where they fail, by a simplex for a while. A likelihood over lists of
+        hypotheses jumps where one is dropped: a simplex that gains next to nothing shows that no step can."""
         free = np.array([i for i in range(len(start)) if i != fixed_index])
         point, value = start, self._log_likelihood(start)
         curvature = self.curvature_model if fixed_index is not None else Curvature(self._log_likelihood)
@@ -210,7 +211,10 @@ class LikelihoodSearch:
             point, value, is_maximum = self._climb_by_newton(point, value, free, tolerance, curvature)
             if is_maximum:
                 return point, value
+            value_before = value
             point, value = self._climb_by_simplex(point, free, tolerance, max_evaluations)
+            if value - value_before < ROUGH_ACCURACY:
+                return point, value
             curvature = Curvature(self._log_likelihood)
         return point, value
 
@@ -236,7 +240,7 @@ class LikelihoodSearch:
                 if predicted_gain < SMALL_GAIN_FACTOR * tolerance:
                     return point, value, True
             else:
-                break
+                return point, value, predicted_gain < ROUGH_ACCURACY
             if predicted_gain < SMALL_GAIN_FACTOR * tolerance:
                 return point, value, True
             if fraction < 1 or predicted_gain > ROUGH_ACCURACY:
