@@ -126,12 +126,13 @@ def named_by_results(
 
 def print_large_runs(experiments: "Sequence[Experiment]", sources: "Sequence[tuple[str, Archive | None]]") -> None:
     """Say how long the large results of archives take, before any is run: somebody else has chosen their number."""
-    from radarsim.api import cost
+    from radarsim.api import cost_estimate
     from radarsim.cli import console
 
     for experiment, (_, archive) in zip(experiments, sources, strict=True):
         if archive is not None and sum(case.realisations for case in experiment.cases) > MAX_UNANNOUNCED:
-            console.print_error_line(tr("note: {words}", words=f"{experiment.stem}: {cost.check(experiment).total}"))
+            total = cost_estimate.check(experiment).total
+            console.print_error_line(tr("note: {words}", words=f"{experiment.stem}: {total}"))
 
 
 def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: bool, as_json: bool) -> None:
