@@ -17,7 +17,7 @@ from tests.forked_programs import Start
 from tests.variables import CLEARED
 
 # Folders, in the order in which their groups begin; what is short is left for the end, where processes wait.
-LONG = ("studies", "trust", "cli", "app", "engine", "docs", "report", "language", "kernels", "recorded")
+LONG = ("studies", "trust", "cli", "api", "engine", "docs", "report", "language", "kernels", "recordings")
 
 for name in CLEARED:
     os.environ.pop(name, None)
