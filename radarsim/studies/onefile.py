@@ -316,13 +316,21 @@ class OneFile(Study):
 
     def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """σ of the leading component at the last scan, and the gain of each filter."""
-        from radarsim.report import case_selection, sentences, tables, wording
+        from radarsim.report import (
+            case_selection,
+            compared_value,
+            gain_sentences,
+            key_labels,
+            sentences,
+            tables,
+            wording,
+        )
 
         leading = self.components[0]
         last = tables.select_rows(tables_by_name["last"], case=result.name, component=leading.name)
         keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
         sigmas = [
-            f"{row['filter']} {wording.estimate((row[key] for key in keys), tr(row['unit']))}"
+            f"{row['filter']} {wording.estimate((row[key] for key in keys), key_labels.unit_label(row['unit']))}"
             for row in last.to_dict("records")
         ]
         text = tr(
@@ -337,11 +345,10 @@ class OneFile(Study):
         gains = tables.select_rows(tables_by_name["gains"], case=result.name, component=leading.name)
         gains = gains[gains["k"] == gains["k"].max()]
         if len(gains):
-            keys = ("gain_percent", "gain_lo", "gain_hi")
-            texts = [
-                f"{row['filter']} {wording.estimate((row[key] for key in keys), '%', '.3g')}"
-                for row in gains.to_dict("records")
-            ]
+            values = (
+                (row["filter"], compared_value.row_value(row, compared_value.GAIN)) for _, row in gains.iterrows()
+            )
+            texts = [f"{name} {gain_sentences.percent_text(gain, result.count)}" for name, gain in values]
             base = result.axes.filters[result.axes.baseline]
             text = tr("Gain against {base} there: {filters}.", base=base, filters=join_names(texts))
             yield sentences.Sentence(

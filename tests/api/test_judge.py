@@ -251,6 +251,14 @@ class Odd:
         return np.stack([plots["range_m"], plots["velocity_mps"]][: 1 + (self.k > 3)], axis=1)
 
 
+def test_filters_of_the_config_that_are_equal_are_all_named(tmp_path):
+    filters = ", ".join(f"{{name: {name}, observes: [range], manoeuvre_variance: 1e-3}}" for name in ("one", "two"))
+    (tmp_path / "twins.yaml").write_text(f"include: [rls2]\nfilters: [{filters}]\n")
+    result = radarsim.judge(tmp_path / "twins.yaml", lambda plots: plots["range_m"], realisations=200)
+    assert result.answer[0].startswith("mine is worse than one (equal to two), the config's best in r at 140 s")
+    assert not any("against two" in sentence for sentence in result.answer)
+
+
 @numba.njit
 def compiled(z, v):
     return z
@@ -388,7 +396,9 @@ def test_of_equal_filters_the_first_is_the_best_and_one_realisation_tells_nothin
     keys = [{"name": name, "observes": ["range"], "manoeuvre_variance": 1e-3} for name in "cab"]
     said = radarsim.judge("rls2", held, realisations=1, overrides={"filters": keys}).answer[0]
     assert re.match(
-        r"mine cannot be distinguished from c, the config's best in r at 140 s: gain \S+ % \[−∞, 100\]", said
+        r"mine cannot be distinguished from c \(equal to a and b\), the config's best in r at 140 s: "
+        r"gain \S+ % \[−∞, 100\]",
+        said,
     )
 
 

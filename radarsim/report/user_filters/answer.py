@@ -1,5 +1,6 @@
 """Question and answer of an experiment with user filters: how each compares with the config's filters."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 
 TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
+ROUNDING = 1e-9  # relative difference of σ of filters that are the same but for rounding
 MATERIAL_LOSS = 1.0  # per cent: a smaller one in another component is not told in the first sentence
 NEGLIGIBLE = 1e-3  # of the largest σ of a filter's component over time: what is below is known, not estimated
 DEPENDENCES = {  # why a filter has no intervals, after "as"
@@ -64,11 +66,19 @@ class _Comparison:
     gains: "pd.DataFrame"  # against every other filter
     sigma: "pd.Series[Any]"  # of `curves`: the user filter's
     rivals: Mapping[str, "pd.Series[Any]"]  # of `curves`: the best filter, then the best tuned one
+    equal: tuple[str, ...]  # the config's other filters with the σ of its best one, but for rounding
     dependence: str  # why the user filter has no intervals; empty where it has
 
     @property
     def best(self) -> str:
         return next(iter(self.rivals))
+
+    @property
+    def best_name(self) -> str:
+        """The config's best filter in a sentence, with those that are equal to it."""
+        return (
+            tr("{name} (equal to {others})", name=self.best, others=join_names(self.equal)) if self.equal else self.best
+        )
 
     @property
     def best_sigma(self) -> ComparedValue:
@@ -173,7 +183,12 @@ def _compare(
     best = min((baseline for baseline in baselines if baseline not in tuned), key=rank.__getitem__)
     rivals = {rival: rows[rival] for rival in (best, *sorted(tuned, key=rank.__getitem__)[:1])}
     dependence = dict(user_filter_cases(result)[0].axes.dependent).get(name, "")
-    return _Comparison(name, key_labels.unit_label(unit), gains, rows[name], rivals, dependence)
+    equal = tuple(
+        baseline
+        for baseline in baselines
+        if baseline != best and math.isclose(rows[baseline]["sigma"], rows[best]["sigma"], rel_tol=ROUNDING)
+    )
+    return _Comparison(name, key_labels.unit_label(unit), gains, rows[name], rivals, equal, dependence)
 
 
 def _ranks(baselines: Sequence[str], rows: Mapping[str, "pd.Series[Any]"], gains: "pd.DataFrame") -> dict[str, float]:
@@ -239,7 +254,7 @@ def _against_best(comparison: _Comparison, best: str) -> Sentence:
     row, gain = comparison.row_against(best), comparison.gain_against(best)
     fields = {
         "name": comparison.name,
-        "best": best,
+        "best": comparison.best_name,
         "component": row["component"],
         "t": numeral(f"{row['t_s']:g}"),
         "gain": comparison.gain_text(best),
@@ -358,7 +373,7 @@ def _floor_sentence(comparison: _Comparison) -> list[Sentence]:
 
 def _further_gains(comparison: _Comparison) -> list[Sentence]:
     """The gains at the same scan against all filters but the config's best."""
-    rows = comparison.gains[comparison.gains["baseline"] != comparison.best]
+    rows = comparison.gains[~comparison.gains["baseline"].isin([comparison.best, *comparison.equal])]
     if not len(rows):
         return []
     against = [f"{baseline} {comparison.gain_text(baseline)}" for baseline in rows["baseline"]]
