@@ -1,0 +1,65 @@
+"""No sentence of an answer contradicts the tables: every number with an interval, and every exact one, is read back."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from radarsim.api import result_content
+from radarsim.api.run import run
+from radarsim.config.find_files import SHIPPED
+from radarsim.language import current
+from tests.report.sentence_reader import read_sentence
+
+CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
+RANGE = {"observes": ["range"], "manoeuvre_variance": 1e-3}
+VELOCITY = {"observes": ["range", "velocity"], "manoeuvre_variance": 1e-3}
+ODD = {
+    "swapped": ("rls2", {"filters": [{"name": "r+Vr", **VELOCITY}, {"name": "r", **RANGE}]}),
+    "equal": ("rls2", {"filters": [{"name": "A", **RANGE}, {"name": "B", **RANGE}]}),
+    "baseline last": ("rls2", {"baseline": "r+Vr"}),
+    "missed": ("rls2", {"radar.detection_probability": 0.3}),
+    "few scans": ("rls2", {"scans": 4}),
+    "two values": ("rls2", {"sweep": {"radar.sigma_velocity_mps": [2, 20]}}),
+}
+
+
+def faults_of(result):
+    """Faults of all sentences of an answer, in every language, and how many numbers were read."""
+    faults, count = [], 0
+    for code in current.language_codes():
+        with current.use_language(code):
+            texts = result_content.make_answer(result.cases, result._tables).texts
+        for text in texts:
+            reading = read_sentence(text, result._tables, code)
+            faults += [f"{code}: {text}: {fault}" for fault in reading.faults]
+            count += len(reading.read)
+    return faults, count
+
+
+def test_the_reader_notices_what_contradicts_a_table():
+    gains = {"gain_percent": [33.8], "gain_lo": [31.1], "gain_hi": [36.7], "exact_percent": [30.97]}
+    exact, measured = ({"gains": pd.DataFrame(gains | {"exact_percent": [value]})} for value in (30.97, np.nan))
+    quoted = "at worst 33.8 % [31.1, 36.7] higher, at 100 s"
+    (fault,) = read_sentence(quoted, exact).faults
+    assert "known exactly, 30.97" in fault
+    assert read_sentence(quoted, measured).read == ["33.8 % [31.1, 36.7]"]
+    assert read_sentence("at worst 31.0 % (exact) higher", exact).read == ["31.0 % (exact)"]
+    assert read_sentence("31,0 % (точно)", exact, "ru").read == ["31.0 % (точно)"]
+    assert read_sentence("33,8 % [31,1; 36,7]", measured, "ru").read == ["33.8 % [31.1, 36.7]"]
+    assert read_sentence("at worst 32.0 % (exact) higher", exact).faults
+    assert read_sentence("33.8 % [29.0, 38.0]", measured).faults
+    assert read_sentence("33.8 % [29.0, 38.0] (interval for all 14 compared)", measured).read
+
+
+@pytest.mark.parametrize("odd", ODD)
+def test_odd_variants_contradict_no_table(odd):
+    config, overrides = ODD[odd]
+    faults, count = faults_of(run(config, realisations=200, overrides=overrides))
+    assert faults == []
+    assert count or odd == "equal"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", CONFIGS)
+def test_no_shipped_config_contradicts_its_tables(config):
+    assert faults_of(run(config, realisations=100))[0] == []
