@@ -12,11 +12,11 @@ from radarsim.studies.sonar.clutter.kernels import (
     association,
     blocks,
     gate,
+    single_tracks,
     track_prediction,
     track_rules,
     track_sums,
     track_update,
-    tracker,
 )
 from radarsim.studies.sonar.clutter.kernels.rare_end_laws import (
     FALSE_CAME,
@@ -83,25 +83,25 @@ def simulate_ends(world, detections, field, trackers, ends, work, first, total, 
     counts, keys, target = (
         np.zeros(track_sums.COUNTS),
         (ends.plots[0], ends.plots[1]),
-        tracker.Target(detected, z, True),
+        single_tracks.Target(detected, z, True),
     )
     errors = np.empty((ends.young.shape[1], 2, CHUNK))
     for done in range(0, total, CHUNK):
-        tracker.reset_tracks(work)
+        single_tracks.reset_tracks(work)
         plots[:] = 0.0
         n = min(CHUNK, total - done)
         for f in range(F):
             write_young_errors(world, ends.young[f], first + done, errors)
             choose_end_laws(ends.choice, tracker_laws(ends, trackers, f), first + done, n, errors, sampling[f])
         for k in range(K):
-            scan, course = tracker.Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
+            scan, course = single_tracks.Scan(first + done, n, k, world.dt[k]), Course(world.truth[k], shift)
             blocks.measure_target(world, first + done, k, plots, measured, shift)
             sigma = world.fresh[k]
             for f in range(F):
                 if trackers.association[f] == gate.KNOWN:
                     continue
                 laws = tracker_laws(ends, trackers, f)
-                tracks = tracker.tracks_of_tracker(work, f)
+                tracks = single_tracks.tracks_of_tracker(work, f)
                 status = work.status[f]
                 motion = trackers.period, trackers.sigma, trackers.manoeuvre[f]
                 track_prediction.predict(tracks, scan.dt, *motion, work.predicted)

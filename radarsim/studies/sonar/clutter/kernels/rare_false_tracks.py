@@ -22,11 +22,11 @@ from radarsim.kernels.random import uniforms
 from radarsim.studies.sonar.clutter.kernels import association as kernels_association
 from radarsim.studies.sonar.clutter.kernels import (
     false_plots,
+    single_tracks,
     track_prediction,
     track_rules,
     track_sums,
     track_update,
-    tracker,
 )
 from radarsim.studies.sonar.clutter.kernels import gate as kernels_gate
 from radarsim.studies.sonar.clutter.kernels.rare_boxes import MAX_BOX_MEAN, MAX_RATIO, associate_in_box, gate_box
@@ -71,7 +71,7 @@ def associate_false_tracks(field, shift, trackers, f, scan, work, sampling, coun
         address(counts),
         work.status[f],
     )
-    predicted, plots, rule = work.predicted, work.plots[f], tracker.association_rule(trackers, f)
+    predicted, plots, rule = work.predicted, work.plots[f], single_tracks.association_rule(trackers, f)
     status_address, out_address, m, n = address(status), address(out), trackers.m[f], trackers.n[f]
     keys, max_misses, holds = (shift.plots[0], shift.plots[1]), trackers.misses[f], shift.shares[2] > 0.0
     for i in range(scan.count):
@@ -133,7 +133,7 @@ def count_held_tracks(shares, sampling, state, n, held_sums):
 @kernel_part
 def step_false_tracks(field, shift, trackers, f, scan, work, sampling, counts):
     """Process scan k > 0 of the tracks of a chunk; return whether any is alive."""
-    tracks, status, manoeuvre = tracker.tracks_of_tracker(work, f), work.status[f], trackers.manoeuvre[f]
+    tracks, status, manoeuvre = single_tracks.tracks_of_tracker(work, f), work.status[f], trackers.manoeuvre[f]
     track_prediction.predict(tracks, scan.dt, trackers.period, trackers.sigma, manoeuvre, work.predicted)
     associate_false_tracks(field, shift, trackers, f, scan, work, sampling, counts)
     joint = trackers.association[f] == kernels_gate.PDA
@@ -152,18 +152,18 @@ def simulate_false_tracks(seeds, field, shift, trackers, work, dt, first, total,
     counts = np.zeros(track_sums.COUNTS)
     sampling = np.zeros((ROWS, CHUNK))
     for done in range(0, total, CHUNK):
-        tracker.reset_tracks(work)
+        single_tracks.reset_tracks(work)
         n = min(CHUNK, total - done)
         false_plots.draw_uniform_positions(seeds, field, first + done, n, z)
         for f in range(trackers.chi_square.size):
-            tracks, status = tracker.tracks_of_tracker(work, f), work.status[f]
+            tracks, status = single_tracks.tracks_of_tracker(work, f), work.status[f]
             if trackers.association[f] == kernels_gate.KNOWN:
                 continue
-            scan, target = tracker.Scan(first + done, n, 0, dt[0]), tracker.Target(detected, z, True)
-            tracker.step_tracker(trackers, f, field, scan, tracks, target, work, counts)
+            scan, target = single_tracks.Scan(first + done, n, 0, dt[0]), single_tracks.Target(detected, z, True)
+            single_tracks.step_tracker(trackers, f, field, scan, tracks, target, work, counts)
             choose_false_laws(shift, first + done, n, status, sampling)
             for k in range(1, dt.size):
-                scan = tracker.Scan(first + done, n, k, dt[k])
+                scan = single_tracks.Scan(first + done, n, k, dt[k])
                 any_alive = step_false_tracks(field, shift, trackers, f, scan, work, sampling, counts)
                 count_held_tracks(shift.shares, sampling, status[track_rules.STATE], n, sums.held[f])
                 if not any_alive:
