@@ -97,14 +97,17 @@ def _is_equal(cell: Any, value: Any) -> bool:
 def value(evidence: TableEvidence, rows: Any, column: str, lo: str = "", hi: str = "", se: str = "") -> Estimate:
     """The number of a row. lo and hi: the columns with the ends of its 95 % interval; se: that of its standard error.
 
-    Default: columns COLUMN_lo and COLUMN_hi, or COLUMN_se, where the table has them; else it is without noise."""
+    Default: columns COLUMN_lo and COLUMN_hi, or COLUMN_se, with or without the unit at the end of COLUMN, where the
+    table has them; else it is without noise."""
     number, table = evidence.number(rows, column), evidence.table
     if not math.isfinite(number):
         return exact_number(math.nan)
     if bool(lo) != bool(hi) or (lo and se):
         raise ConfigError("takes lo and hi, or se alone")
     if not (lo or se):
-        defaults = {end: f"{column}_{end}" for end in ("lo", "hi", "se") if f"{column}_{end}" in table}
+        stems = (column.rpartition("_")[0], column)  # rmse_se of rmse_m, where there is no rmse_m_se
+        names = [(end, f"{stem}_{end}") for stem in stems if stem for end in ("lo", "hi", "se")]
+        defaults = {end: name for end, name in names if name in table and name != column}
         lo, hi, se = (defaults.get(end, "") for end in ("lo", "hi", "se"))
         if bool(lo) != bool(hi):
             raise ConfigError(f"column {lo or hi!r} is one end of an interval, and the table has no other")

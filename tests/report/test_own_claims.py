@@ -67,6 +67,13 @@ def test_a_number_of_a_row_is_judged_with_its_interval(tmp_path):
         pd.testing.assert_frame_equal(pd.DataFrame(judged(same, *parts)), pd.DataFrame(rows))
 
 
+@pytest.mark.parametrize("names", [("rmse_m_se",), ("rmse_se",), ("rmse_lo", "rmse_hi"), ("rmse_m_lo", "rmse_m_hi")])
+def test_a_column_with_a_unit_has_its_interval_with_or_without_it(names):
+    table = {"filter": ["ekf"], "rmse_m": [1.0]} | dict(zip(names, ([0.9], [1.1]), strict=False))
+    (row,) = judged(table, ("[{filter: ekf}]", "{value: {column: rmse_m}}", '{printed: "1.0"}'))
+    assert row["lo"] < 1 < row["hi"]
+
+
 def test_ratio_and_difference_are_of_independent_rows():
     rows = judged(
         TABLE,
