@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.extensions import extensions
+from radarsim.report import provenance
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -49,13 +50,14 @@ def result(finished: "Result") -> dict[str, Any]:
     """A finished run or report: request, counts, answer, σ at the last scan, verdicts, files."""
     written = finished.written
     assert written is not None  # the commands write what they print
+    asked = provenance.requested_counts(finished.experiment, finished.facts)
     done_counts = {case.name: case.count for case in finished.cases}
     return {
         "config": finished.experiment.stem,
         "stop": finished.facts["stop"],
         "unmet": finished.unmet,
         "cases": {
-            case.name: {"asked": case.realisations, "done": done_counts.get(case.name, 0), "seed": case.seed}
+            case.name: {"asked": asked[case.name], "done": done_counts.get(case.name, 0), "seed": case.seed}
             for case in finished.experiment.cases
         },
         "precision": finished.facts.get("precision"),
@@ -64,6 +66,7 @@ def result(finished: "Result") -> dict[str, Any]:
         **{key: value for extension in extensions() for key, value in extension.result_document(finished).items()},
         "folder": str(written.folder),
         "files": list(written.files),
+        "removed": list(written.removed),
         "warnings": finished.warnings,
     }
 

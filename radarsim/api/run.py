@@ -138,6 +138,7 @@ def run(
         facts |= {"unmet": [*facts["unmet"], *undecided], "stop": "; ".join((*facts["unmet"], *undecided)) or "done"}
     reached_precision = None if simulated.stopped or precision is None else (precision, of)
     repeat = repeat_command(requested, simulated.done, overrides, reached_precision)
+    facts["asked"] = {case.name: case.realisations for case in requested.cases}
     result = make_result(experiment, simulated, facts, repeat)
     run_warnings = (line for case in experiment.cases for member in case.user_filters for line in member.warnings())
     result.facts["warnings"] += dict.fromkeys((*filter_warnings, *run_warnings))

@@ -146,6 +146,8 @@ def report(
         counts = {} if replace or realisations is None else replacement.larger_counts(experiment, out)
         stored_experiment = replacement.with_counts(experiment, counts)
         result = stored_runs.stored_result(stored_experiment, out=out, overrides=overrides)
+        if counts:
+            result.facts["asked"] = {case.name: case.realisations for case in experiment.cases}
         result.write(out, replace=replace, **drawing.arguments)
         return result
 

@@ -38,21 +38,23 @@ def record(
     """All of run.json except the report's own hash.
 
     run: the facts of the run (stop reason, threads, times, warnings, identities …), copied; contents: the outputs, by
-    path; machine: its description. Realisations requested and done are sums over the cases, which may differ in both.
-    """
+    path; machine: its description. Realisations requested (in `run` where they are not those of the experiment) and
+    done are sums over the cases, which may differ in both."""
     facts = dict(run)
     facts["warnings"] = [without_folders(line) for line in facts.get("warnings", ())]
     stop = facts.pop("stop", "done")
+    asked = requested_counts(experiment, facts)
+    facts.pop("asked", None)
     done = {result.name: result.count for result in results}
     return {
         "config": experiment.stem,
         "config_path": path_of(experiment),
         "study": experiment.study,
         "answer": list(answer),
-        "realisations_asked": sum(case.realisations for case in experiment.cases),
+        "realisations_asked": sum(asked.values()),
         "realisations_done": sum(done.get(case.name, 0) for case in experiment.cases),
         "cases": {
-            case.name: {"asked": case.realisations, "done": done.get(case.name, 0), "seed": case.seed}
+            case.name: {"asked": asked[case.name], "done": done.get(case.name, 0), "seed": case.seed}
             for case in experiment.cases
         },
         "stop": stop,
@@ -64,6 +66,11 @@ def record(
         "machine": dict(machine),
         "outputs": {path: hashlib.sha256(data).hexdigest() for path, data in sorted(contents.items())},
     }
+
+
+def requested_counts(experiment: Experiment, run: Mapping[str, Any]) -> dict[str, int]:
+    """The realisations of each case that were asked for; more may be stored and shown. run: the facts of the run."""
+    return {case.name: case.realisations for case in experiment.cases} | dict(run.get("asked", {}))
 
 
 def resolved_sha256(experiment: Experiment) -> str:
@@ -160,6 +167,8 @@ def extent(record: Mapping) -> str:
         )
     else:
         count_text = plural("{done} realisation", "{done} realisations", max_done, **counts)
+    if any(case["done"] > case["asked"] for case in cases):
+        count_text = tr("{words} (stored; {asked} requested)", words=count_text, **counts)
     seed_names = ", ".join(map(str, seeds[:MAX_SHOWN_SEEDS])) + (", …" if len(seeds) > MAX_SHOWN_SEEDS else "")
     return plural("{words}, seed {seeds}", "{words}, seeds {seeds}", len(seeds), words=count_text, seeds=seed_names)
 

@@ -1,5 +1,6 @@
 """Nothing shrinks in silence: which results take the place of others, and what is said."""
 
+import json
 import re
 import shlex
 import shutil
@@ -10,7 +11,7 @@ import pytest
 
 import radarsim
 from radarsim.errors import ConfigError
-from tests.program import command, csv_bytes
+from tests.program import command, csv_bytes, record
 
 QUIET = ("--no-figures", "-q")
 
@@ -119,6 +120,11 @@ def test_fewer_realisations_show_those_that_are_stored(options, out):
 def test_a_note_says_that_more_are_shown(out):
     note = command("run", "rls2", "-n", 2000, "--out", out, "--no-figures").stderr
     assert f"note: rls2: 4,000 realisations are stored in {out} and shown in place of 2,000" in note
+    (case,) = record(out / "rls2")["cases"].values()
+    assert (case["asked"], case["done"], record(out / "rls2")["realisations_asked"]) == (2000, 4000, 2000)
+    assert "4,000 realisations (stored; 2,000 requested), seed 2017" in (out / "rls2" / "report.html").read_text()
+    (document,) = json.loads(command("report", "rls2", "-n", 3000, "--out", out, "--no-figures", "--json").stdout)
+    assert (document["cases"]["rls2"]["asked"], document["cases"]["rls2"]["done"]) == (3000, 4000)
     assert "note" not in command("run", "rls2", "-n", 4000, "--out", out, "--no-figures").stderr
     assert "4,000 realisations" in command("report", "rls2", "-n", 2000, "--out", out, "--no-figures").stderr
     command("run", "rls2", "-n", 2000, "--replace", "--out", out, *QUIET)
