@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 CURVE_DIMENSIONS = ("case", "filter", "component", "k")
 GAIN_DIMENSIONS = ("case", "filter", "baseline", "component", "k")
-TEXT_COLUMNS = ("unit", "note", "floor_kind", "why")  # of tables, not of arrays
+LABELLED_COLUMNS = ("t_s", "unit")  # coordinates
 
 Variable = tuple[tuple[str, ...], np.ndarray, dict[str, str]]  # dimensions, values, attributes
 
@@ -37,20 +37,24 @@ class LabelledArrays:
 
 
 def labelled_arrays(curves: "pd.DataFrame", gains: "pd.DataFrame", attributes: Mapping[str, str]) -> LabelledArrays:
-    """The numbers of curves.csv and gains.csv over case, filter, component and scan, NaN where a table has no row."""
+    """The columns of curves.csv and gains.csv over case, filter, component and scan; where a table has no row, numbers
+    are NaN, and texts empty. Raises ConfigError where several rows have the same place."""
     tables = [(curves, CURVE_DIMENSIONS), (gains, GAIN_DIMENSIONS)]
     columns_by_dimension: dict[str, list[pd.Series]] = {}
     for table, dimensions in tables:
         for name in dimensions if len(table) else ():
             columns_by_dimension.setdefault(name, []).append(table[name])
     labels = {name: _labels(name, columns) for name, columns in columns_by_dimension.items()}
-    variables: dict[str, Variable] = {
-        "t_s": _times(curves, labels),
-        "unit": (("component",), _units(curves, labels["component"]), {}),
-    }
+    variables: dict[str, Variable] = {}
+    if len(curves):
+        variables["t_s"] = _times(curves, labels)
+        variables["unit"] = ("component",), _units(curves, labels["component"]), {}
     for table, dimensions in tables:
         units = column_units(table.columns)
-        columns = [name for name in table.columns if name not in (*dimensions, *TEXT_COLUMNS, "t_s")]
+        if len(table) and (twice := table.duplicated([*dimensions])).any():
+            place = ", ".join(f"{name} {table[name][twice].iloc[0]}" for name in dimensions)
+            raise ConfigError(f"several rows of one table are of {place}: they have no place in an array")
+        columns = [name for name in table.columns if name not in (*dimensions, *LABELLED_COLUMNS)]
         for name in columns if len(table) else ():
             unit = {"units": units[name]} if units.get(name, UNIT_COLUMN) != UNIT_COLUMN else {}
             variables[name] = (dimensions, _array(table, dimensions, name, labels), unit)
@@ -79,9 +83,14 @@ def _array(
     """A column of a table as an array over these dimensions."""
     positions = [{label: i for i, label in enumerate(labels[name].tolist())} for name in dimensions]
     indices = tuple(table[name].map(where).to_numpy() for name, where in zip(dimensions, positions, strict=True))
-    values = np.full([len(labels[name]) for name in dimensions], np.nan)
-    values[indices] = table[column].to_numpy(dtype=float)
-    return values
+    shape, cells = [len(labels[name]) for name in dimensions], table[column]
+    if cells.dtype.kind in "biuf":
+        values = np.full(shape, np.nan)
+        values[indices] = cells.to_numpy(dtype=float)
+        return values
+    texts = np.full(shape, "", dtype=object)
+    texts[indices] = ["" if text is None or text != text else str(text) for text in cells.tolist()]
+    return texts
 
 
 def to_xarray(arrays: LabelledArrays) -> "xarray.Dataset":
@@ -90,8 +99,8 @@ def to_xarray(arrays: LabelledArrays) -> "xarray.Dataset":
         import xarray
     except ImportError as error:
         raise ConfigError("to_xarray needs the package xarray: pip install 'radarsim[xarray]'") from error
-    data = {name: variable for name, variable in arrays.variables.items() if name not in ("t_s", "unit")}
-    coordinates = {**arrays.labels, **{name: arrays.variables[name] for name in ("t_s", "unit")}}
+    data = {name: variable for name, variable in arrays.variables.items() if name not in LABELLED_COLUMNS}
+    coordinates = {**arrays.labels, **{name: arrays.variables[name] for name in LABELLED_COLUMNS if len(arrays.labels)}}
     return xarray.Dataset(data, coordinates, dict(arrays.attributes))
 
 
@@ -121,11 +130,11 @@ def _create_variable(
 ) -> None:
     """A variable of a netCDF file; texts get a last dimension of their characters."""
     if values.dtype == object:
-        texts = np.array([str(value).encode() for value in values], dtype="S")
+        texts = np.array([str(value).encode() for value in values.ravel()], dtype="S")
         letters = f"{name}_letters"
         file.createDimension(letters, max(texts.dtype.itemsize, 1))
         variable = file.createVariable(name, "c", (*dimensions, letters))
-        variable[:] = texts.view("S1").reshape(len(texts), -1)
+        variable[:] = texts.view("S1").reshape(*values.shape, -1)
         variable._Encoding = b"utf-8"
         return
     variable = file.createVariable(name, "i4" if values.dtype.kind == "i" else "f8", dimensions)

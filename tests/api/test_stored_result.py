@@ -3,11 +3,14 @@
 import shutil
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.io import netcdf_file
 
 import radarsim
+from radarsim.api import dataset
 from radarsim.errors import ConfigError, StoreError
+from radarsim.report import column_units
 from tests.program import command
 
 xarray = pytest.importorskip("xarray")
@@ -129,11 +132,55 @@ def test_export_of_nothing_says_where_it_looked(tmp_path):
     assert not (tmp_path / "a.nc").exists()
 
 
-@pytest.mark.parametrize("kind", ["pdf", "eps"])
+@pytest.mark.parametrize("kind", ["pdf", "ps", "eps"])
 def test_a_saved_figure_embeds_true_type_fonts(ran, kind, tmp_path):
     path = tmp_path / f"a.{kind}"
     ran.figure("sigma_r").savefig(path)
     data = path.read_bytes()
-    assert (b"/FontType 42" if kind == "eps" else b"/CIDFontType2") in data
+    assert (b"/FontType 42" if kind != "pdf" else b"/CIDFontType2") in data
     assert b"/Type3" not in data
     assert b"/FontType 3" not in data
+
+
+def test_arrays_of_any_table_read_back_the_same(tmp_path):
+    """Text in a column, missing values, a case without times of another, letters beyond ASCII; and no row at all."""
+    curves = pd.DataFrame(
+        {
+            "case": ["a", "a", "β"],
+            "filter": "r",
+            "component": ["b", "b", "r"],
+            "unit": ["rad", "rad", "m"],
+            "k": [1, 2, 2],
+            "t_s": [0.5, 1.0, 3.0],
+            "n": [7, 7, 8],
+            "sigma": [1.0, np.nan, 3.0],
+            "azimuth_rad": [0.25, 0.5, np.nan],
+            "looks": ["good", None, "schön"],
+            "is_lost": [True, False, True],
+        }
+    )
+    for table in (curves, curves[:0]):
+        arrays = dataset.labelled_arrays(table, table[["case", "k"]][:0], {"seed": "1"})
+        dataset.write_netcdf(tmp_path / "a.nc", arrays)
+        with xarray.open_dataset(tmp_path / "a.nc", engine="scipy") as read:
+            again, made = read.load(), dataset.to_xarray(arrays)
+            xarray.testing.assert_identical(again.drop_attrs(), made.drop_attrs())
+    arrays = dataset.to_xarray(dataset.labelled_arrays(curves, curves[:0], {}))
+    cell = arrays.sel(case="β", filter="r", component="r", k=2)
+    assert (float(cell["sigma"]), str(cell["looks"].values), float(cell["t_s"])) == (3.0, "schön", 3.0)
+    assert arrays["azimuth_rad"].attrs == {"units": "rad"}
+    with pytest.raises(ConfigError, match="several rows of one table are of case a, filter r, component b, k 1"):
+        dataset.labelled_arrays(pd.concat([curves, curves]), curves[:0], {})
+
+
+@pytest.mark.parametrize(
+    ("columns", "units"),
+    [
+        ("unit exact_bias steady_sigma last_sigma last_lo last_hi", [column_units.UNIT_COLUMN] * 5),
+        ("above_oracle_percent above_oracle_lo gain_percent gain_hi", ["%"] * 4),
+        ("bearing_rad bearing_rad_lo course_deg energy_db", ["rad", "rad", "°", "dB"]),
+        ("k n lock_rate_3sigma right_lo nees sigma", []),
+    ],
+)
+def test_columns_have_the_unit_of_their_name(columns, units):
+    assert [*column_units.column_units(columns.split()).values()] == units
