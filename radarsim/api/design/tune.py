@@ -24,14 +24,13 @@ from radarsim.api.design.jackknife import jackknife_interval
 from radarsim.api.design.quantities import MeasuredQuantity
 from radarsim.api.design.question import Curve, measure_seconds
 from radarsim.api.design.tuned_content import tuned_content
+from radarsim.api.design.tuning_intervals import flat_interval, has_no_effect, spread_of_tuning
+from radarsim.api.design.tuning_objective import Objective, Variants, case_with_filters, cost_by_quantity
 from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, objective_words
+from radarsim.api.design.tuning_search import PILOT_POINTS, find_minimum
 from radarsim.api.design.tuning_space import (
-    DIGITS,
-    MAX_WHOLE_COMBINATIONS,
-    MIN_PROBABILITY,
     Path,
     Place,
-    ProbabilityRange,
     SearchedKey,
     from_scale,
     is_at_end,
@@ -49,7 +48,7 @@ from radarsim.config.identity import all_keys
 from radarsim.config.labels import label
 from radarsim.config.overrides import override_origin
 from radarsim.config.yaml_text import one_line_yaml
-from radarsim.engine.results import Axes, CaseResult
+from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import plural, tr
 from radarsim.report.user_filters.answer import TUNED
@@ -58,265 +57,7 @@ from radarsim.studies import registry
 
 TUNED_OUT = f"{RESULTS}/tuned"  # where the run with tuned values writes
 TRAINING_SEED_OFFSET = 2**32  # more than the seed of the config: the seed of the noise that is searched with
-FLAT_CHANGE = 1e-3  # of the quantity: within it a key is as good as tuned
-STEP = 0.25  # on the scale of the search, of derivatives of sampled values
-# Of exact and of sampled values: how closely the scale is searched, the logarithm of what is minimised, values a key of
-# a simplex at most, and those expected of both.
-SCALE_TOLERANCE, COST_TOLERANCE, MAX_VALUES_PER_KEY = (
-    {True: 1e-7, False: 1e-2},
-    {True: 1e-12, False: 1e-6},
-    {True: 200, False: 50},
-)
-EXPECTED_VALUES_PER_KEY = {True: 100, False: 40}
-SIMPLEX_STEPS = 0.5, 0.1  # first steps, one simplex after the other
-PILOT_POINTS, PILOT_SHARE, MIN_PILOT_REALISATIONS = (
-    13,
-    8,
-    200,
-)  # of the scan of sampled values: values, and realisations of all
-NO_CHANGE = 1e-9  # of the quantity: largest change where a key has no effect
-
-
-class Variants:
-    """A case with one filter, and the baseline of its gains, with other values of the keys; like `Cases`."""
-
-    def __init__(self, case: Case, filter_name: str, searched: Sequence[SearchedKey], paired: bool):
-        self.case, self.filter_name, self.searched, self.seed = case, filter_name, searched, case.seed
-        self.keys_by_filter = {member.name: all_keys(member) for member in case.spec.members}
-        config_baseline = getattr(case.spec, "baseline", None)
-        self.baseline = (config_baseline or next(iter(self.keys_by_filter))) if paired else None
-        self.kept_names = {filter_name, self.baseline}
-        try:
-            self.base = self.case_with_filter(self.keys_by_filter[filter_name])
-        except ConfigError:  # other keys name the filters that are left out
-            self.kept_names, self.baseline = set(self.keys_by_filter), config_baseline
-            self.base = self.case_with_filter(self.keys_by_filter[filter_name])
-
-    def case_with_filter(self, filter_keys: Mapping[str, Any], *tuned: Mapping[str, Any]) -> Case:
-        """The case with these keys of the filter, and with a tuned filter if it is given. Raises ConfigError."""
-        members = [
-            filter_keys if name == self.filter_name else keys
-            for name, keys in self.keys_by_filter.items()
-            if name in self.kept_names
-        ]
-        case = case_with_filters(self.case, [*members, *tuned], self.baseline)
-        return replace(case, seed=self.seed, noise_keys=self.case.noise_keys or self.case.spec)
-
-    def case_with_value(self, key: str, place: Place) -> Case:
-        """The case with other values. Raises ConfigError where the config refuses them."""
-        return self.case_with_filter(self.filter(place))
-
-    def stated_and_tuned_case(self, place: Place) -> Case:
-        """The case with the filter as stated and as tuned, with the config's own seed."""
-        case = self.case_with_filter(
-            self.keys_by_filter[self.filter_name], self.filter(place) | {"name": self.filter_name + TUNED}
-        )
-        return replace(case, seed=self.case.seed)
-
-    def filter(self, place: Place) -> dict[str, Any]:
-        """The filter's keys with other values."""
-        filter_keys = deepcopy(self.keys_by_filter[self.filter_name])
-        for path, value in from_scale(self.searched, place, filter_keys).items():
-            set_at_path(filter_keys, path, value)
-        return filter_keys
-
-
-def case_with_filters(case: Case, members: Sequence[Mapping[str, Any]], baseline: str | None) -> Case:
-    """A case with other filters. Raises ConfigError where the config refuses them."""
-    settings = {"study": case.study, "realisations": case.realisations, "seed": case.seed, "baseline": baseline}
-    keys = all_keys(case.spec) | settings | {type(case.spec).bare_keys: members}
-    (loaded,) = load({key: value for key, value in keys.items() if value is not None}).cases
-    return replace(case, spec=loaded.spec)
-
-
-class Objective:
-    """What is minimised, at a place of the search: over the family the root of the mean square of a size, the mean of
-    anything else; of a quantity that is better the larger, 100 % less its value."""
-
-    def __init__(self, variants: Sequence[Variants], curves: Sequence[Curve], exact: bool, count: int):
-        self.variants, self.curves, self.exact, self.count = variants, curves, exact, count
-        self.searched, self.filter_keys = variants[0].searched, variants[0].keys_by_filter[variants[0].filter_name]
-        self.definition = curves[0].quantity.definition
-        self.rough = exact and any(curve.has_rough_values for curve in curves)
-
-    @property
-    def pilot_realisations(self) -> int:
-        """Realisations of a value of a scan."""
-        return min(self.count, max(MIN_PILOT_REALISATIONS, self.count // PILOT_SHARE))
-
-    def combined(self, values: Sequence[Any]) -> Any:
-        """The quantity of the family, from the values of its cases, numbers or arrays."""
-        is_size = self.definition.kind == "size"
-        mean = sum(value**2 if is_size else value for value in values) / len(values)
-        return mean**0.5 if is_size else mean
-
-    def cost(self, values: Sequence[Any]) -> Any:
-        """What is minimised, from the values of the cases."""
-        combined = self.combined(values)
-        return 100.0 - combined if self.definition.more_is_better else combined
-
-    def __call__(self, place: Place, count: int | None = None) -> float:
-        """The cost at a place, with all training realisations or fewer; infinite if there is no estimate."""
-        if self.rough:
-            values = [curve.roughly(place) for curve in self.curves]
-        elif self.exact:
-            values = [curve.exact_value(place) for curve in self.curves]
-        else:
-            values = [curve.simulate(place, count or self.count).value for curve in self.curves]
-        cost = float(self.cost(values))
-        return math.inf if math.isnan(cost) else cost
-
-
-def find_minimum(objective: Objective) -> Place:
-    """The place with the smallest cost.
-
-    For each combination of whole numbers, the real numbers are scanned one after the other; simplexes (Nelder and Mead)
-    then start from the best place."""
-    from scipy.optimize import minimize
-
-    searched, start = objective.searched, tuple(key.stated for key in objective.searched)
-    real_indices = [i for i, key in enumerate(searched) if not key.search_range.whole_numbers]
-    pilot = None if objective.exact else objective.pilot_realisations
-    grids = [key.search_range.grid() if key.search_range.whole_numbers else [key.stated] for key in searched]
-    if math.prod(map(len, grids)) > MAX_WHOLE_COMBINATIONS:
-        raise ConfigError(f"{argument('free', '--free')}: too many whole numbers to try: give KEY=LOW:HIGH")
-
-    def scan_real_keys(best: Place) -> Place:
-        for i in real_indices:
-            candidates = [
-                (*best[:i], x, *best[i + 1 :])
-                for x in searched[i].search_range.grid(None if objective.exact else PILOT_POINTS)
-            ]
-            best = min((best, *candidates), key=lambda place: objective(place, pilot))
-        return best
-
-    possible = [place for place in itertools.product(*grids) if math.isfinite(objective(place, pilot))]
-    best = min(map(scan_real_keys, possible), key=lambda place: objective(place, pilot), default=start)
-    for step in SIMPLEX_STEPS if real_indices else ():
-        scale_place = np.array([searched[i].search_range.to_scale(best[i]) for i in real_indices])
-        options: Any = {
-            "initial_simplex": np.vstack([scale_place, scale_place + step * np.eye(len(scale_place))]),
-            "xatol": SCALE_TOLERANCE[objective.exact],
-        }
-        options |= {
-            "fatol": COST_TOLERANCE[objective.exact],
-            "maxfev": MAX_VALUES_PER_KEY[objective.exact] * len(scale_place),
-        }
-        logarithm: Any = lambda u, best=best: float(np.log(max(objective(move_keys(searched, best, u)), 1e-300)))  # noqa: E731
-        best = move_keys(searched, best, minimize(logarithm, scale_place, method="Nelder-Mead", options=options).x)
-    best = tuple(float(f"{x:.{DIGITS}g}") for x in best)
-    return min((start, best), key=objective)
-
-
-def move_keys(searched: Sequence[SearchedKey], best: Place, scale_place: np.ndarray) -> Place:
-    """A place with its real numbers moved to these positions (n,) on the scales of the search."""
-    coordinates = iter(scale_place)
-    return tuple(
-        x if key.search_range.whole_numbers else key.search_range.from_scale(float(next(coordinates)))
-        for key, x in zip(searched, best, strict=True)
-    )
-
-
-def flat_interval(objective: Objective, best: Place, i: int) -> tuple[float, float]:
-    """The range of a key over which the exact quantity is within 0.1 % of its minimum."""
-    search_range, limit = objective.searched[i].search_range, (1 + FLAT_CHANGE) * objective(best)
-    ends = []
-    for end in (search_range.low, search_range.high):
-        inside, outside = search_range.to_scale(best[i]), search_range.to_scale(end)
-        if objective((*best[:i], end, *best[i + 1 :])) > limit:
-            for _ in range(24):
-                middle = (inside + outside) / 2
-                is_flat = objective((*best[:i], search_range.from_scale(middle), *best[i + 1 :])) <= limit
-                inside, outside = (middle, outside) if is_flat else (inside, middle)
-            outside = inside
-        ends.append(search_range.from_scale(outside))
-    return ends[0], ends[1]
-
-
-def has_no_effect(objective: Objective, best: Place, i: int) -> bool:
-    """Whether a key changes nothing over the whole searched range."""
-    search_range = objective.searched[i].search_range
-    ends = (objective((*best[:i], x, *best[i + 1 :])) for x in (search_range.low, search_range.high))
-    return all(math.isclose(value, objective(best), rel_tol=NO_CHANGE) for value in ends)
-
-
-def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[float, float]]:
-    """The 95 % intervals of the best values of real numbers, from how far they move without each of the batches.
-
-    Each move is a Newton step from the best place with the gradient of the remaining batches. Empty where the quantity
-    has no minimum on this scale, for instance where it is flat or jumps, or at an end of the range."""
-    searched = [
-        replace(key, search_range=replace(key.search_range, whole_numbers=True)) if is_at_end(key, x) else key
-        for key, x in zip(objective.searched, best, strict=True)
-    ]
-    scale_place = np.array(
-        [
-            key.search_range.to_scale(x)
-            for key, x in zip(searched, best, strict=True)
-            if not key.search_range.whole_numbers
-        ]
-    )
-
-    def costs(u: np.ndarray) -> np.ndarray:
-        """With all realisations, then without each of the batches."""
-        cases = [variant.case_with_value("", move_keys(searched, best, u)) for variant in objective.variants]
-        pairs = zip(cases, objective.curves, strict=True)
-        return np.asarray(
-            objective.cost([cost_by_quantity(case, (curve.quantity,), objective.count)[:, 0] for case, curve in pairs])
-        )
-
-    size, steps = len(scale_place), STEP * np.eye(len(scale_place))
-    if not size:
-        return {}
-    try:
-        centre_costs = costs(scale_place)
-        upper_costs, lower_costs = ([costs(scale_place + sign * step) for step in steps] for sign in (1, -1))
-        diagonal_costs = {
-            (i, j): costs(scale_place + steps[i] + steps[j]) for i, j in itertools.combinations(range(size), 2)
-        }
-    except ConfigError:
-        return {}
-    slopes = (np.array(upper_costs) - np.array(lower_costs)) / (2 * STEP)
-    curvature = np.diag(
-        [(a[0] - 2 * centre_costs[0] + b[0]) / STEP**2 for a, b in zip(upper_costs, lower_costs, strict=True)]
-    )
-    for (i, j), diagonal in diagonal_costs.items():
-        curvature[i, j] = curvature[j, i] = (
-            diagonal[0] - upper_costs[i][0] - upper_costs[j][0] + centre_costs[0]
-        ) / STEP**2
-    if not np.isfinite(curvature).all() or np.linalg.eigvalsh(curvature)[0] <= 0:
-        return {}
-    newton = scale_place[:, None] - np.linalg.solve(curvature, slopes - slopes[:, :1])
-    values = [from_scale(searched, move_keys(searched, best, u), objective.filter_keys) for u in newton.T]
-    intervals = {}
-    for path in values[0]:
-        matching_keys = [key for key in searched if key.path == path and key.largest_path is None]
-        if matching_keys and matching_keys[0].search_range.whole_numbers:
-            continue
-        search_range = (
-            matching_keys[0].search_range
-            if matching_keys
-            else ProbabilityRange(MIN_PROBABILITY**2, 1 - MIN_PROBABILITY**2, False)
-        )
-        inner = np.array(
-            [
-                search_range.to_scale(min(max(place_values[path], search_range.low), search_range.high))
-                for place_values in values
-            ]
-        )
-        _, lo, hi = jackknife_interval(inner[1:], float(inner[0]))
-        intervals[path] = search_range.from_scale(lo), search_range.from_scale(hi)
-    return intervals
-
-
-def cost_by_quantity(case: Case, measured: Sequence[MeasuredQuantity], count: int) -> np.ndarray:
-    """Q quantities of a case (1 + n, Q): from all realisations, then without each of n batches."""
-
-    def values(result: CaseResult) -> list[float]:
-        return [float(quantities.sampled_value(quantity, result)[0].value) for quantity in measured]
-
-    total_values, leave_one_out_values, _ = question.leave_one_out(case, values, count)
-    return np.array([total_values, *leave_one_out_values])
+EXPECTED_VALUES_PER_KEY = {True: 100, False: 40}  # of a simplex, by whether the quantity is exact
 
 
 def _predict(notify: Callable[[str], None], objective: Objective, place_s: float) -> None:

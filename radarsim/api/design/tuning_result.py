@@ -17,7 +17,7 @@ from radarsim.report.wording import format_number, with_unit
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.api.design.tune import Objective
+    from radarsim.api.design.tuning_objective import Objective
 
 
 NO_GAIN = 1e-3  # per cent or points of an exact gain that are called nothing

@@ -1,0 +1,115 @@
+"""How well a search determines the keys: the range over which one is as good, the interval of its best value."""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from radarsim.api.design.jackknife import jackknife_interval
+from radarsim.api.design.tuning_objective import Objective, cost_by_quantity
+from radarsim.api.design.tuning_search import move_keys
+from radarsim.api.design.tuning_space import MIN_PROBABILITY, Path, Place, ProbabilityRange, from_scale, is_at_end
+from radarsim.errors import ConfigError
+
+FLAT_CHANGE = 1e-3  # of the quantity: within it a key is as good as tuned
+NO_CHANGE = 1e-9  # of the quantity: largest change where a key has no effect
+STEP = 0.25  # on the scale of the search, of derivatives of sampled values
+
+
+def flat_interval(objective: Objective, best: Place, i: int) -> tuple[float, float]:
+    """The range of a key over which the exact quantity is within 0.1 % of its minimum."""
+    search_range, limit = objective.searched[i].search_range, (1 + FLAT_CHANGE) * objective(best)
+    ends = []
+    for end in (search_range.low, search_range.high):
+        inside, outside = search_range.to_scale(best[i]), search_range.to_scale(end)
+        if objective((*best[:i], end, *best[i + 1 :])) > limit:
+            for _ in range(24):
+                middle = (inside + outside) / 2
+                is_flat = objective((*best[:i], search_range.from_scale(middle), *best[i + 1 :])) <= limit
+                inside, outside = (middle, outside) if is_flat else (inside, middle)
+            outside = inside
+        ends.append(search_range.from_scale(outside))
+    return ends[0], ends[1]
+
+
+def has_no_effect(objective: Objective, best: Place, i: int) -> bool:
+    """Whether a key changes nothing over the whole searched range."""
+    search_range = objective.searched[i].search_range
+    ends = (objective((*best[:i], x, *best[i + 1 :])) for x in (search_range.low, search_range.high))
+    return all(math.isclose(value, objective(best), rel_tol=NO_CHANGE) for value in ends)
+
+
+def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[float, float]]:
+    """The 95 % intervals of the best values of real numbers, from how far they move without each of the batches.
+
+    Each move is a Newton step from the best place with the gradient of the remaining batches. Empty where the quantity
+    has no minimum on this scale, for instance where it is flat or jumps, or at an end of the range."""
+    searched = [
+        replace(key, search_range=replace(key.search_range, whole_numbers=True)) if is_at_end(key, x) else key
+        for key, x in zip(objective.searched, best, strict=True)
+    ]
+    scale_place = np.array(
+        [
+            key.search_range.to_scale(x)
+            for key, x in zip(searched, best, strict=True)
+            if not key.search_range.whole_numbers
+        ]
+    )
+
+    def costs(u: np.ndarray) -> np.ndarray:
+        """With all realisations, then without each of the batches."""
+        cases = [variant.case_with_value("", move_keys(searched, best, u)) for variant in objective.variants]
+        pairs = zip(cases, objective.curves, strict=True)
+        return np.asarray(
+            objective.cost([cost_by_quantity(case, (curve.quantity,), objective.count)[:, 0] for case, curve in pairs])
+        )
+
+    if not len(scale_place):
+        return {}
+    try:
+        slopes, curvature = _derivatives(costs, scale_place)
+    except ConfigError:
+        return {}
+    if not np.isfinite(curvature).all() or np.linalg.eigvalsh(curvature)[0] <= 0:
+        return {}
+    newton = scale_place[:, None] - np.linalg.solve(curvature, slopes - slopes[:, :1])
+    values = [from_scale(searched, move_keys(searched, best, u), objective.filter_keys) for u in newton.T]
+    intervals = {}
+    for path in values[0]:
+        matching_keys = [key for key in searched if key.path == path and key.largest_path is None]
+        if matching_keys and matching_keys[0].search_range.whole_numbers:
+            continue
+        search_range = (
+            matching_keys[0].search_range
+            if matching_keys
+            else ProbabilityRange(MIN_PROBABILITY**2, 1 - MIN_PROBABILITY**2, False)
+        )
+        inner = np.array(
+            [
+                search_range.to_scale(min(max(place_values[path], search_range.low), search_range.high))
+                for place_values in values
+            ]
+        )
+        _, lo, hi = jackknife_interval(inner[1:], float(inner[0]))
+        intervals[path] = search_range.from_scale(lo), search_range.from_scale(hi)
+    return intervals
+
+
+def _derivatives(costs: Callable[[np.ndarray], np.ndarray], u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes (n, 1 + batches) of costs (1 + batches,) at a place u (n,) of the scale, and the curvature (n, n) of the
+    first."""
+    size, steps = len(u), STEP * np.eye(len(u))
+    centre_costs = costs(u)
+    upper_costs, lower_costs = ([costs(u + sign * step) for step in steps] for sign in (1, -1))
+    diagonal_costs = {(i, j): costs(u + steps[i] + steps[j]) for i, j in itertools.combinations(range(size), 2)}
+    slopes = (np.array(upper_costs) - np.array(lower_costs)) / (2 * STEP)
+    curvature = np.diag(
+        [(a[0] - 2 * centre_costs[0] + b[0]) / STEP**2 for a, b in zip(upper_costs, lower_costs, strict=True)]
+    )
+    for (i, j), diagonal in diagonal_costs.items():
+        curvature[i, j] = curvature[j, i] = (
+            diagonal[0] - upper_costs[i][0] - upper_costs[j][0] + centre_costs[0]
+        ) / STEP**2
+    return slopes, curvature
