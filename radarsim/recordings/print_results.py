@@ -90,6 +90,11 @@ def print_fit(fitted: "Fit") -> None:
         lines.append(line)
     if fitted.outliers is not None:
         lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * fitted.outliers, "#.2g")))
+    if fitted.near_outliers is not None and fitted.has_overlap:
+        width = significant_digits(fitted.near_outliers.width, "#.2g")
+        words = tr("some of them, {width} σ wide, look like sound plots: the intervals cover less often than stated",
+                   width=width)  # fmt: skip
+        lines.append(labelled_line("", words))
     if fitted.outlier_rows:
         rows = sentences.outlier_rows_text(fitted.outlier_rows)
         lines.append(labelled_line("", tr("far off: {rows}", rows=rows)))

@@ -9,7 +9,7 @@ import pytest
 from radarsim.api.load_experiments import load_all
 from radarsim.errors import ConfigError
 from radarsim.physics.motion import transition
-from radarsim.recordings import csv_output, simulate_plots, study_part, track, tracking_result
+from radarsim.recordings import csv_output, print_results, simulate_plots, study_part, track, tracking_result
 from radarsim.recordings.fit import advice, fit, newton_steps, profile_search, row_sample
 from radarsim.recordings.fit.likelihood_slice import no_progress
 from radarsim.recordings.report import sentences
@@ -118,6 +118,20 @@ def test_a_likelihood_that_jumps_is_searched_no_longer():
     assert jumping < 2 * smooth
     for here, there in zip(sound.keys[:2], rough.keys[:2], strict=True):
         assert there.value == pytest.approx(here.value, rel=0.02)
+
+
+def test_near_outliers_that_look_like_sound_plots_are_told(capsys):
+    """Every eighth range is 5 σ off, to either side; 100 σ off they look like no sound one."""
+    rng = np.random.default_rng(7)
+    track, is_off = recording(rng), np.arange(SCANS) % 8 == 3
+    side = np.where(np.arange(SCANS) % 16 == 3, 1, -1)
+    told = "look like sound plots: the intervals cover less often than stated"
+    for sigmas, overlaps in ((5, True), (100, False), (0, False)):
+        changed = track | {"range_m": track["range_m"] + is_off * side * sigmas * 250.0}
+        found = fit.fit_likelihood(likelihood(changed), None, [OUTLIERS])
+        assert found.has_overlap == overlaps
+        print_results.print_fit(found)
+        assert (told in " ".join(capsys.readouterr().out.split())) == overlaps
 
 
 def flown(*overrides, realisation=0):

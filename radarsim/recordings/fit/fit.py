@@ -63,6 +63,8 @@ class FitStages:
 
 
 MAX_PLAUSIBLE_OUTLIERS = 0.3  # of numbers that may be far outliers; with more, the errors follow another law
+SOUND_SIGMAS = 3.0  # by which a sound number may differ
+MAX_OVERLAP = 0.002  # of the numbers that are near outliers and look sound: with more, intervals cover less often
 OUTLIER_PROBABILITY = 0.5  # from which a number is named as an outlier
 CORRELATION_TIME_KEY = "correlation_time_s"
 ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
@@ -85,6 +87,26 @@ class Fit:
     plain: "Fit | None" = None
     outlier_rows: tuple["OutlierRow", ...] = ()  # the numbers that are probably outliers
     doubles: int = 0  # further plots of a track in a scan, left out
+    near_outliers: "NearOutliers | None" = None  # where outliers are allowed for
+
+    @property
+    def has_overlap(self) -> bool:
+        """Whether near outliers, which the plots plainly have, overlap the sound errors: then those that look sound
+        count as such, and the intervals cover less often than they say."""
+        if self.near_outliers is None or self.plain is None or self.gain - self.plain.gain <= PLAIN_GAIN:
+            return False
+        return self.near_outliers.share_within_sound() > MAX_OVERLAP
+
+
+class NearOutliers(NamedTuple):
+    """The share of near outliers among the numbers, and their width in σ."""
+
+    share: float
+    width: float
+
+    def share_within_sound(self) -> float:
+        """The share of the numbers that are near outliers and differ by less than sound ones may."""
+        return self.share * math.erf(SOUND_SIGMAS / (self.width * math.sqrt(2)))
 
 
 class FurtherExplanation(NamedTuple):
@@ -321,6 +343,7 @@ def fit_keys(
         gain,
         _find_further_explanation(search, likelihood),
         outlier_rows=_outlier_rows(search, likelihood),
+        near_outliers=NearOutliers(law.outliers * law.near, law.near_width) if robust else None,
     )
 
 
