@@ -127,6 +127,8 @@ def load(
 def read_result(stored: ResultFolder) -> Result:
     """The result in a folder: from its blocks if they are there, else from its tables."""
     experiment, folder = stored.experiment, Path(os.path.abspath(stored.folder))
+    if experiment is not None and experiment.stem != folder.name:
+        folder = Path(os.path.realpath(folder))  # a link may have another name
     if experiment is None or stored.record.get("judged") or experiment.stem != folder.name:
         return TableResult(stored)
     counted = replacement.with_counts(experiment, stored.files.counts)

@@ -84,6 +84,9 @@ def _find_config(source: str | bytes | os.PathLike[str], studies: Studies, fault
     if file.suffix.lower() == ".zip":
         faults.add(Origin(name), (), "is an archive: `radarsim check` verifies it, and `radarsim run` takes it")
         return None
+    if file.name == "run.json":
+        faults.add(Origin(name), (), f"is the record of a result, and no config; its folder is {file.parent}")
+        return None
     document = read_document(file, faults)
     if document and not is_stem(file.stem):  # it names the folder of results
         faults.add(

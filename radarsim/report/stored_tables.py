@@ -113,8 +113,11 @@ def _look_at_files(folder: Path, is_wanted: Callable[[str], bool]) -> StoredFile
 
 def no_result(folder: Path) -> str:
     """The error for a path that is no folder of a result."""
-    if folder.suffix.lower() == ".zip":
-        return f"{folder}: no folder of a result; `radarsim check {folder}` verifies an archive"
+    archive = next((path for path in (folder, *folder.parents) if path.suffix.lower() == ".zip"), None)
+    if archive is not None:
+        return f"{folder}: no folder of a result; `radarsim check {archive}` verifies an archive"
+    if folder.is_file():
+        return f"{folder}: no folder of a result, but a file; its folder is {folder.parent}"
     if not folder.exists():
         return f"{folder}: no result: there is no such folder"
     return f"{folder}: no result: there is no {RECORD} in it"

@@ -136,13 +136,22 @@ def test_a_damaged_table_has_one_sentence(fault, reader, folder):
         ("empty", "no result: there is no run.json in it"),
         ("nowhere", "no result: there is no such folder"),
         ("study.zip", "no folder of a result; `radarsim check"),
+        ("study.zip/results/rls2", "study.zip` verifies an archive"),
+        ("a/run.json", "no folder of a result, but a file; its folder is"),
     ],
 )
 def test_what_is_no_result_is_named(name, words, reader, tmp_path):
     (tmp_path / "empty").mkdir()
     (tmp_path / "study.zip").touch()
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "run.json").touch()
     result = READERS[reader](tmp_path / name)
     assert (result.exit_code, words in result.stderr) == (2, True), result.output
+
+
+def test_a_record_is_no_config(folder):
+    words = "run.json: is the record of a result, and no config; its folder is"
+    assert words in command("run", folder / "run.json", code=2).stderr
 
 
 def test_the_numbers_of_a_result_are_of_one_run(folder, monkeypatch):

@@ -45,6 +45,11 @@ def test_a_folder_suffices(ran, folder):
     assert "<table" in loaded._repr_html_()
 
 
+def test_a_link_of_another_name_leads_to_the_blocks(ran, tmp_path):
+    (tmp_path / "latest").symlink_to(ran.written.folder)
+    assert radarsim.load(tmp_path / "latest").figure("sigma_r")
+
+
 def test_a_name_needs_no_overrides(ran):
     with pytest.warns(UserWarning, match="not the shipped config"):
         loaded = radarsim.load("rls2", out=ran.written.folder.parent)
