@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from radarsim.cli import command_group, options
-from radarsim.errors import Interruption, NotChecked, RadarsimError, StoreError
+from radarsim.errors import ConfigError, Interruption, NotChecked, RadarsimError, StoreError
 from radarsim.language.translate import plural, tr
 
 if TYPE_CHECKING:
@@ -136,19 +136,27 @@ def print_large_runs(experiments: "Sequence[Experiment]", sources: "Sequence[tup
 
 
 def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: bool, as_json: bool) -> None:
-    """Verify archives, and print what was checked. Raises StoreError for faults, else NotChecked for what was not."""
+    """Verify archives, and print what was checked. Raises StoreError for faults, else ConfigError for files that are no
+    archives, else NotChecked for what was not checked."""
     from radarsim.api import json_output
     from radarsim.api.maintenance.check_archive import RECOMPUTED_PIECES, check_archive
     from radarsim.cli import console, print_inventory, progress
 
     documents: list[dict[str, Any]] = []
     faults: list[str] = []
+    refusals: list[str] = []
     not_checked: list[str] = []
     for archive in archives:
-        with progress.Progress(archive, quiet=as_json) as bar:
-            checked = check_archive(
-                archive, RECOMPUTED_PIECES if max_pieces is None else max_pieces, trust_code, bar.update
-            )
+        try:
+            with progress.Progress(archive, quiet=as_json) as bar:
+                checked = check_archive(
+                    archive, RECOMPUTED_PIECES if max_pieces is None else max_pieces, trust_code, bar.update
+                )
+        except (ConfigError, StoreError) as error:  # which says nothing of the other archives
+            lines = faults if isinstance(error, StoreError) else refusals
+            lines += error.lines
+            documents.append({"archive": archive, "errors": [*error.lines]})
+            continue
         for name, inspection in checked.results.items():
             faults += inspection.faults
             not_checked += [f"{archive}: {name}: {line}" for line in inspection.not_checked]
@@ -165,7 +173,9 @@ def check_archives(archives: Sequence[str], max_pieces: int | None, trust_code: 
     if as_json:
         click.echo(json_output.text(documents))
     if faults:
-        raise StoreError(*faults)
+        raise StoreError(*faults, *refusals)
+    if refusals:
+        raise ConfigError(*refusals)
     if not_checked:
         raise NotChecked(*not_checked)
 

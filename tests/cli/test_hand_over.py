@@ -312,6 +312,20 @@ def test_a_changed_byte_is_refused_before_anything_is_written(study, temporary, 
     assert "damaged or altered: results/rls2/curves.csv" in command("check", study, code=4).stderr
 
 
+def test_an_archive_that_cannot_be_read_does_not_keep_the_others_from_being_checked(study, tmp_path):
+    (tmp_path / "none.zip").write_text("no zip")
+    shutil.copy(study, tmp_path / "bad.zip")
+    content = bytearray(study.read_bytes())
+    content[content.index(b"sigma_lo")] ^= 1
+    (tmp_path / "bad.zip").write_bytes(content)
+    told = command("check", tmp_path / "none.zip", study, code=2)
+    assert "all intact" in told.stdout
+    assert "none.zip" in told.stderr
+    told = command("check", tmp_path / "none.zip", tmp_path / "bad.zip", study, code=4)
+    assert "all intact" in told.stdout
+    assert [line.split(": ")[0].rpartition("/")[2] for line in told.stderr.splitlines()] == ["bad.zip", "none.zip"]
+
+
 def test_without_blocks_it_says_last_what_was_not_verified(out, tmp_path):
     shutil.rmtree(out / ".blocks")
     told = command("pack", out / "rls2", "-o", tmp_path / "s.zip").stdout
