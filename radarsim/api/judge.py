@@ -14,7 +14,7 @@ from radarsim.api import arguments, configs, load_experiments, repeat_command, r
 from radarsim.api.configs import Config, Overrides
 from radarsim.api.estimate_files import read_estimates
 from radarsim.api.filter_checks import check_user_filter
-from radarsim.api.replacement import check_counts, check_replacement
+from radarsim.api.replacement import earlier_result
 from radarsim.config.case_choice import case_choice
 from radarsim.config.common_keys import UserFilterKeys
 from radarsim.config.document import Document
@@ -104,8 +104,9 @@ def run_judged_experiment(
 ) -> "Result":
     """The result of an experiment with a judged filter and the warnings of its checks, written if `out` is given."""
     if out is not None and not replace:
-        check_replacement(experiment, out, [member.name for member in experiment.cases[0].user_filters])
-        check_counts(experiment, {case.name: case.realisations for case in experiment.cases}, out)
+        earlier = earlier_result(experiment, out)
+        earlier.check_replacement([member.name for member in experiment.cases[0].user_filters])
+        earlier.check_counts({case.name: case.realisations for case in experiment.cases})
     try:
         result = run.run(experiment, **run_arguments)
     except (DisagreementError, MeasureError) as error:  # raised again below

@@ -6,6 +6,7 @@ else in its place must be asked for by `replace`."""
 import os
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Any
@@ -25,34 +26,51 @@ MAX_VALUE_CHARACTERS = 40
 Path_ = str | os.PathLike[str]
 
 
-def check_replacement(experiment: Experiment, out: Path_, judged: Sequence[str] = ()) -> None:
-    """Raise ConfigError if the folder of an experiment holds the tables of another study, other settings, another seed
-    or other judged filters; judged: the names of those of this run."""
-    record = _record(experiment, out)
-    if record is None:
-        return
-    if difference := _difference(record, experiment, judged):
-        raise _refusal(record, experiment, out, difference)
+@dataclass(frozen=True)
+class EarlierResult:
+    """The result in the folder of an experiment under `out`, as it was when its record was read; None: no record that
+    can be read."""
+
+    experiment: Experiment
+    out: Path_
+    record: Mapping[str, Any] | None
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """The realisations of each case that its tables have."""
+        return {} if self.record is None else _counts(self.record)
+
+    def check_replacement(self, judged: Sequence[str] = ()) -> None:
+        """Raise ConfigError if its tables are of another study, other settings, another seed or other judged filters;
+        judged: the names of those of this run."""
+        if self.record is not None and (difference := _difference(self.record, self.experiment, judged)):
+            raise _refusal(self.record, self.experiment, self.out, difference)
+
+    def check_counts(self, done: Mapping[str, int]) -> None:
+        """Raise ConfigError if a case of these counts has fewer realisations than its tables."""
+        if self.record is not None and any(done.get(name, 0) < count for name, count in self.counts.items()):
+            raise _refusal(self.record, self.experiment, self.out, tr("and this result would have fewer"))
+
+    def larger_counts(self) -> dict[str, int]:
+        """The realisations of each case of which its tables hold more than the experiment asks for. Raises ConfigError
+        if their blocks are not stored, so that the tables cannot be made again."""
+        counts, cases = self.counts, self.experiment.cases
+        larger = {case.name: counts[case.name] for case in cases if counts.get(case.name, 0) > case.realisations}
+        for case in cases:
+            if case.name in larger and not has_blocks(CaseWork(case), larger[case.name], self.out):
+                assert self.record is not None  # it gives the counts
+                why = tr("whose blocks are not stored, and this result would have fewer")
+                raise _refusal(self.record, self.experiment, self.out, why)
+        return larger
 
 
-def check_counts(experiment: Experiment, done: Mapping[str, int], out: Path_) -> None:
-    """Raise ConfigError if a case of these counts has fewer realisations than the tables that the folder holds."""
-    record = _record(experiment, out)
-    if record is not None and any(done.get(name, 0) < count for name, count in _counts(record).items()):
-        raise _refusal(record, experiment, out, tr("and this result would have fewer"))
-
-
-def larger_counts(experiment: Experiment, out: Path_) -> dict[str, int]:
-    """The realisations of each case of which the folder's tables hold more than the experiment asks for. Raises
-    ConfigError if their blocks are not stored, so that the tables cannot be made again."""
-    record = _record(experiment, out)
-    counts = {} if record is None else _counts(record)
-    larger = {case.name: counts[case.name] for case in experiment.cases if counts.get(case.name, 0) > case.realisations}
-    for case in experiment.cases:
-        if case.name in larger and not has_blocks(CaseWork(case), larger[case.name], out):
-            assert record is not None  # it gives the counts
-            raise _refusal(record, experiment, out, tr("whose blocks are not stored, and this result would have fewer"))
-    return larger
+def earlier_result(experiment: Experiment, out: Path_) -> EarlierResult:
+    """The result that the folder of an experiment holds; its record is read once."""
+    try:
+        record = stored_tables.find_record(Path(out) / experiment.stem)
+        return EarlierResult(experiment, out, record if record is None or _counts(record) else None)
+    except StoreError:
+        return EarlierResult(experiment, out, None)  # what cannot be read cannot be lost
 
 
 def has_blocks(work: CaseWork, realisations: int, out: Path_) -> bool:
@@ -78,24 +96,9 @@ def larger_counts_note(experiment: Experiment, counts: Mapping[str, int], out: P
     )
 
 
-def stored_counts(experiment: Experiment, out: Path_) -> dict[str, int]:
-    """The realisations of each case that the tables in the folder of an experiment have; empty without tables."""
-    record = _record(experiment, out)
-    return {} if record is None else _counts(record)
-
-
 def _counts(record: Mapping[str, Any]) -> dict[str, int]:
     """The realisations of each case that a record says are done."""
     return {name: case["done"] for name, case in record["cases"].items()}
-
-
-def _record(experiment: Experiment, out: Path_) -> dict[str, Any] | None:
-    """The record of the result in the folder of an experiment; None where there is none that can be read."""
-    try:
-        record = stored_tables.find_record(Path(out) / experiment.stem)
-        return record if record is None or _counts(record) else None
-    except StoreError:
-        return None  # what cannot be read cannot be lost
 
 
 def _difference(record: Mapping[str, Any], experiment: Experiment, judged: Sequence[str]) -> str:

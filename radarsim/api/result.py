@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.api import arguments, configs
 from radarsim.api.display import Displayable, ShortTuple
-from radarsim.api.replacement import check_counts, check_replacement
+from radarsim.api.replacement import earlier_result
 from radarsim.api.result_config import config_text
 from radarsim.api.result_content import case_figures, case_tables, make_answer, question_text, with_first_baseline
 from radarsim.api.write_result import WrittenFiles, write_files
@@ -223,8 +223,9 @@ class Result(Displayable):
 
         arguments.check_arguments(out=out, figures=figures, width_mm=width_mm)
         if not replace:
-            check_replacement(self.experiment, out, list(self.facts.get("judged", ())))
-            check_counts(self.experiment, {case.name: case.count for case in self.cases}, out)
+            earlier = earlier_result(self.experiment, out)
+            earlier.check_replacement(list(self.facts.get("judged", ())))
+            earlier.check_counts({case.name: case.count for case in self.cases})
         folder = Path(out) / self.experiment.stem
         for extension in extensions():
             self._tables.update(extension.updated_tables(self._tables, self.experiment.study, Path(out)))

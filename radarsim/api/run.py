@@ -13,7 +13,7 @@ from radarsim.api.executor import open_executor
 from radarsim.api.load_experiments import combine_overrides
 from radarsim.api.progress import Progress
 from radarsim.api.repeat_command import repeat_command
-from radarsim.api.replacement import check_replacement, larger_counts, stored_counts, with_counts
+from radarsim.api.replacement import earlier_result, with_counts
 from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, missing_pieces, simulate, works_by_identity
 from radarsim.api.stored_runs import config_filter_warnings, make_result
@@ -108,10 +108,11 @@ def run(
     at_least: Mapping[str, int] = {}
     requested = experiment
     if out is not None and not replace:
-        check_replacement(experiment, out)
-        at_least = stored_counts(experiment, out)
+        earlier = earlier_result(experiment, out)
+        earlier.check_replacement()
+        at_least = earlier.counts
         if precision is None and not decide:
-            experiment = with_counts(experiment, larger_counts(experiment, out))
+            experiment = with_counts(experiment, earlier.larger_counts())
     started, writing_s = time.perf_counter(), None
     filter_warnings = config_filter_warnings(experiment)
     if out is not None and isinstance(limit, stopping.TimeLimit) and limit.remaining_s >= MIN_MEASURED_LIMIT_S:

@@ -143,7 +143,7 @@ def report(
     overrides = load_experiments.combine_overrides(overrides, realisations, seed)
 
     def write_stored_result(experiment: "Experiment", progress: object) -> "Result":
-        counts = {} if replace or realisations is None else replacement.larger_counts(experiment, out)
+        counts = {} if replace or realisations is None else replacement.earlier_result(experiment, out).larger_counts()
         stored_experiment = replacement.with_counts(experiment, counts)
         result = stored_runs.stored_result(stored_experiment, out=out, overrides=overrides)
         if counts:

@@ -139,8 +139,9 @@ def check_replacements(loaded: "list[Experiment]", out: str, quiet: bool, ends_e
     faults: list[str] = []
     for experiment in loaded:
         try:
-            replacement.check_replacement(experiment, out)
-            larger = {} if ends_early else replacement.larger_counts(experiment, out)
+            earlier = replacement.earlier_result(experiment, out)
+            earlier.check_replacement()
+            larger = {} if ends_early else earlier.larger_counts()
         except ConfigError as error:
             faults += error.lines
             continue

@@ -6,11 +6,14 @@ import shlex
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 import radarsim
+from radarsim.api import replacement
 from radarsim.errors import ConfigError
+from radarsim.report import stored_tables
 from tests.program import command, csv_bytes, record
 
 QUIET = ("--no-figures", "-q")
@@ -225,3 +228,15 @@ def test_a_kill_at_any_moment_leaves_all_of_the_old_or_all_of_the_new(tmp_path):
     assert len(states) > 20
     assert states == sorted(states, reverse=True)
     assert set(states) == {"old", "new"}
+
+
+def test_what_a_folder_holds_is_read_once_before_a_run_and_once_as_it_is_written(out, monkeypatch):
+    folders = []
+
+    def find_record(folder):
+        folders.append(folder)
+        return stored_tables.find_record(folder)
+
+    monkeypatch.setattr(replacement, "stored_tables", SimpleNamespace(find_record=find_record))
+    radarsim.run("rls2", realisations=4000, out=out, figures=False)
+    assert folders == [out / "rls2"] * 2
