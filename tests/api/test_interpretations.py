@@ -360,17 +360,17 @@ def test_what_is_undecided_runs_on_until_it_is_decided(ran, tmp_path):
     before = few.papers[0].claims[0]
     assert before.outcome.kind == UNDECIDED
     assert before.undecided
-    assert not few.remaining_s
+    assert not few.undecided_messages
     little = judge_requests([wanted], out=tmp_path, realisations=60, decide=True, figures=False)
     assert little.papers[0].claims[0].outcome == before.outcome  # the most is what it began with
     assert (
         f"P1.8 not yet decided under {len(before.undecided)} interpretations at 60 realisations; "
-        in little.remaining_s[0]
+        in little.undecided_messages[0]
     )
     decided = judge_requests([wanted], out=tmp_path, realisations=64_000, decide=True, figures=False)
     (over,) = decided.papers[0].claims
     assert over.outcome.kind != UNDECIDED
-    assert not decided.remaining_s
+    assert not decided.undecided_messages
     counts = {judged.n for one in over.verdicts for _, judged in one.parts}
     assert counts - {60} <= {2000 * 2**m for m in range(6)}
     open_ = {one.interpretation for one in before.undecided}
