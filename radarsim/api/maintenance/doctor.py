@@ -93,7 +93,7 @@ def inspect_result(
     elif not (recompute or inspection.faults) and (
         absent := [name for name in record["identities"] if name not in audits]
     ):
-        further_cases = f" and {len(absent) - 1} other cases" if len(absent) > 1 else ""
+        further_cases = f" and {len(absent) - 1} more" if len(absent) > 1 else ""
         cases = "" if len(absent) == len(record["identities"]) else f" of {absent[0]}{further_cases}"
         inspection.not_checked.append(f"nothing{cases} could be recomputed: no blocks are stored")
     return inspection

@@ -121,7 +121,7 @@ def _block_files(folder: Path, record: Mapping[str, Any], notes: list[str]) -> d
     if judged := record.get("judged"):
         notes.append(f"{folder}: the estimates of its judged filter {', '.join(judged)} are not in it: hashes alone")
     elif missing:
-        further_cases = f" and {len(missing) - 1} other cases" if len(missing) > 1 else ""
+        further_cases = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         notes.append(
             f"{folder}: no blocks of {missing[0]}{further_cases} are stored: it can only be recomputed as a whole"
         )
