@@ -26,6 +26,9 @@ CHANGES = (  # how sentences write a column: itself, in per cent, of a gain the 
 )
 
 
+WITHOUT_COLUMN = re.compile(r"over the bound|отнесённое к границе")  # σ over the posterior bound, which no table has
+
+
 class Reading(NamedTuple):
     """What a sentence's numbers are: found in a row, contradicted by it, or in no row."""
 
@@ -55,6 +58,21 @@ def columns_of(tables) -> Iterator[Table]:
                 yield Table(f"{name}.{value}", *numbers[:3], exact)
 
 
+def derived_columns(tables) -> Iterator[Table]:
+    """σ over what a filter believes, and σ by a paired gain over a baseline whose σ is exact."""
+    curves, gains = tables["curves"], tables["gains"]
+    ratios = [curves[name].to_numpy(float) for name in ("sigma", "sigma_lo", "sigma_hi")]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        believed = curves["believed_sigma"].to_numpy(float)
+        yield Table("σ over believed", *(part / believed for part in ratios), np.full(len(curves), np.nan))
+    keys = ["case", "baseline", "component", "k"]
+    exact = curves.rename(columns={"filter": "baseline"})[[*keys, "exact_sigma"]]
+    paired = gains.merge(exact, on=keys, how="left")
+    base = paired["exact_sigma"].to_numpy(float)
+    parts = [base * (1 - paired[name].to_numpy(float) / 100) for name in ("gain_percent", "gain_hi", "gain_lo")]
+    yield Table("paired σ", *parts, np.full(len(paired), np.nan))
+
+
 def number(text: str) -> tuple[float, float]:
     """A number of a sentence, and half a unit of its last digit."""
     text = text.replace("−", "-").replace("\u202f", "").replace("\u00a0", "").replace(",", "").replace("∞", "inf")
@@ -79,6 +97,7 @@ def read_sentence(sentence: str, tables: Mapping, language: str = "en", derived=
     if language != "en":
         sentence = RUSSIAN_COMMA.sub(".", sentence).replace("; ", ", ")
     columns, read, faults = [*columns_of(tables), *derived], [], []
+    sentence = WITHOUT_COLUMN.split(sentence)[0]
     for match in MEASURED.finditer(sentence):
         text = match[0]
         rows = [found for column in columns for found in _rows(column, match, bool(FOR_ALL.search(sentence)))]

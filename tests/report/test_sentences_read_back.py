@@ -8,7 +8,7 @@ from radarsim.api import result_content
 from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.language import current
-from tests.report.sentence_reader import read_sentence
+from tests.report.sentence_reader import derived_columns, read_sentence
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 RANGE = {"observes": ["range"], "manoeuvre_variance": 1e-3}
@@ -30,7 +30,7 @@ def faults_of(result):
         with current.use_language(code):
             texts = result_content.make_answer(result.cases, result._tables).texts
         for text in texts:
-            reading = read_sentence(text, result._tables, code)
+            reading = read_sentence(text, result._tables, code, list(derived_columns(result._tables)))
             faults += [f"{code}: {text}: {fault}" for fault in reading.faults]
             count += len(reading.read)
     return faults, count

@@ -85,7 +85,7 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
             "most with {most}, least with {least}.",
             usual=USUAL_FALSE_ALARM_RATE,
             most=texts[-1],
-            least=texts[0],
+            least=texts[0] + values[0].choice_remark(),
         )
     intervals = [interval for value in values for interval in value.intervals]
     return [Sentence(case_selection.after_swept_values(result, text), tuple(intervals))]
