@@ -80,7 +80,7 @@ def test_a_planted_import_is_seen():
     assert {"numba", "kernels.second_order"} <= loaded_with("studies.range_doppler.kernels.missed_block")
 
 
-MAX_LINES = {"run": 28_500, "sums": 13_500}  # a little above what they were when this was written: 27,900 and 12,700
+MAX_LINES = {"run": 29_000, "sums": 13_500}  # a little above what they were when this was written: 28,300 and 12,700
 WAYS = {"run": ("run", "rls2", "-n", "2000", "--quiet", "--out", "results"), "sums": ("--sums", "rls2")}
 PARTS = (  # which `radarsim run rls2` has no use for
     *("api.design", "api.maintenance", "recordings.commands", "report.comparison", "report.user_filters.answer"),
@@ -92,11 +92,11 @@ PARTS = (  # which `radarsim run rls2` has no use for
 @pytest.mark.slow_cases("run")
 @pytest.mark.parametrize("way", WAYS)
 def test_a_command_imports_little_that_it_has_no_use_for(way, tmp_path):
-    """From config to sums under 13,500 lines, the whole of `radarsim run rls2` under 28,500.
+    """From config to sums under 13,500 lines, the whole of `radarsim run rls2` under 29,000.
 
     15,000 were once meant for the whole. That is the way from config to sums; a run also writes tables with intervals,
     judges 30 claims by the paper's measures, says what the answer is, and draws and writes a page: 15,000 lines more,
-    of which all but 1,000 lie in modules that do something in it (`python -m tests.loaded_lines run rls2`)."""
+    of which all but 1,600 lie in modules that do something in it (`python -m tests.loaded_lines run rls2`)."""
     command = [sys.executable, "-m", "tests.loaded_lines", *WAYS[way]]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (ROOT, os.environ.get("PYTHONPATH", ""))))}
     ended = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
