@@ -142,6 +142,7 @@ def test_a_class_does_not_outlive_the_edit_of_its_measure(package):
         "measure: {gain: {filter: kalman, component: x}}, expected: {above: 10}",
         "measure: {sigma: {filter: fixed, component: x, at: 1}}, expected: {above: 10}",
     )
+    assert f"{NAME}.1 not run" in " ".join(package.command("claims", NAME).stdout.split())
     package.command("run", NAME, "-n", "2000", "--no-figures", "-q")
     after = package.command("claims", NAME, "--parts").stdout
     assert f"{NAME}.1 refuted as shipped; other interpretations not judged" in " ".join(after.split())
