@@ -153,7 +153,9 @@ def add_user_filter(
     counts: dict[str, Any] = {"realisations": n or available} if n or available else {}
     cases = tuple(replaced(case, user_filters=(*case.user_filters, member), **counts) for case in cases)
     stem = f"{experiment.stem}_{'_'.join(name.split())}"
-    judged_experiment = replaced(experiment, stem=stem, cases=cases, content=_named(experiment, stem), **counts)
+    judged_experiment = replaced(
+        experiment, stem=stem, cases=cases, content=_renamed_content(experiment, stem), **counts
+    )
     return judged_experiment, [
         *tuning_warnings,
         *(line for case in judged_experiment.cases for line in check_user_filter(case, member)),
@@ -163,7 +165,7 @@ def add_user_filter(
 OUTER_KEYS = ("figures", "realisations", "runs", "scenarios", "seed")  # of a config that includes another
 
 
-def _named(experiment: Experiment, stem: str) -> dict[str, Any] | None:
+def _renamed_content(experiment: Experiment, stem: str) -> dict[str, Any] | None:
     """The content of an experiment under another name; its cases keep theirs."""
     if experiment.content is None:
         return None

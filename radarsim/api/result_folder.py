@@ -56,8 +56,8 @@ def choose_result(
     """The result that a source means: of a name that in `out`, else one here; of a path that alone. And a note where
     the name could mean something else, too; names_config: also a config of other settings."""
     for place in result_places(source, out):
-        if (found := find_result(place)) is not None:
-            return found, _choice_note(os.fspath(source), found, names_config)
+        if (result := find_result(place)) is not None:
+            return result, _choice_note(os.fspath(source), result, names_config)
     return None, ""
 
 
@@ -89,9 +89,9 @@ def _is_of_config(result: ResultFolder, config: Path) -> bool:
 
 def result_of(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> tuple[ResultFolder, str]:
     """As `choose_result`. Raises ConfigError where there is no result."""
-    found, note = choose_result(source, out)
-    if found is not None:
-        return found, note
+    result, note = choose_result(source, out)
+    if result is not None:
+        return result, note
     places = result_places(source, out)
     if len(places) == 1:
         raise ConfigError(no_result(places[0]))
@@ -101,10 +101,10 @@ def result_of(source: str | os.PathLike[str], out: str | os.PathLike[str]) -> tu
 def config_to_report(name: str, out: str | os.PathLike[str]) -> tuple[str, str]:
     """The config of which `radarsim report NAME` writes the result, and a note as in `choose_result`: that which the
     result of this name in `out` keeps, where it is another than the config of this name."""
-    found = find_result(Path(out) / name) if is_stem(name) else None
-    if found is None or found.experiment is None or found.record.get("judged"):
+    result = find_result(Path(out) / name) if is_stem(name) else None
+    if result is None or result.experiment is None or result.record.get("judged"):
         return name, ""
     config = configs.config_path(name)
-    if config is not None and _is_of_config(found, config):
+    if config is not None and _is_of_config(result, config):
         return name, ""
-    return str(found.folder), _choice_note(name, found)
+    return str(result.folder), _choice_note(name, result)

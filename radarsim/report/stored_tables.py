@@ -153,37 +153,37 @@ def _check_record(record: Any) -> None:
         if key not in record:
             raise ValueError(f"lacks `{key}`")
         if not isinstance(record[key], kind):
-            raise ValueError(f"`{key}` must be {words}, got {_shown(record[key])}")
+            raise ValueError(f"`{key}` must be {words}, got {_short_json(record[key])}")
     for name, version in _object(record.get("versions", {}), "`versions`").items():
         if not isinstance(version, str):
-            raise ValueError(f"`versions` of {name} must be a text, got {_shown(version)}")
+            raise ValueError(f"`versions` of {name} must be a text, got {_short_json(version)}")
     for name, package in _object(record.get("packages", {}), "`packages`").items():
         details = _object(package, f"`packages` of {name}")
         if not all(isinstance(details.get(key), str) for key in ("version", "sha256")):
-            raise ValueError(f"`packages` of {name} must have version and sha256, got {_shown(package)}")
+            raise ValueError(f"`packages` of {name} must have version and sha256, got {_short_json(package)}")
     for name, case in record["cases"].items():
         done = _object(case, f"case {name}").get("done")
         if type(done) is not int or done < 0:
-            raise ValueError(f"`done` of case {name} must be a whole number, got {_shown(done)}")
+            raise ValueError(f"`done` of case {name} must be a whole number, got {_short_json(done)}")
     for name, identity in record["identities"].items():
         if name not in record["cases"]:
             raise ValueError(f"`cases` lacks {name}, which `identities` has")
         if not isinstance(identity, str) or not IDENTITY.fullmatch(identity):
-            raise ValueError(f"`identities` of {name} must be a hash, got {_shown(identity)}")
+            raise ValueError(f"`identities` of {name} must be a hash, got {_short_json(identity)}")
     for name, digest in record["outputs"].items():
         if not isinstance(digest, str):
-            raise ValueError(f"`outputs` of {name} must be a hash, got {_shown(digest)}")
+            raise ValueError(f"`outputs` of {name} must be a hash, got {_short_json(digest)}")
         if Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
-            raise ValueError(f"`outputs` must lie in the folder, got {_shown(name)}")
+            raise ValueError(f"`outputs` must lie in the folder, got {_short_json(name)}")
 
 
 def _object(value: Any, name: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ValueError(f"{name} must be an object, got {_shown(value)}")
+        raise ValueError(f"{name} must be an object, got {_short_json(value)}")
     return value
 
 
-def _shown(value: object) -> str:
+def _short_json(value: object) -> str:
     """A value of JSON, shortened."""
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= MAX_SHOWN_CHARACTERS else text[:MAX_SHOWN_CHARACTERS] + "…"
@@ -219,7 +219,7 @@ def _column_fault(name: str, table: "pd.DataFrame") -> str | None:
     for column in numbers:
         if len(table) and table[column].dtype.kind not in "fi":
             text = next(value for value in table[column] if not _is_number(value))
-            return f"is no table of {name}: column {column} must hold numbers, got {_shown(text)}"
+            return f"is no table of {name}: column {column} must hold numbers, got {_short_json(text)}"
     return None
 
 

@@ -71,7 +71,7 @@ def computing_packages(case: Case) -> dict[str, UserPackage]:
         return {}
     groups = entry_points_by_name(), entry_points_by_name(FILTERS)
     entries = [entry for group in groups for by_package in group.values() for entry in by_package.values()]
-    names = {top: found[0] for top, found in packages_distributions().items()}
+    names = {top: libraries[0] for top, libraries in packages_distributions().items()}
     names |= {entry.module.partition(".")[0]: entry.dist.name for entry in entries if entry.dist}
     packages = {}
     for top in tops:
