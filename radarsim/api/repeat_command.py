@@ -57,7 +57,7 @@ def command(
     for override in overrides:
         key, _, value = override.partition("=")
         words += [SHORT_OPTIONS[key], value] if key in SHORT_OPTIONS else ["--set", override]
-    if experiment.runs:
+    if experiment.runs and verb == "run":
         words += ["--runs", experiment.runs]
     if precision is not None:
         percent, quantity_name = precision
