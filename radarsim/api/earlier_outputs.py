@@ -1,7 +1,7 @@
 """Outputs of an earlier run in the folder of a result: which stay, which are removed, and how these are made again.
 
-Figures, as in another format, and the table of runs stay where the earlier run has the same numbers, as both were asked
-for and are of this very result."""
+Figures (of another format, say) and the table of runs stay if the earlier run has the same numbers: a user asked for
+them, and they still show this result."""
 
 import csv
 from collections.abc import Iterable, Mapping
@@ -33,7 +33,7 @@ def earlier_outputs(folder: Path, record: Mapping[str, Any]) -> EarlierOutputs:
         files = None
     if files is None:
         return EarlierOutputs({}, tuple(names), b"")
-    has_same_numbers = _numbers(files.record) == _numbers(record)
+    has_same_numbers = _numbers_key(files.record) == _numbers_key(record)
     lasting = {name: files.record["outputs"][name] for name in files.contents if has_same_numbers}
     removable = tuple(name for name in names if name not in lasting)
     return EarlierOutputs(lasting, removable, files.contents.get(RUNS_FILE, b""))
@@ -43,7 +43,7 @@ def _can_last(name: str) -> bool:
     return name.startswith(FIGURES) or name == RUNS_FILE
 
 
-def _numbers(record: Mapping[str, Any]) -> object:
+def _numbers_key(record: Mapping[str, Any]) -> object:
     """What the numbers of a result follow from: by case the realisations and the identity of their blocks."""
     return {name: case["done"] for name, case in record["cases"].items()}, record["identities"], record.get("judged")
 

@@ -205,7 +205,7 @@ def case_figures(
 
     The config may select fewer: `Experiment.selected_figures`."""
     case_study = study(results[0].study)
-    figure_tables = _with_bands(tables_by_name)
+    figure_tables = interval_notes.without_noted_intervals(tables_by_name)
     figures_by_name = _study_figures(
         results, user_filters_rows.without_user_filters(figure_tables, results), experiment
     )
@@ -252,16 +252,6 @@ def _study_figures(
             f"{name}_{n + 2}": figure for name, figure in baseline_figures.items() if name.startswith("gain_")
         }
     return figures_by_name
-
-
-def _with_bands(tables_by_name: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
-    """The tables for figures: without the interval of σ or gain where a note marks it."""
-    thinned_tables = {}
-    for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
-        table = tables_by_name[name]
-        if (is_marked := has_note(table)).any():
-            thinned_tables[name] = table.assign(**{end: table[end].mask(is_marked) for end in ends})
-    return {**tables_by_name, **thinned_tables}
 
 
 def undeclared_figures(case_study: Study, described: Iterable[str]) -> list[str]:

@@ -18,10 +18,10 @@ from radarsim.api.run_facts import run_facts
 from radarsim.api.simulate_cases import RunOptions, Shares, compute_shares, missing_pieces, simulate, works_by_identity
 from radarsim.api.stored_runs import config_filter_warnings, make_result
 from radarsim.config.experiment import Experiment
-from radarsim.engine import stopping
+from radarsim.engine import stop_conditions
 from radarsim.engine.executors import Executor
 from radarsim.engine.machine import available_cores
-from radarsim.engine.stopping import Signals, Stop
+from radarsim.engine.stop_conditions import Signals, Stop
 from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.extensions import StopRule, stop_rule
 from radarsim.system.threads import limited
@@ -104,7 +104,7 @@ def run(
     rule = required_stop_rule() if decide else None
     if rule is not None:
         rule.check(experiment)
-    limit = time_limit if time_limit is None or callable(time_limit) else stopping.TimeLimit(time_limit)
+    limit = time_limit if time_limit is None or callable(time_limit) else stop_conditions.TimeLimit(time_limit)
     at_least: Mapping[str, int] = {}
     requested = experiment
     if out is not None and not replace:
@@ -115,13 +115,13 @@ def run(
             experiment = with_counts(experiment, earlier.larger_counts())
     started, writing_s = time.perf_counter(), None
     filter_warnings = config_filter_warnings(experiment)
-    if out is not None and isinstance(limit, stopping.TimeLimit) and limit.remaining_s >= MIN_MEASURED_LIMIT_S:
+    if out is not None and isinstance(limit, stop_conditions.TimeLimit) and limit.remaining_s >= MIN_MEASURED_LIMIT_S:
         from radarsim.api.writing_time import writing_seconds
 
         limit = limit.with_reserve(writing_s := writing_seconds(experiment, figures, width_mm))
     with open_executor(workers, scheduler) if executor is None else nullcontext(executor) as pool:
         threads = pool.workers if pool else available_cores() if threads is None else int(threads)
-        options = RunOptions(out, threads, stopping.AnyStop(stop, limit), pool, at_least)
+        options = RunOptions(out, threads, stop_conditions.AnyStop(stop, limit), pool, at_least)
         if rule is not None:
             simulated = rule.simulate(experiment, options, progress)
         else:
@@ -172,7 +172,7 @@ def run_share(
     stop: Signals | None = None,
 ) -> Shares:
     """Compute a share of every case, such as (2, 3) for the second of three, into the store under out. See `run`."""
-    options = RunOptions(out, threads, stopping.AnyStop(stop, time_limit), executor)
+    options = RunOptions(out, threads, stop_conditions.AnyStop(stop, time_limit), executor)
     works = dict(works_by_identity(experiment))
     if stop is not None:
         stop.missing = partial(missing_pieces, works, share, out)

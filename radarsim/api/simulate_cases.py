@@ -17,7 +17,7 @@ from radarsim.engine.collect import collect, compute_share, read_stored
 from radarsim.engine.dispatch import CollectedSums, ShareResult
 from radarsim.engine.executors import Executor
 from radarsim.engine.results import CaseResult
-from radarsim.engine.stopping import Stop
+from radarsim.engine.stop_conditions import Stop
 from radarsim.engine.store.inventory import take_inventory
 from radarsim.errors import ConfigError
 from radarsim.report.quantities import SIGMA
@@ -183,11 +183,21 @@ def _collect_case(
 ) -> "tuple[CollectedSums, WidestInterval | None]":
     """The sums of a case, and the cell of its widest interval where a precision is set. at_least: realisations that are
     stored, and used in any case."""
-    if target is None:
-        collected = collector(case.realisations)
-        return (
-            replace(collector(at_least), stopped=collected.stopped) if collected.count < at_least else collected
-        ), None
+    if target is not None:
+        return _collect_to_precision(case, work, target, collector, at_least)
+    collected = collector(case.realisations)
+    if collected.count < at_least:
+        collected = replace(collector(at_least), stopped=collected.stopped)
+    return collected, None
+
+
+def _collect_to_precision(
+    case: Case, work: CaseWork, target: PrecisionTarget, collector: Callable[[int], CollectedSums], at_least: int
+) -> "tuple[CollectedSums, WidestInterval | None]":
+    """The sums of a case once its widest interval is narrow enough, and the cell of that interval.
+
+    The intervals are looked at for a doubling number of realisations; they count from the fewest that rare large errors
+    allow (`minimum_realisations`). Ends at the realisations of the case, or when the run is stopped."""
     from radarsim.report.precision import (
         FIRST_LOOK,
         MIN_REALISATIONS_WITHOUT_TAILS,

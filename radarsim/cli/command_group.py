@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 import radarsim
-from radarsim.cli.exit_codes import NO_THREAD, fail, file_error, stop_on_signals
+from radarsim.cli.early_end import NO_THREAD, fail, file_error, stop_on_signals
 from radarsim.cli.options import language_option
 from radarsim.errors import AUTHOR_ERRORS, ON_COMMAND_LINE, ConfigError, RadarsimError
 from radarsim.extensions import extensions

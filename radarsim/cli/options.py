@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from radarsim.cli.exit_codes import fail
+from radarsim.cli.early_end import fail
 from radarsim.errors import ConfigError
 from radarsim.language import current
 from radarsim.system.threads import limited

@@ -12,9 +12,9 @@ from radarsim.api.load_experiments import load_all
 from radarsim.api.maintenance.reproduce import reproduce, summary
 from radarsim.api.repeat_command import RESULTS
 from radarsim.cli import console
-from radarsim.cli.exit_codes import file_error
+from radarsim.cli.early_end import file_error
 from radarsim.cli.streams import tolerant_output
-from radarsim.engine.stopping import Signals
+from radarsim.engine.stop_conditions import Signals
 from radarsim.errors import ON_COMMAND_LINE, RadarsimError
 
 

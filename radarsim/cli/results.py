@@ -82,9 +82,9 @@ def judge(
       radarsim judge rls2 estimates.npz --against tuned --for "sigma r at 60 s"
     """
     refuse_quantity_without_precision(of, precision)
-    from radarsim.engine import stopping
+    from radarsim.engine import stop_conditions
 
-    with stopping.Signals() as stop:
+    with stop_conditions.Signals() as stop:
         from radarsim.api import judge as api_judge
         from radarsim.api import load_experiments, precision_target
 

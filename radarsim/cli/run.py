@@ -95,10 +95,10 @@ def run(
         raise click.UsageError("--shard and --runs do not go together: a share has no tables")
     if workers and scheduler:
         raise click.UsageError("--workers and --scheduler do not go together: give one of them")
-    from radarsim.engine import stopping
+    from radarsim.engine import stop_conditions
 
-    limit = stopping.TimeLimit(time_limit) if time_limit else None
-    with stopping.Signals() as stop, hand_over.loadable(configs, trust_code) as sources:
+    limit = stop_conditions.TimeLimit(time_limit) if time_limit else None
+    with stop_conditions.Signals() as stop, hand_over.loadable(configs, trust_code) as sources:
         from radarsim.api import executor, load_experiments
         from radarsim.api import run as api_run
 

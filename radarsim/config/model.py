@@ -68,7 +68,7 @@ class Model(BaseModel):
     def _run_cross_checks(self) -> Self:
         misfits = list(self.misfits())
         if misfits:
-            raise PydanticCustomError("at", "fields that do not go together", {"faults": misfits})
+            raise PydanticCustomError("cross_check", "fields that do not go together", {"faults": misfits})
         return self
 
     @model_validator(mode="after")

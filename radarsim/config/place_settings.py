@@ -10,7 +10,7 @@ from radarsim.config.inline_files import ConfigFiles, inline_scenarios
 from radarsim.config.model import in_degrees, in_radians
 from radarsim.config.study_keys import StudyKeys
 from radarsim.config.user_filter_keys import is_code
-from radarsim.config.validate import allowed_keys, model_at, unknown_key
+from radarsim.config.validate import allowed_keys, model_at, unknown_key_message
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def _paths_in_members(document: Document, model: type[StudyKeys], key: str) -> l
         if key in keys:
             paths.append((model.bare_keys, i, key))
     if not paths:
-        raise NoSuchKey(unknown_key(key, [*allowed_keys(model), *known_keys]))
+        raise NoSuchKey(unknown_key_message(key, [*allowed_keys(model), *known_keys]))
     return paths
 
 

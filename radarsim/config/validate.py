@@ -84,7 +84,7 @@ class _InputError:
         if kind in ("union_tag_invalid", "union_tag_not_found", "no_such_kind"):
             path = (*path, context["discriminator"].strip("'"))
             kind = kind if document.get(path) is not ABSENT else "missing"
-        if kind == "at":
+        if kind == "cross_check":
             return [cls.misfit(misfit, path, document) for misfit in context["faults"]]
         return [cls(kind, path, context, error["msg"])]
 
@@ -93,7 +93,9 @@ class _InputError:
         """The error that a cross-check of the mapping at a path reports."""
         *outer_steps, key = fault.key.split(".")
         outer_path = [int(step) if step.isdecimal() else step for step in outer_steps]
-        return cls("at", twin(document.data, (*path, *outer_path), key), {"message": fault.message}, fault.message)
+        return cls(
+            "cross_check", twin(document.data, (*path, *outer_path), key), {"message": fault.message}, fault.message
+        )
 
 
 class _PartialCheck:
@@ -115,7 +117,7 @@ class _PartialCheck:
         return self.further_errors
 
     def _read(self, path: KeyPath) -> Model:
-        """The mapping at a path, without the fields that have errors; raises NotRead if it is not a mapping."""
+        """The mapping at a path without the fields that have errors; InvalidFieldError if it is not a mapping."""
         model, data = model_at(self.model, self.document.data, path), self.document.get(path)
         if path in self.unusable_paths or model is None or not isinstance(data, dict):
             raise InvalidFieldError
@@ -197,7 +199,7 @@ def _add_fault(
     if kind == "extra_forbidden":
         holder = model_at(model, document.data, path[:-1])
         known_keys = allowed_keys(holder) if holder else ()
-        message = unknown_key(path[-1], [*known_keys, *(further_keys if len(path) == 1 else ())])
+        message = unknown_key_message(path[-1], [*known_keys, *(further_keys if len(path) == 1 else ())])
         faults.add(document.key_origin(path), path, message)
         return
     message = _message(kind, context, input_error.text, str(path[-1]) if path else "")
@@ -212,7 +214,7 @@ def _add_fault(
 
 def _message(kind: str, context: dict[str, Any], original: str, key: str) -> str:
     """What is required, as text; the bounds of a `_deg` key in degrees."""
-    if kind == "at":
+    if kind == "cross_check":
         return str(context["message"])
     if kind == "value_error":
         return str(context["error"])
@@ -231,7 +233,7 @@ def _message(kind: str, context: dict[str, Any], original: str, key: str) -> str
     return original
 
 
-def unknown_key(key: object, known_keys: Iterable[str]) -> str:
+def unknown_key_message(key: object, known_keys: Iterable[str]) -> str:
     """The message for an unknown key."""
     known_keys = list(known_keys)
     suggestion = did_you_mean(str(key), known_keys) or ";"

@@ -27,7 +27,7 @@ def as_yaml(value: Mapping[str, Any]) -> str:
 
 
 class _PlainDumper(yaml.SafeDumper):
-    """Writes equal values twice and never as an alias, which `read` refuses."""
+    """Writes equal values twice and never as an alias, which `parse_yaml` refuses."""
 
     def ignore_aliases(self, data: object) -> bool:
         return True

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from radarsim.engine.blocks import Work
 from radarsim.engine.dispatch import CollectedSums, Dispatch, Run, Share, ShareResult
 from radarsim.engine.executors import Executor, Serial, Threads
-from radarsim.engine.stopping import Stop
+from radarsim.engine.stop_conditions import Stop
 from radarsim.errors import StoreError
 from radarsim.system.threads import forbidden, limited
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from radarsim.engine.blocks import Forest, Node, Partial, Piece, Total, Work, add_sums, gaps, share_of, widest_node
 from radarsim.engine.executors import Executor, Outcome
-from radarsim.engine.stopping import Stop
+from radarsim.engine.stop_conditions import Stop
 from radarsim.engine.store.store import Store, mixture_warning
 from radarsim.engine.store.writer import StoreWriter
 from radarsim.engine.sums import Sums

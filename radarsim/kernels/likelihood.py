@@ -89,7 +89,8 @@ def innovation(x, P, h, z, p):
 def extrapolate(x, P, product, predicted_x, F, Q, manoeuvre):
     """x = F x and P = F P F' + manoeuvre Q, in place; product (d, d) and predicted_x (d,) are work arrays.
 
-    P stays symmetric to the last digit, here and in `take`: a difference between its halves grows from row to row."""
+    P stays symmetric to the last digit, here and in `take_number`: a difference between its halves grows from row to
+    row."""
     d = x.size
     for a in range(d):
         predicted_x[a] = 0.0

@@ -102,11 +102,11 @@ def interpretations(
       radarsim interpretations P2 --decide -n 3.2e4          up to 32 000 realisations; undecided claims: exit code 3
       radarsim interpretations P1 --json | jq '.[] | select(.depends_on != [])'
     """
-    from radarsim.engine import stopping
+    from radarsim.engine import stop_conditions
     from radarsim.errors import TargetUnmet
 
-    limit = stopping.TimeLimit(time_limit) if time_limit else None
-    with stopping.Signals() as stop:
+    limit = stop_conditions.TimeLimit(time_limit) if time_limit else None
+    with stop_conditions.Signals() as stop:
         from radarsim.api import json_output
         from radarsim.cli import progress as cli_progress
         from radarsim.papers import interpretation_files, judge_interpretations, print_claims

@@ -12,7 +12,7 @@ from radarsim.api.simulate_cases import RunOptions, SimulatedCases
 from radarsim.api.stored_runs import stored_realisations
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.machine import available_cores
-from radarsim.engine.stopping import Signals
+from radarsim.engine.stop_conditions import Signals
 from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.papers.claim import Claim
 from radarsim.papers.evidence import interpreted_case, shipped_spec

@@ -10,7 +10,7 @@ from typing import Any
 from radarsim.api import arguments
 from radarsim.api.progress import Progress, TimedProgress
 from radarsim.api.simulate_cases import RunOptions
-from radarsim.engine.stopping import AnyStop, Signals, Stop, TimeLimit
+from radarsim.engine.stop_conditions import AnyStop, Signals, Stop, TimeLimit
 from radarsim.errors import ConfigError, argument
 from radarsim.papers.claim_outcome import round_up
 from radarsim.papers.interpretation_files import outdated_configs, write_files

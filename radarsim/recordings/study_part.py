@@ -4,7 +4,7 @@ from typing import Literal
 
 from radarsim.config.case_choice import case_choice
 from radarsim.config.experiment import Case, Experiment
-from radarsim.config.unknown_keys import keys_unknown_to
+from radarsim.config.foreign_keys import foreign_keys
 from radarsim.errors import ConfigError
 from radarsim.studies.recording_interface import RecordingInterface
 from radarsim.studies.registry import module as home_of
@@ -32,7 +32,7 @@ def unknown_inherited_keys(case: Case, part: InterfacePart) -> list[str]:
     if f"{module}.".startswith(f"{home_of(case.study)}."):  # of the study itself
         return []
     packages = module.split(".")
-    return keys_unknown_to(case.spec, ".".join(packages[:3] if packages[0] == "radarsim" else packages[:1]))
+    return foreign_keys(case.spec, ".".join(packages[:3] if packages[0] == "radarsim" else packages[:1]))
 
 
 def refuse_inherited_part(case: Case, part: InterfacePart) -> None:

@@ -52,7 +52,7 @@ def line_from_rows(
 def line_from_tables(
     x: np.ndarray, rows: Sequence["pd.Series"], columns: Sequence[str], label: str, style: Style
 ) -> Line:
-    """`line` over x (n,) of n rows of several tables."""
+    """`line_from_rows` over x (n,) of n rows of several tables."""
     return line_from_rows(
         common.frame({"x": x} | {name: [row[name] for row in rows] for name in columns}), ("x", *columns), label, style
     )
@@ -69,8 +69,8 @@ def case_lines(
     """A line for each filter of each case of a panel: named by the filter if there is one case, else by the swept
     value.
 
-    rows by case, filter and component; columns as for `line`; filters as of `all_filters`: a filter has the same style
-    in all panels of a figure."""
+    rows by case, filter and component; columns as for `line_from_rows`; filters as of `all_filters`: a filter has the
+    same style in all panels of a figure."""
     marks: list[Mark] = []
     for i, result in enumerate(members):
         for f in result.axes.filters:

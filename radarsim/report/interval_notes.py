@@ -18,7 +18,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report.exact_check import ROUNDING
 from radarsim.report.quantities import COMMON, Quantity
-from radarsim.report.row_notes import RowNote, notes_where
+from radarsim.report.row_notes import RowNote, has_note, notes_where
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,6 +96,16 @@ def _with_notes(
         by_rules = np.where(is_exact(table) & exact, "", by_rules)
         notes = np.where(by_rules == "", notes, by_rules)
     return table.assign(note=notes) if any(notes) else table
+
+
+def without_noted_intervals(tables_by_name: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
+    """The tables for figures: without the interval of σ or gain where a note marks it."""
+    figure_tables = {}
+    for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
+        table = tables_by_name[name]
+        if (is_marked := has_note(table)).any():
+            figure_tables[name] = table.assign(**{end: table[end].mask(is_marked) for end in ends})
+    return {**tables_by_name, **figure_tables}
 
 
 def is_exact(table: "pd.DataFrame") -> np.ndarray:

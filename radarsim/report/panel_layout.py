@@ -85,7 +85,9 @@ def with_remark_on_bands(figure: Figure) -> Figure:
     lines = (mark for panel in figure.panels for mark in panel.marks if isinstance(mark, Line) and mark.lo is not None)
     if not any((np.isnan(np.asarray(line.lo, float)) & np.isfinite(line.y)).any() for line in lines):
         return figure
-    return replace(figure, caption=f"{figure.caption} {tr('No band is drawn where a few large errors dominate.')}")
+    return replace(
+        figure, caption=f"{figure.caption} {tr('No band is drawn where a note marks the interval as unreliable.')}"
+    )
 
 
 def loss_lines(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:

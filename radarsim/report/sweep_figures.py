@@ -20,7 +20,7 @@ BROAD = 12  # letters of a name at an axis, from which it is broken between word
 def sweep_figures(results: Sequence[CaseResult], curves: Mapping) -> dict[str, Figure]:
     """A figure for each config that is swept over one key or two.
 
-    curves is tables.groups(table, "case", "filter", "component")."""
+    curves is tables.group_by(table, "case", "filter", "component")."""
     figures_by_name = {}
     for keys, groups in group_by_swept_keys(results).items():
         name = "_".join(["sweep", *(key.rpartition(".")[2] for key in keys)])

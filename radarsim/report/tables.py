@@ -29,7 +29,7 @@ def frame(columns: Mapping[str, Sequence[Any] | np.ndarray]) -> "pd.DataFrame":
 
 def join_columns(parts: Iterable[Columns], columns: Sequence[str] = ()) -> "pd.DataFrame":
     """One DataFrame of cases' columns set one below the other, in the order of the first, or as named by `columns`. An
-    `Estimate` makes three columns, see `spread`. Cases without rows do not count where others have some."""
+    `Estimate` makes three columns, see `spread_estimates`. Cases without rows do not count where others have some."""
     spread_parts = [spread_estimates(part) for part in parts]
     with_rows = [part for part in spread_parts if any(map(len, part.values()))] or spread_parts[:1]
     if not with_rows:

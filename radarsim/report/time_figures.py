@@ -52,7 +52,7 @@ LONGEST_INSIDE = 28  # letters of a name in a legend inside a panel of many line
 def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: Component) -> Figure:
     """σ(t) of one component: a panel for each config, a line for each filter and swept value.
 
-    curves is tables.groups(table, "case", "filter", "component")."""
+    curves is tables.group_by(table, "case", "filter", "component")."""
     groups = group_by_panel(results)
     filters = all_filters(results)
     panels = [_sigma_panel(title, members, curves, component, filters) for title, members in groups.items()]
@@ -98,7 +98,7 @@ def _sigma_panel(
 def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: Component) -> Figure:
     """Relative gain of one component against time, a line for each case and filter.
 
-    One panel where no config is swept; else one for each of `group_by_panel`. gains is tables.groups(table, "case",
+    One panel where no config is swept; else one for each of `group_by_panel`. gains is tables.group_by(table, "case",
     "filter", "component")."""
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from radarsim.cli import exit_codes
+from radarsim.cli import early_end
 from radarsim.errors import Interruption
 
 LONG = {
@@ -74,7 +74,7 @@ def test_a_signal_ends_it_with_one_line_and_no_file(name, number, tmp_path):
 
 
 def test_an_exception_that_a_library_makes_of_the_signal_is_still_the_signal():
-    @exit_codes.stop_on_signals()
+    @early_end.stop_on_signals()
     def importing():
         try:
             os.kill(os.getpid(), signal.SIGTERM)
@@ -89,9 +89,9 @@ def test_an_exception_that_a_library_makes_of_the_signal_is_still_the_signal():
 
 def test_a_signal_that_is_swallowed_ends_the_process_a_little_later(monkeypatch):
     left = []
-    monkeypatch.setattr(exit_codes, "PATIENCE_S", 0.05)
-    monkeypatch.setattr(exit_codes, "fail", left.append)
-    with exit_codes.stop_on_signals():
+    monkeypatch.setattr(early_end, "PATIENCE_S", 0.05)
+    monkeypatch.setattr(early_end, "fail", left.append)
+    with early_end.stop_on_signals():
         try:
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(0.1)
@@ -112,7 +112,7 @@ def test_what_python_swallows_of_a_signal_is_not_printed(capsys, monkeypatch):
             raise self.fault
 
     monkeypatch.setattr(sys, "unraisablehook", sys.__unraisablehook__)
-    with exit_codes.stop_on_signals():
+    with early_end.stop_on_signals():
         Dying(Interruption(signal.SIGTERM, goes_on=False))
         assert capsys.readouterr().err == ""
         Dying(ValueError("another"))
@@ -122,7 +122,7 @@ def test_what_python_swallows_of_a_signal_is_not_printed(capsys, monkeypatch):
 
 def test_other_faults_pass_and_handlers_are_as_before():
     before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
-    with pytest.raises(KeyError), exit_codes.stop_on_signals():
+    with pytest.raises(KeyError), early_end.stop_on_signals():
         {}["x"]
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
 
@@ -130,7 +130,7 @@ def test_other_faults_pass_and_handlers_are_as_before():
 def test_an_ignored_signal_stays_ignored():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with exit_codes.stop_on_signals():
+        with early_end.stop_on_signals():
             assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)

@@ -16,7 +16,7 @@ from radarsim.api.case_results import case_result
 from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import load
 from radarsim.api.run import run_share
-from radarsim.engine import stopping
+from radarsim.engine import stop_conditions
 from radarsim.engine.collect import collect
 from radarsim.errors import Interruption, TargetUnmet
 from tests.program import command, csv_bytes, record
@@ -168,8 +168,8 @@ def test_a_limit_too_short_for_a_block_says_that_nothing_was_done(tmp_path):
 def test_a_limit_leaves_time_for_tables_and_figures(monkeypatch):
     """As much as they take, and at most half of what is left."""
     clock = [100.0]
-    monkeypatch.setattr(stopping.time, "monotonic", lambda: clock[0])
-    limit = stopping.TimeLimit(60.0)
+    monkeypatch.setattr(stop_conditions.time, "monotonic", lambda: clock[0])
+    limit = stop_conditions.TimeLimit(60.0)
     for reserve, end in ((10.0, 150.0), (45.0, 130.0)):
         clock[0] = 100.0
         kept = limit.with_reserve(reserve)
@@ -300,7 +300,7 @@ def test_a_share_that_was_interrupted_is_named_as_it_was_asked_for(shares, tmp_p
 
 def test_a_share_that_a_signal_ends_names_the_pieces_that_are_missing(tmp_path):
     """Of all cases, also of those that it did not come to."""
-    stop, experiment = stopping.Signals(), load({"include": ["rls1", "rls2"]}, ["realisations=1e5"])
+    stop, experiment = stop_conditions.Signals(), load({"include": ["rls1", "rls2"]}, ["realisations=1e5"])
     stop.received_signal = 2
     for missing in (26, 13):  # before the second time the share of rls2 is computed
         with pytest.raises(Interruption) as caught:

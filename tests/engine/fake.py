@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from radarsim.engine.collect import collect
-from radarsim.engine.stopping import Signals
+from radarsim.engine.stop_conditions import Signals
 from radarsim.engine.store import writer as store_writer
 from radarsim.engine.sums import Sums
 from radarsim.system.threads import limited

@@ -13,7 +13,7 @@ from radarsim.engine.collect import collect
 from radarsim.engine.dispatch import Pace
 from radarsim.engine.executors import Serial, Threads
 from radarsim.engine.machine import available_cores
-from radarsim.engine.stopping import TimeLimit
+from radarsim.engine.stop_conditions import TimeLimit
 from radarsim.errors import NonFiniteError
 from tests.engine.fake import Fake, textbook
 

@@ -13,7 +13,7 @@ import pytest
 
 from radarsim.engine.blocks import Node
 from radarsim.engine.collect import collect, read_stored
-from radarsim.engine.stopping import Signals
+from radarsim.engine.stop_conditions import Signals
 from radarsim.engine.store.store import Store
 from radarsim.errors import Interruption
 from radarsim.system.threads import limited
@@ -186,7 +186,7 @@ def test_a_signal_to_a_process_as_it_is_forked_is_not_one_to_the_run():
     script = """if True:
         import os, signal, time
         os.register_at_fork(after_in_child=lambda: os.kill(os.getpid(), signal.SIGTERM))  # before that of radarsim
-        from radarsim.engine.stopping import Signals
+        from radarsim.engine.stop_conditions import Signals
         with Signals() as signals:
             child = os.fork()
             if not child:

@@ -595,7 +595,7 @@ def test_outliers_are_allowed_for_where_there_are_some_alone():
     for share, tracks, count, least, most in ((0, 1, 200, 0, 2), (0.04, 1, 100, 90, 100), (0.04, 3, 50, 48, 50)):
         drawn = ([recording(rng, share=share) for _ in range(tracks)] for _ in range(count))
         found = [fit.fit_keys(likelihood(*one, config=config)).further_explanation for one in drawn]
-        switched = sum(one is not None and one.name == OUTLIERS and one.gain > fit.PLAIN_GAIN for one in found)
+        switched = sum(one is not None and one.name == OUTLIERS and one.gain > fit.CLEAR_RISE for one in found)
         assert least <= switched <= most, switched
 
 

@@ -141,7 +141,7 @@ def test_a_missing_band_is_told_of_in_its_figure_alone():
     assert panel_layout.with_remark_on_bands(whole) is whole
     ends = np.array([0.5, np.nan, 1.5])
     assert panel_layout.with_remark_on_bands(one(Line(x, x, "a", lo=ends, hi=ends))).caption.endswith(
-        "a few large errors dominate."
+        "a note marks the interval as unreliable."
     )
 
 

@@ -89,10 +89,10 @@ def test_fixed_lag_and_fixed_interval_are_least_squares_on_more_plots():
     assert bound.smoothed == pytest.approx(batch(rows, sigma, maps, scans), rel=EXACT)
     for i, lag in enumerate(LAGS):
         for k in range(2, scans - lag):
-            assert bound.waited[i, k] == pytest.approx(batch(rows, sigma, maps, k + lag + 1)[k], rel=EXACT)
-        assert np.isnan(bound.waited[i, scans - lag :]).all()
+            assert bound.lagged[i, k] == pytest.approx(batch(rows, sigma, maps, k + lag + 1)[k], rel=EXACT)
+        assert np.isnan(bound.lagged[i, scans - lag :]).all()
     last = scans - 1 - LAGS[-1]  # a lag to the last scan is the whole interval, no lag is the filter
-    assert bound.waited[-1, last] == pytest.approx(bound.smoothed[last], rel=EXACT)
+    assert bound.lagged[-1, last] == pytest.approx(bound.smoothed[last], rel=EXACT)
     assert bound.smoothed[-1] == pytest.approx(bound.sigma[-1], rel=EXACT)
 
 
@@ -132,7 +132,7 @@ def test_states_that_noise_moves_are_those_of_least_squares_for_all_that_moves_t
         assert bound.smoothed[k] == pytest.approx(known[11][k], rel=tolerance)
         for i, lag in enumerate(LAGS):
             if k + lag < 12:
-                assert bound.waited[i, k] == pytest.approx(known[k + lag][k], rel=tolerance)
+                assert bound.lagged[i, k] == pytest.approx(known[k + lag][k], rel=tolerance)
     # as information, from next to nothing known: nearly a flat prior
     wide = np.diag([1e10, 1e8, 1e6])
     gained = np.einsum("kdi,kdj,kd->kij", H, H, 1 / R)

@@ -18,7 +18,7 @@ from multiprocessing import active_children, get_context
 from pathlib import Path
 
 from radarsim.api import run
-from radarsim.engine.stopping import Signals
+from radarsim.engine.stop_conditions import Signals
 from radarsim.errors import Interruption, RadarsimError
 from radarsim.extensions import extensions
 from radarsim.report.output_labels import clock

@@ -68,7 +68,7 @@ MAX_OVERLAP = 0.002  # of the numbers that are near outliers and look sound: wit
 OUTLIER_PROBABILITY = 0.5  # from which a number is named as an outlier
 CORRELATION_TIME_KEY = "correlation_time_s"
 ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
-PLAIN_GAIN = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
+CLEAR_RISE = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class Fit:
     def has_overlap(self) -> bool:
         """Whether near outliers, which the plots plainly have, overlap the sound errors: then those that look sound
         count as such, and the intervals cover less often than they say."""
-        if self.near_outliers is None or self.plain is None or self.gain - self.plain.gain <= PLAIN_GAIN:
+        if self.near_outliers is None or self.plain is None or self.gain - self.plain.gain <= CLEAR_RISE:
             return False
         return self.near_outliers.share_within_sound() > MAX_OVERLAP
 
@@ -284,7 +284,7 @@ def fit_likelihood(
     plain = result = fit_keys(likelihood, (), stages.report, rough)
     if allowed:
         result = fit_keys(likelihood, allowed, stages.next(), rough)
-    while allowing is None and (explanation := result.further_explanation) and _is_plain_error(explanation):
+    while allowing is None and (explanation := result.further_explanation) and _is_clear_error(explanation):
         allowed = (*allowed, explanation.name)
         try:
             result = fit_keys(likelihood, allowed, stages.next(), rough)
@@ -293,10 +293,10 @@ def fit_likelihood(
     return result if result is plain else replace(result, plain=plain)
 
 
-def _is_plain_error(explanation: FurtherExplanation) -> bool:
+def _is_clear_error(explanation: FurtherExplanation) -> bool:
     """Whether outliers or correlation raise the likelihood by more than chance does in one recording of 1000, and
     nothing else does as well."""
-    return explanation.name in FITTED_EXPLANATIONS and explanation.gain > PLAIN_GAIN and explanation.rival is None
+    return explanation.name in FITTED_EXPLANATIONS and explanation.gain > CLEAR_RISE and explanation.rival is None
 
 
 def check_explanations(likelihood: Likelihood, allowing: Sequence[str]) -> None:

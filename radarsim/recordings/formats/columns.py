@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
-from radarsim.recordings.formats.column_guesses import guess_options
+from radarsim.recordings.formats.column_suggestions import suggest_options
 
 KNOT_MPS = 1852 / 3600
 
@@ -292,7 +292,7 @@ class Header:
         quantities = [*missing, *(ours for ours in optional if ours not in self.columns)]
         used = {column.position for column in self.columns.values()}
         stems = [("", "") if i in used else stem for i, stem in enumerate(self.stems)]
-        return guess_options({ours: known_names(ours) for ours in quantities}, _name_with_unit, stems, self.names,
+        return suggest_options({ours: known_names(ours) for ours in quantities}, _name_with_unit, stems, self.names,
                              self.sample)  # fmt: skip
 
     def notes(self) -> list[str]:

@@ -60,7 +60,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Reference:
-    """A thin line across the panel at a value of x or y ("across" says which), with a label."""
+    """A thin line across the panel at a value of x or y (`axis_name` says which), with a label."""
 
     value: float
     axis_name: str = "y"

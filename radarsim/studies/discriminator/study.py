@@ -268,7 +268,7 @@ def errors(plan: Plan, first: int, count: int) -> np.ndarray:
     lock_flags = np.zeros((len(plan.options), count, turns.shape[2], len(kernels_sums.LOCKS)))
     for f, options in enumerate(plan.options):
         bounds = plan.potential[f, :, :size], plan.posterior[f, :, :size]
-        kernels_sums.judge(turns[:, f], *bounds, options["windows"], lock_flags[f])
+        kernels_sums.mark_locks(turns[:, f], *bounds, options["windows"], lock_flags[f])
     is_locked = (lock_flags[..., kernels_sums.LOCKS.index("lock")] > 0) & is_plain[:, None]
     errors_in_units = turns[..., :size] / model.turns_per_parameter(size, plan.axes.burst_s)
     return np.where(is_locked[..., None], np.moveaxis(errors_in_units, 1, 0), np.nan)

@@ -23,12 +23,12 @@ MAX_UNKNOWN_SHARE = 1e-9  # of a component in what is not known: above, it has n
 class Bound(NamedTuple):
     """The least σ (K, C) of components with the same plots, not-a-number where there is no bound.
 
-    waited (LAGS, K, C): so many scans later; smoothed (K, C): after the last scan; both not-a-number where plots may be
-    missed. patterns (K,): how missed plots count, of ENUMERATION, REDUCTION and nothing. reached: whether there is an
-    estimator that attains it."""
+    lagged (LAGS, K, C): so many scans later; smoothed (K, C): after the last scan; both not-a-number where plots may be
+    missed. patterns (K,): how missed plots count, of ENUMERATION, REDUCTION and nothing. is_attained: whether an
+    estimator attains it."""
 
     sigma: np.ndarray
-    waited: np.ndarray
+    lagged: np.ndarray
     smoothed: np.ndarray
     patterns: tuple[str, ...]
     is_attained: bool = True

@@ -72,6 +72,6 @@ def _rows(floor: Floor, f: int, bound: Bound, result: "CaseResult") -> dict[str,
     rows = tables.label_columns(result, np.full(k.size, f), k, **tables.component_columns(result, c))
     if floor.t_s is not None:
         rows["t_s"] = floor.t_s[f, k]
-    lags = {name: waited[k, c] for name, waited in zip(LAG_COLUMNS, bound.waited, strict=True)}
+    lags = {name: lagged[k, c] for name, lagged in zip(LAG_COLUMNS, bound.lagged, strict=True)}
     last_columns = {"smoothed": bound.smoothed[k, c], "reached": np.full(k.size, bound.is_attained), "kind": kinds[k]}
     return rows | {"floor": bound.sigma[k, c]} | lags | last_columns

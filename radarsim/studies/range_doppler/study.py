@@ -80,12 +80,12 @@ class Plan:
         """The module that simulates: for the paper's world with shared gains, for any other one with gains of each
         realisation. Each loads the compiler and kernels of its own."""
         if self.design.plain:
-            from radarsim.studies.range_doppler import shared_gains
+            from radarsim.studies.range_doppler import shared_gains_kernel
 
-            return shared_gains
-        from radarsim.studies.range_doppler import individual_gains
+            return shared_gains_kernel
+        from radarsim.studies.range_doppler import individual_gains_kernel
 
-        return individual_gains
+        return individual_gains_kernel
 
 
 def prepare(case: Case) -> Plan:

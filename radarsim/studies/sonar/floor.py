@@ -128,5 +128,5 @@ def fluctuating(target: Polynomial, spec: Keys, axes: GivenPlotsAxes, t: np.ndar
         F, Q = np.stack([transition(step, n) for step in dt]), pushed[:, :, None] * pushed[:, None, :]
         bounds.append(moving.moving_bound(np.zeros((n, n)), information, F, Q, size))
     arrays = zip(*(bound[:3] for bound in bounds), strict=True)
-    sigma, waited, smoothed = (np.concatenate(columns, axis=-1) for columns in arrays)
-    return Bound(sigma, waited, smoothed, bounds[0].patterns)
+    sigma, lagged, smoothed = (np.concatenate(columns, axis=-1) for columns in arrays)
+    return Bound(sigma, lagged, smoothed, bounds[0].patterns)

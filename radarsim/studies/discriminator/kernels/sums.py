@@ -51,7 +51,7 @@ def add_component(e, within, potential, posterior, error, error_all, residuals):
 
 
 @kernel
-def judge(errors, potential, posterior, windows, lock_flags):
+def mark_locks(errors, potential, posterior, windows, lock_flags):
     """Write which of LOCKS hold, 1 or 0, into lock_flags (n, K, 6), for errors (n, K, 6) of an estimator.
 
     potential and posterior (K, C) are the bounds without and with the prior, of the C components that count;
@@ -83,7 +83,7 @@ def accumulate(errors, options, potential, posterior, sums):
     n, size = errors.shape[0], sums.error.shape[2]
     e, within, lock_flags = np.empty(n), np.empty(n), np.empty((n, errors.shape[2], len(LOCKS)))
     for f in range(options.size):
-        judge(errors[:, f], potential[f, :, :size], posterior[f, :, :size], options[f].windows, lock_flags)
+        mark_locks(errors[:, f], potential[f, :, :size], posterior[f, :, :size], options[f].windows, lock_flags)
         for k in range(options[f].windows):
             for i in range(n):
                 within[i] = lock_flags[i, k, 0]
@@ -107,7 +107,7 @@ def accumulate_losses(errors, options, potential, posterior, weights, losses):
     n = errors.shape[0]
     lock_flags = np.empty((n, errors.shape[2], len(LOCKS)))
     for f in range(options.size):
-        judge(errors[:, f], potential[f], posterior[f], options[f].windows, lock_flags)
+        mark_locks(errors[:, f], potential[f], posterior[f], options[f].windows, lock_flags)
         for k in range(options[f].windows):
             for i in range(n):
                 for lock in range(len(LOCKS)):

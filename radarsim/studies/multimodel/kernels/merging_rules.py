@@ -1,6 +1,7 @@
 """Merging rules: maps of weights to the shares of a merge.
 
-Letters as in `families`."""
+`work` and its layout are those of `hypothesis`; `c` (lanes) is the sum of the weights of a group, `main` (lanes) the
+number of its main hypothesis, `rule` a constant of `layout`."""
 
 from radarsim.kernels.compiler import inline, kernel_part
 from radarsim.kernels.lanes import any_greater, full, get, put, where_greater

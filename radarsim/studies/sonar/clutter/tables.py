@@ -1,7 +1,5 @@
 """Tables of trackers among false plots.
 
-docs/sonar_clutter.md defines confirmed, tentative, kept, lost and dropped.
-
 docs/sonar_clutter.md says what confirmed, tentative, kept, lost and dropped mean."""
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""How a command ends: signals, errors as lines on stderr, and exit codes."""
+"""How a command ends early: by a signal, or by an error whose lines go to stderr and whose exit code it leaves."""
 
 import contextlib
 import os

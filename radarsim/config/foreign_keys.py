@@ -1,4 +1,4 @@
-"""The keys of a config that the code of a package cannot know."""
+"""Keys of a config that another package adds: the code of a package cannot know them. Misspelt ones: `validate`."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any
@@ -9,16 +9,16 @@ from pydantic.fields import FieldInfo
 from radarsim.config.model import Model
 
 
-def keys_unknown_to(spec: Model, home: str) -> list[str]:
+def foreign_keys(spec: Model, home: str) -> list[str]:
     """The dotted keys of a config that the code of a package cannot know: keys and values that a derived model of
     another package adds.
 
-    home: the name of the package."""
-    return list(_unknown_keys(spec, home, ""))
+    home: the name of that package."""
+    return list(_foreign_keys(spec, home, ""))
 
 
-def _unknown_keys(spec: Model, home: str, prefix: str) -> Iterator[str]:
-    """Those of `keys_unknown_to` in a mapping whose own path is the prefix."""
+def _foreign_keys(spec: Model, home: str, prefix: str) -> Iterator[str]:
+    """Those of `foreign_keys` in a mapping whose own path is the prefix."""
     bases = type(spec).__mro__
     known_model = next(
         (item for item in bases if issubclass(item, Model) and _is_known_module(item.__module__, home)), Model
@@ -32,7 +32,7 @@ def _unknown_keys(spec: Model, home: str, prefix: str) -> Iterator[str]:
         members = enumerate(value) if isinstance(value, tuple) else [(None, value)]
         for i, item in members:
             if isinstance(item, Model):
-                yield from _unknown_keys(item, home, f"{key}." if i is None else f"{key}.{i}.")
+                yield from _foreign_keys(item, home, f"{key}." if i is None else f"{key}.{i}.")
 
 
 def _is_known_module(module: str, home: str) -> bool:

@@ -14,7 +14,7 @@ MIN_METRES = 500.0  # of the largest range: smaller numbers are kilometres
 TIME_CELL = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}.*|\d{1,2}:\d\d.*")
 
 
-def guess_options(
+def suggest_options(
     missing: Mapping[str, Sequence[str]],
     unit_of: Callable[[str, str], str],
     stems: Sequence[tuple[str, str]],

@@ -1,4 +1,4 @@
-"""Reasons to stop a run: a time limit, and signals.
+"""Conditions that stop a run before its end: a time limit, and signals.
 
 A stop condition is called between tasks and gives None, or the reason as text."""
 
@@ -79,7 +79,7 @@ class Signals:
         return None if self.received_signal is None else f"signal {self.received_signal}"
 
     def raise_if_received(self) -> None:
-        """Interrupted, if a signal came."""
+        """Raise `Interruption` if a signal came."""
         if self.received_signal is not None:
             raise self._interruption(self.received_signal)
 
