@@ -26,7 +26,7 @@ BASICS = ("errors", "system")  # any other room may import them
 SUMS = ("engine.results", "engine.sums")  # the engine's plain data, which studies fill
 CASE = ("config.experiment", "config.radial_keys", "config.rare_event_keys")
 SCHEMA = (
-    *("config.cross_checks", "config.error_text", "config.key_types", "config.marks", "config.model"),
+    *("config.cross_checks", "config.value_text", "config.key_types", "config.marks", "config.model"),
     *("config.radial_keys", "config.rare_event_keys", "config.study_keys"),
 )
 ROOMS = {

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from radarsim.config.error_list import ABSENT, Origin
-from radarsim.config.error_text import KeyPath
+from radarsim.config.value_text import KeyPath
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from radarsim.config.error_text import KeyPath, dotted, one_line, quoted_value
+from radarsim.config.value_text import KeyPath, dotted, one_line, quoted_value
 from radarsim.errors import ConfigError
 
 ABSENT = object()

@@ -12,7 +12,6 @@ from radarsim.config.complete_config import Content, folder_of, sweep_with_data_
 from radarsim.config.document import Document
 from radarsim.config.drafts import Draft, Expansion, OverlaidKeys, changes_included, config_name
 from radarsim.config.error_list import ABSENT, ErrorList, Origin
-from radarsim.config.error_text import KeyPath, one_line
 from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern
 from radarsim.config.find_files import RESERVED, available_stems, config_file, did_you_mean, is_reserved, is_stem
 from radarsim.config.inline_files import (
@@ -35,6 +34,7 @@ from radarsim.config.place_settings import (
 from radarsim.config.study_keys import StudyKeys
 from radarsim.config.user_filter_keys import is_code, names_code, separate_code_filters
 from radarsim.config.validate import validate
+from radarsim.config.value_text import KeyPath, one_line
 from radarsim.extensions import extension_figures
 from radarsim.system.private_files import foreign_owner
 

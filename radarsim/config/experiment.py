@@ -6,8 +6,8 @@ from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any
 
-from radarsim.config.error_text import one_line, short_number
 from radarsim.config.identity import all_keys, portable_filter, recorded_keys
+from radarsim.config.value_text import one_line, short_number
 
 
 @dataclass(frozen=True)

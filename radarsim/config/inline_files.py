@@ -7,12 +7,12 @@ from pathlib import Path as FilePath
 
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList
-from radarsim.config.error_text import KeyPath, quoted_value
 from radarsim.config.find_files import available_stems, did_you_mean, is_stem, scenario_file
 from radarsim.config.marks import DataFile, Scenario
 from radarsim.config.model import Model
 from radarsim.config.study_keys import StudyKeys
 from radarsim.config.validate import model_at, models_in
+from radarsim.config.value_text import KeyPath, quoted_value
 
 ReadDocument = Callable[[FilePath, ErrorList], Document | None]
 

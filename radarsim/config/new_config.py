@@ -9,12 +9,12 @@ from typing import Any
 
 from radarsim.config.common_keys import Studies
 from radarsim.config.error_list import ErrorList
-from radarsim.config.error_text import one_line
 from radarsim.config.experiment import Experiment
 from radarsim.config.find_files import RESERVED, config_file, is_reserved, is_stem
 from radarsim.config.load import load
 from radarsim.config.overrides import Overrides
 from radarsim.config.starter import starter_text
+from radarsim.config.value_text import one_line
 from radarsim.config.yaml_io import read_document
 from radarsim.errors import ConfigError, argument
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from radarsim.config.error_text import dotted
 from radarsim.config.find_files import did_you_mean
 from radarsim.config.key_types import WholeNumber
 from radarsim.config.model import Model, annotation_parts, in_degrees, in_radians
 from radarsim.config.study_keys import StudyKeys
+from radarsim.config.value_text import dotted
 from radarsim.errors import ConfigError
 
 MAX_SUGGESTED_KEYS = 5  # that begin with an unknown name: all are suggested

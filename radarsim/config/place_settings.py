@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from radarsim.config.document import Document
 from radarsim.config.error_list import ABSENT, ErrorList, Origin
-from radarsim.config.error_text import KeyPath
 from radarsim.config.inline_files import ConfigFiles, inline_scenarios
 from radarsim.config.model import in_degrees, in_radians
 from radarsim.config.study_keys import StudyKeys
 from radarsim.config.user_filter_keys import is_code
 from radarsim.config.validate import allowed_keys, model_at, unknown_key_message
+from radarsim.config.value_text import KeyPath
 
 
 @dataclass(frozen=True)

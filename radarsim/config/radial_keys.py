@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import Field, GetJsonSchemaHandler
 
 from radarsim.config.cross_checks import CheckError, InvalidFieldError, check_error, cross_check
-from radarsim.config.error_text import short_number
 from radarsim.config.key_types import Name, NonNegative, Number, Positive, key
 from radarsim.config.marks import DataFile, DisplayMark
 from radarsim.config.model import Model
 from radarsim.config.study_keys import StudyKeys
+from radarsim.config.value_text import short_number
 from radarsim.constants import STANDARD_GRAVITY_MPS2, Band, outside_band
 
 MAX_SCANS = 100_000

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 
 from radarsim.config.error_list import ErrorList, Origin
-from radarsim.config.error_text import KeyPath
+from radarsim.config.value_text import KeyPath
 
 NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 CONSTANTS = {"true": True, "false": False, "": None, "~": None, "null": None}

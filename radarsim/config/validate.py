@@ -14,9 +14,9 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from radarsim.config.cross_checks import CheckError, InvalidFieldError
 from radarsim.config.document import Document, child
 from radarsim.config.error_list import ABSENT, ErrorList
-from radarsim.config.error_text import KeyPath, short_number
 from radarsim.config.find_files import did_you_mean
 from radarsim.config.model import Model, in_degrees, in_radians, radians
+from radarsim.config.value_text import KeyPath, short_number
 
 M = TypeVar("M", bound=Model)
 MESSAGES = {

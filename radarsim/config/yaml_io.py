@@ -11,8 +11,8 @@ import yaml
 
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList, Origin
-from radarsim.config.error_text import KeyPath
 from radarsim.config.scalars import DEEPEST, NotFinite, from_text
+from radarsim.config.value_text import KeyPath
 
 MAX_FILE_BYTES = 256_000  # bytes
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same events and marks, ten times faster

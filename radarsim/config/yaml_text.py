@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Callable, Mapping
 
-from radarsim.config.error_text import short_number
+from radarsim.config.value_text import short_number
 
 PLAIN_TEXT = re.compile(r"[A-Za-z_][\w+ .*-]*")  # text that YAML reads as text without quotes
 MIN_COUNTED_ZEROS = 3  # at the end of a number, to be written as a power of ten

@@ -1,6 +1,7 @@
 """Conditions that stop a run before its end: a time limit, and signals.
 
-A stop condition is called between tasks and gives None, or the reason as text."""
+A stop condition is called between tasks and gives None, or the reason as text. The end of a run by its precision is in
+`radarsim.api.run_to_precision`."""
 
 import contextlib
 import math

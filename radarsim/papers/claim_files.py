@@ -27,10 +27,10 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList
-from radarsim.config.error_text import KeyPath
 from radarsim.config.find_files import did_you_mean
 from radarsim.config.model import Model
 from radarsim.config.validate import validate
+from radarsim.config.value_text import KeyPath
 from radarsim.config.yaml_io import parse_yaml, read_document
 from radarsim.papers import expected_ranges
 from radarsim.papers.claim import Claim, Part

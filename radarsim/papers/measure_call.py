@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from radarsim.config.error_text import quoted_value
+from radarsim.config.value_text import quoted_value
 from radarsim.errors import AUTHOR_ERRORS, ConfigError, MeasureError, RadarsimError
 from radarsim.papers.evidence import INTERVAL_ROUNDING, MissingEvidence, UnknownName, exact_number, has_interval
 from radarsim.papers.interpretations import ImpossibleInterpretation

@@ -11,8 +11,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api.stored_runs import stored_result
-from radarsim.config.error_text import quoted_value
 from radarsim.config.experiment import Experiment
+from radarsim.config.value_text import quoted_value
 from radarsim.errors import AUTHOR_ERRORS, ConfigError
 from radarsim.papers import one_file_measures, table_measures
 from radarsim.papers.claim import Claim

@@ -24,7 +24,7 @@ Z95 = NormalDist().inv_cdf(0.975)
 ROUNDING = 1e-12  # of a margin
 # A verdict is the same however its number of realisations came about: by one run, by `--decide`, or by a person who
 # extends undecided runs. So each counts as one of all looks that may be taken, one for each doubling: at fewer than
-# 2000 realisations, at 2000·2^m, and at the most that a run may have, 10¹². report.precision.looks makes them.
+# 2000 realisations, at 2000·2^m, and at the most that a run may have, 10¹². `report.precision.look_counts` makes them.
 MAX_LOOKS = 31
 
 

@@ -86,7 +86,7 @@ def user_frames(error: BaseException, folder: str) -> list[str]:
     return [f"  {frame.filename}:{frame.lineno}, in {frame.name}: {frame.line}" for frame in user_frames[-MAX_FRAMES:]]
 
 
-def error_text(error: BaseException) -> str:
+def value_text(error: BaseException) -> str:
     """An error in one line: its kind, and the first non-empty line of its message."""
     message = str(error.msg) if isinstance(error, SyntaxError) else _message(error)
     lines = [line.strip() for line in message.splitlines() if line.strip() and not COMPILER_NOISE.match(line)]
@@ -108,7 +108,7 @@ def _message(error: BaseException) -> str:
 def error_summary(error: BaseException) -> str:
     """An error in one line, with its place in brackets."""
     location = locate(error)
-    return f"{error_text(error)} ({location})" if location else error_text(error)
+    return f"{value_text(error)} ({location})" if location else value_text(error)
 
 
 @contextmanager
@@ -153,8 +153,8 @@ def call_user_function(function: Callable[..., Any], *arguments: Any, owner: str
     except AUTHOR_ERRORS as error:
         location = locate(error, function=function)
         if location is None:
-            raise user_code_error(function, error_text(error), owner=owner) from error
-        raise ConfigError(f"{location}: {owner or _owner.get()}{location.function}: {error_text(error)}") from error
+            raise user_code_error(function, value_text(error), owner=owner) from error
+        raise ConfigError(f"{location}: {owner or _owner.get()}{location.function}: {value_text(error)}") from error
 
 
 def user_code_error(function: Any, message: str, name: str = "", owner: str = "") -> ConfigError:

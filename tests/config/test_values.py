@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from radarsim.config.error_list import ErrorList, Origin
-from radarsim.config.error_text import quoted_value, short_number
 from radarsim.config.scalars import NotFinite, from_python, from_text
+from radarsim.config.value_text import quoted_value, short_number
 from radarsim.errors import ConfigError
 
 NUMBERS = {

@@ -12,7 +12,7 @@ from keyword import iskeyword, issoftkeyword
 from pathlib import Path
 
 from radarsim.api.configs import config_path
-from radarsim.config.error_text import one_line
+from radarsim.config.value_text import one_line
 from radarsim.errors import ConfigError, StoreError
 from radarsim.studies import registry
 from radarsim.system.private_files import create_readable_file, make_readable_folder

@@ -17,7 +17,7 @@ from radarsim.bursts.burst import balanced_inverse
 from radarsim.papers.authoring import CaseResult, MissingEvidence, exact_number, shipped_spec
 from radarsim.papers.authoring import Evidence as GeneralEvidence
 from radarsim.report.statistics import Estimate, difference, root_mean_square
-from radarsim.studies.discriminator import lock_ceiling, scenario
+from radarsim.studies.discriminator import efficient_share, scenario
 from radarsim.studies.discriminator.kernels.sums import LOCKS
 
 COMPUTED, PRINTED = "computed", "printed"
@@ -121,7 +121,7 @@ class Evidence(GeneralEvidence):
         """What an efficient estimator would score in `always`, over the windows of the sequence."""
         result, i = self.case(key), self.estimator(key, "sequence")
         forecast = tuple(map(float, result.axes.prior_sigma))
-        return lock_ceiling.share_within_bounds(
+        return efficient_share.share_within_bounds(
             scenario.configured_burst(result.spec), tuple(result.axes.pulses[i]), forecast
         )
 

@@ -63,7 +63,7 @@ class Finding:
 @dataclass(frozen=True)
 class FilterComparison:
     """By how much the best filter predicts the plots better than each other: differences of the log-likelihood of the
-    numbers that all of them take. fullest: the best predictor among those that take most columns of a plot."""
+    numbers that all of them take. most_columns: the best predictor among those that take most columns of a plot."""
 
     best: str
     log_ratios: dict[str, float]
@@ -83,7 +83,7 @@ class Advice:
     """Advice from the likelihood of a config's filters over recorded plots: the best filter; the errors in the numbers
     of the one that takes most columns; the rows used. folding, doppler_scale: where the velocities are folded, or a
     multiple of the change of the range; impossible_speed: that no target has, m/s; nothing else is then examined.
-    start_errors: plots too far off to start a track."""
+    start_errors: outliers at the values of the config, as plots too far off to start a track."""
 
     comparison: FilterComparison
     findings: list[Finding]

@@ -356,8 +356,8 @@ def _outlier_rows(search: "LikelihoodSearch", likelihood: Likelihood) -> tuple[O
 def find_outlier_rows(
     likelihood: Likelihood, values: np.ndarray, law: ErrorLaw = STATED_ERRORS
 ) -> tuple[OutlierRow, ...]:
-    """The numbers that are probably outliers for values of the keys and a law of errors; none where the likelihood
-    knows no outliers."""
+    """The numbers that are outliers with a probability of over 1/2, for values of the keys and a law of errors; none
+    where the likelihood knows no outliers."""
     if OUTLIERS not in likelihood.explains:
         return ()
     tracks = likelihood.soundness(values, law)

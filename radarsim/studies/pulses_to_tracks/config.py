@@ -8,11 +8,11 @@ from pydantic import Field, model_validator
 
 from radarsim.config import cross_checks, key_types, marks, radial_keys, study_keys
 from radarsim.config.cross_checks import CheckError, check_error, cross_check
-from radarsim.config.error_text import short_number
 from radarsim.config.key_types import Positive, WholeNumber, key
 from radarsim.config.marks import DesignMark, DisplayMark
 from radarsim.config.model import Model
 from radarsim.config.radial_keys import MIN_RANGE_M, TimedStudyKeys
+from radarsim.config.value_text import short_number
 from radarsim.constants import Band
 
 MAX_SCANS = 1000  # each scan has its own windows

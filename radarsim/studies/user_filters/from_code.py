@@ -342,7 +342,7 @@ class CodeFilter(UserFilter):
                 package = self.module.partition(".")[0] if is_installed(self.folder) else ""
                 code_folder = os.path.join(self.folder, package)
                 advice = f": of a package, it is {Path(self.folder).name}.{self.module}:{self.object_name}"
-                hint = advice if "no known parent package" in user_code_errors.error_text(error) else ""
+                hint = advice if "no known parent package" in user_code_errors.value_text(error) else ""
                 raise ConfigError(
-                    line, *user_code_errors.user_frames(error, code_folder), user_code_errors.error_text(error) + hint
+                    line, *user_code_errors.user_frames(error, code_folder), user_code_errors.value_text(error) + hint
                 ) from error

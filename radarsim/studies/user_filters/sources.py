@@ -173,7 +173,7 @@ def _syntax(content: bytes, file: str) -> ast.Module:
         tree = ast.parse(content, file)
     except (SyntaxError, ValueError) as error:
         raise ConfigError(
-            f"{file}:{getattr(error, 'lineno', None) or 1}: {user_code_errors.error_text(error)}"
+            f"{file}:{getattr(error, 'lineno', None) or 1}: {user_code_errors.value_text(error)}"
         ) from error
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):

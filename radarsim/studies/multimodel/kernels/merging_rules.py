@@ -55,8 +55,8 @@ def put_shares(work, listed, first, size, c, main, rule):
 def keep_by_rule(work, size, main, rule):
     """Set to zero the weights that a rule other than `moment` drops, and return the sum of those that remain.
 
-    best: the largest weight. combined: the main hypothesis if it outweighs every other, else all. modified: the main
-    one if it does, else the main one and the best. Ties go to the lower number."""
+    moment keeps all. best: the largest weight. combined: the main hypothesis if it outweighs every other, else all.
+    modified: the main one if it does, else the main one and the best. Ties go to the lower number."""
     zero = full(0.0)
     best_weight, best, main_weight, largest_other = get(work, layout.WEIGHT), zero, zero, zero
     for j in range(size):
