@@ -24,7 +24,7 @@ from radarsim.engine.machine import available_cores
 from radarsim.engine.stop_conditions import Signals, Stop
 from radarsim.errors import ConfigError, TargetUnmet
 from radarsim.extensions import StopRule, stop_rule
-from radarsim.system.threads import limited
+from radarsim.system.threads import ThreadLimit
 
 if TYPE_CHECKING:
     from radarsim.api.result import Result
@@ -130,7 +130,7 @@ def run(
             stop.raise_if_received()
     if not simulated.cases:
         raise TargetUnmet(f"{experiment.stem}: {simulated.stopped}: nothing was finished by then")
-    with limited(threads):
+    with ThreadLimit(threads):
         facts = run_facts(simulated, threads, time.perf_counter() - started)
     if writing_s is not None:
         facts["seconds_kept_for_writing"] = writing_s
@@ -144,7 +144,7 @@ def run(
     run_warnings = (line for case in experiment.cases for member in case.user_filters for line in member.warnings())
     result.facts["warnings"] += dict.fromkeys((*filter_warnings, *run_warnings))
     if experiment.runs:
-        with limited(threads):
+        with ThreadLimit(threads):
             result.add_runs_table(experiment.runs)
     if out is None:
         result.check()

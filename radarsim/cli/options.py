@@ -13,7 +13,7 @@ import click
 from radarsim.cli.early_end import fail
 from radarsim.errors import ConfigError
 from radarsim.language import current
-from radarsim.system.threads import limited
+from radarsim.system.threads import ThreadLimit
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -175,7 +175,7 @@ time_limit_option = click.option(
 
 def _apply_threads(context: click.Context, option: click.Parameter, count: int | None) -> int | None:
     """The number of threads, for the whole command."""
-    context.with_resource(limited(count))
+    context.with_resource(ThreadLimit(count))
     return count
 
 

@@ -8,7 +8,7 @@ from radarsim.engine.dispatch import CollectedSums, Dispatch, Run, Share, ShareR
 from radarsim.engine.executors import Executor, Serial, Threads
 from radarsim.engine.stop_conditions import Stop
 from radarsim.errors import StoreError
-from radarsim.system.threads import forbidden, limited
+from radarsim.system.threads import ThreadLimit, forbidden
 
 
 def collect(
@@ -31,7 +31,7 @@ def collect(
 
     However a run ends, its finished blocks are stored. NonFiniteError names the first realisations whose sums are not
     finite, which are not stored; StoreError the file that cannot be written."""
-    with limited(threads):
+    with ThreadLimit(threads):
         run = Run(work, realisations, store, progress)
         return run.finish(None if run.restore() else _compute_missing(run, threads, stop, executor))
 
@@ -51,7 +51,7 @@ def compute_share(
 
     Shares are runs of blocks, as equal as blocks permit; the last has the partial block. Stores with all shares are
     united by copying: `collect` then finds every block. The other arguments are those of `collect`."""
-    with limited(threads):
+    with ThreadLimit(threads):
         run = Share(work, realisations, part, store, progress)
         return run.finish(None if run.restore() else _compute_missing(run, threads, stop, executor))
 

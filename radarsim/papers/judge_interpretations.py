@@ -21,7 +21,7 @@ from radarsim.papers.open_papers import JudgingRequest, judging_requests
 from radarsim.papers.stored_verdicts import TABLE
 from radarsim.papers.verdict_rule import UNDECIDED
 from radarsim.papers.verdicts_by_interpretation import ClaimVerdicts
-from radarsim.system.threads import limited
+from radarsim.system.threads import ThreadLimit
 
 
 def judge_requests(
@@ -113,7 +113,7 @@ def interpretations(
     limit = time_limit if time_limit is None or callable(time_limit) else TimeLimit(time_limit)
     options: dict[str, Any] = {"realisations": arguments.whole_number(realisations), "decide": decide}
     options |= {"progress": progress, "figures": figures, "stop": stop, "write": out is not None}
-    with tempfile.TemporaryDirectory(prefix="radarsim-") as folder, limited(threads):
+    with tempfile.TemporaryDirectory(prefix="radarsim-") as folder, ThreadLimit(threads):
         run_options = RunOptions(None, threads, AnyStop(stop, limit))
         return judge_requests(requests, out=Path(folder if out is None else out), options=run_options, **options)
 

@@ -1,7 +1,7 @@
 """Whether threads may be started: `--threads 0` and `threads=0` forbid it, for a whole call."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from typing import Any
 
@@ -13,14 +13,19 @@ def forbidden() -> bool:
     return _forbidden.get()
 
 
-@contextmanager
-def limited(count: int | None) -> Iterator[None]:
-    """While entered no thread is started, if the count is 0."""
-    token = _forbidden.set(forbidden() or count == 0)
-    try:
-        yield
-    finally:
-        _forbidden.reset(token)
+class ThreadLimit(AbstractContextManager[None]):
+    """While entered no thread is started, if the count is 0.
+
+    No generator: one that a usage error leaves open would be ended in the context of whoever collects it."""
+
+    def __init__(self, count: int | None) -> None:
+        self._count = count
+
+    def __enter__(self) -> None:
+        self._token = _forbidden.set(forbidden() or self._count == 0)
+
+    def __exit__(self, *_: object) -> None:
+        _forbidden.reset(self._token)
 
 
 @contextmanager

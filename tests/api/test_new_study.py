@@ -8,6 +8,7 @@ import pytest
 from radarsim.api.maintenance import new_study
 from radarsim.errors import ConfigError, StoreError
 from tests.program import command
+from tests.studies.example_packages import lines_without_imports
 
 
 @pytest.mark.parametrize(("form", "options"), [("linear", ()), ("step", ("--step",))])
@@ -27,8 +28,7 @@ def test_the_command_writes_a_package_under_its_name(tmp_path, monkeypatch, form
 def test_a_study_in_one_file_is_one_file_with_a_config_and_a_test(form):
     files = list(new_study.template_files(form).values())
     assert [file.suffix for file in files] == [".toml", ".py", ".yaml", ".py"]
-    lines = files[1].read_text(encoding="utf-8").splitlines()
-    assert sum(not line.startswith(("from ", "import ")) for line in lines) <= 114
+    assert lines_without_imports(files[1].read_text(encoding="utf-8")) <= 114
 
 
 @pytest.mark.parametrize("form", new_study.FORMS)

@@ -14,7 +14,7 @@ from radarsim.papers.claims_table import CLASS_COLUMNS
 from radarsim.papers.print_claims import print_claims
 from radarsim.report import interval_notes, wording
 from radarsim.report.wording import significant_digits
-from radarsim.system.threads import limited
+from radarsim.system.threads import ThreadLimit
 from tests.program import Terminal, command
 
 
@@ -160,11 +160,11 @@ def test_without_threads_a_bar_begins_with_the_first_report(monkeypatch):
     monkeypatch.setattr("sys.stderr", screen)
     monkeypatch.setattr("threading.Thread.start", None)
     monkeypatch.setattr(cli_progress, "SILENT_S", 0)
-    with limited(0), cli_progress.Progress("rls2", quiet=False) as progress:
+    with ThreadLimit(0), cli_progress.Progress("rls2", quiet=False) as progress:
         progress.update(50, 200, 0)
         assert (progress.bar.tasks[0].total, progress.bar.tasks[0].completed) == (200, 50)
         assert "25.0 %" in screen.getvalue()
-    with limited(0), cli_progress.CountedProgress("tracking", "rows") as counter:
+    with ThreadLimit(0), cli_progress.CountedProgress("tracking", "rows") as counter:
         counter.update(50)
         assert "tracking: 50 rows" in screen.getvalue()
 
@@ -176,7 +176,7 @@ def test_no_time_left_is_shown_while_the_rate_changes(monkeypatch, later, left):
     monkeypatch.setattr("sys.stderr", screen)
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     monkeypatch.setattr(cli_progress, "SILENT_S", 0)
-    with limited(0), cli_progress.CountedProgress("fitting", "likelihoods") as counter:
+    with ThreadLimit(0), cli_progress.CountedProgress("fitting", "likelihoods") as counter:
         for k in range(1, 11):
             now[0] = float(k)
             screen.seek(0)

@@ -14,7 +14,7 @@ from radarsim.engine.collect import collect
 from radarsim.engine.stop_conditions import Signals
 from radarsim.engine.store import writer as store_writer
 from radarsim.engine.sums import Sums
-from radarsim.system.threads import limited
+from radarsim.system.threads import ThreadLimit
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def main() -> None:
         if done >= total / 10 and not said:
             said.append(say("running"))
 
-    with limited(asked.threads), Signals() as signals:
+    with ThreadLimit(asked.threads), Signals() as signals:
         if asked.linger:
             say("running")
             time.sleep(60)

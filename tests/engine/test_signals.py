@@ -16,7 +16,7 @@ from radarsim.engine.collect import collect, read_stored
 from radarsim.engine.stop_conditions import Signals
 from radarsim.engine.store.store import Store
 from radarsim.errors import Interruption
-from radarsim.system.threads import limited
+from radarsim.system.threads import ThreadLimit
 from tests.engine.fake import Fake, textbook
 
 ROOT = Path(__file__).parents[2]
@@ -104,7 +104,7 @@ def test_other_signals_are_left_alone_and_the_handlers_put_back(threads):
     before = [signal.getsignal(number) for number in numbers]
     other = signal.signal(signal.SIGUSR1, lambda *_: None)
     try:
-        with limited(threads), Signals() as signals:
+        with ThreadLimit(threads), Signals() as signals:
             signal.raise_signal(signal.SIGUSR1)
             time.sleep(0.1)
             assert signals() is None
@@ -118,7 +118,7 @@ def test_other_signals_are_left_alone_and_the_handlers_put_back(threads):
 
 @pytest.mark.parametrize("threads", [None, 0])
 def test_a_signal_is_told_as_a_reason_and_as_an_exception(threads):
-    with limited(threads), Signals() as signals:
+    with ThreadLimit(threads), Signals() as signals:
         signal.raise_signal(signal.SIGTERM)
         while signals() is None:
             time.sleep(0.01)

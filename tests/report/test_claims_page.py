@@ -78,7 +78,7 @@ def test_forest_stands_in_margins():
     assert [one.x[:2].tolist() for one in (its_interval, other_interval)] == [[1.0, 3.0], [-1.5, -0.5]]
     assert (exact.x.tolist(), exact.exact.tolist()) == ([-1.25], [1.0])
     assert [words for _, words in panel.y.ticks] == ["s  1", "s  2"]
-    assert [mark.text for mark in panel.marks if isinstance(mark, Note)] == ["3 [2, 4] m", "6.25 m exactly"]
+    assert [mark.text for mark in panel.marks if isinstance(mark, Note)] == ["3 [2, 4] m", "6.25 m (exact)"]
     assert forest_plot([row(kind=NOT_RUN)]) is None
     (few,) = forest_plot([row(judged_lo="", judged_hi="")]).panels  # few realisations have no interval
     assert few.marks[1].x[:2].tolist() == [2.0, 2.0]

@@ -1,5 +1,6 @@
 """Packages that offer studies or filters, as pip leaves them: a folder on the path with the package's metadata."""
 
+import ast
 import tomllib
 from pathlib import Path
 
@@ -34,3 +35,9 @@ def beside(start, site: Path, place: Path):
         return done
 
     return asked
+
+
+def lines_without_imports(text: str) -> int:
+    """The number of lines of a module's text apart from its imports."""
+    imports = [node for node in ast.parse(text).body if isinstance(node, ast.Import | ast.ImportFrom)]
+    return len(text.splitlines()) - sum(node.end_lineno - node.lineno + 1 for node in imports)

@@ -3,7 +3,6 @@
 What their code may do wrong is one line, and never the numbers that are computed already.
 """
 
-import ast
 import hashlib
 import json
 import shutil
@@ -63,8 +62,7 @@ def test_the_long_tests_of_what_is_learned_pass(radarsim):
 @pytest.mark.parametrize("name", LINES)
 def test_its_file_is_short(name):
     text = (EXAMPLES / name / "src" / name / "__init__.py").read_text(encoding="utf-8")
-    imports = [node for node in ast.parse(text).body if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert len(text.splitlines()) - sum(node.end_lineno - node.lineno + 1 for node in imports) <= LINES[name]
+    assert example_packages.lines_without_imports(text) <= LINES[name]
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import pytest
 
 import radarsim
-from radarsim.system.threads import forbidden, limited, mapping
+from radarsim.system.threads import ThreadLimit, forbidden, mapping
 from tests.program import command
 
 BARRED = """
@@ -70,12 +70,12 @@ def test_a_command_that_lacks_its_threads_says_what_does_without(barred):
 
 
 def test_what_is_forbidden_within_is_allowed_after():
-    with limited(0):
+    with ThreadLimit(0):
         assert forbidden()
-        with limited(2), mapping() as mapped:
+        with ThreadLimit(2), mapping() as mapped:
             assert forbidden()
             assert mapped is map
     assert not forbidden()
-    with pytest.raises(KeyError), limited(0):
+    with pytest.raises(KeyError), ThreadLimit(0):
         raise KeyError
     assert not forbidden()

@@ -184,7 +184,7 @@ RADAR = (
 )
 FILTER = "name, kind, observes, initial_scans, manoeuvre_variance, process_noise"
 TOP = "radar, target, filters, baseline, scans, duration_s, "
-TOP += "name, like, study, include, sweep, realisations, seed, figures, scenarios"
+TOP += "name, like, study, include, sweep, realisations, seed, figures, runs, scenarios"
 UNKNOWN = [
     ("radar.sigma_rnge_m", f"unknown key; did you mean sigma_range_m? allowed: {RADAR}"),
     ("filters.0.manoeuver_variance", f"unknown key; did you mean manoeuvre_variance? allowed: {FILTER}"),

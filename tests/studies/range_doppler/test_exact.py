@@ -8,6 +8,7 @@ from radarsim.physics import targets
 from radarsim.physics.motion import process_noise, transition
 from radarsim.studies.range_doppler.error_recursion import Plots, error_recursion
 from radarsim.studies.range_doppler.filter_design import design, least_squares_start, noise_by_time, observation
+from radarsim.studies.range_doppler.kernels.recorded_rows import noise_over
 from radarsim.studies.range_doppler.steady_state import normalised_error, steady_state
 from tests.studies.range_doppler import naive
 from tests.tolerances import assert_rounded, mean_error, scaled_condition
@@ -165,6 +166,5 @@ def test_normalised_error_of_a_singular_covariance_is_not_a_number_beside_others
 
 @pytest.mark.parametrize("noise", ["random_jerk", "white_jerk", "white_acceleration"])
 def test_noise_over_a_time_of_one_period_is_that_of_a_scan(noise):
-    a, b = noise_by_time(noise, 0.3, 7.0)
-    power = 5 - np.array(pack(np.add.outer(np.arange(3), np.arange(3))))
-    assert_rounded(a * 7.0**power + b * 7.0 ** (power + 1), pack(process_noise(noise, 0.3, 7.0)), operations=10)
+    noise_over_period = noise_over(noise_by_time(noise, 0.3, 7.0), 7.0)
+    assert_rounded(np.array(noise_over_period), pack(process_noise(noise, 0.3, 7.0)), operations=10)

@@ -102,8 +102,7 @@ class Walk(StepStudy):
     components = (Component("x", "m", "$x$", "distance"),)  # the errors shown: name, unit, letter, words
     parts, Filter = {"sensor": Sensor, "target": Target}, Filter
     scan_period = "sensor.scan_period_s"
-    # of a recorded plot: column, unit, keys of its σ
-    measured = (MeasuredColumn("range_m", "m", ("sensor.sigma_range_m",)),)
+    measured = (MeasuredColumn("range_m", "m", ("sensor.sigma_range_m",)),)  # recorded: column, unit, keys of its σ
     kinds = {"kalman": Kalman, "fixed": FixedGain}
     normals = 1, 1, 1  # unit normals of the start, of a move, of a plot
     paper, world = Paper("Jazwinski 1970", may_grow=("filters",)), staticmethod(numbers)
