@@ -10,7 +10,7 @@ import numpy as np
 from radarsim.kernels import kalman_algebra
 from radarsim.kernels.gap_noise import ONE_PERIOD, manoeuvre_noise
 from radarsim.kernels.second_order import as_kernel_array
-from radarsim.physics.motion import transition
+from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.studies.ambiguous_doppler.kernels import layout
 
 UNLIMITED_DEPTH = 10.0**300  # of a list from which no hypothesis is dropped
@@ -64,8 +64,9 @@ def model_over(order: int, variance: float, dt: float, period: float) -> tuple[n
             Q[0, 0] = variance * period**2 * (whole - 1.0 + part**2)
     else:
         size = order + 1
-        F[:size, :size] = transition(dt, size)
-        Q[:size, :size] = kalman_algebra.unpack(manoeuvre_noise(variance, dt, period, size))[:size, :size]
+        F[:size, :size], Q[:size, :size] = transition(dt, size), manoeuvre_covariance(variance, dt, size)
+        if dt > ONE_PERIOD * period:
+            Q[:size, :size] = kalman_algebra.unpack(manoeuvre_noise(variance, dt, period, size))[:size, :size]
     return F, Q
 
 
