@@ -31,20 +31,21 @@ def missed_plots_bound(
     chance: np.ndarray,
     counts: np.ndarray,
     needed: Sequence[int],
-    settles: int,
+    settling_scans: int,
     immediate: Sequence[bool] = (),
 ) -> Bound:
     """As `static_bound`, over the realisations with an estimate; chance (K,): the probability of plots at scan k.
 
     counts (K, C): whether the plots count for a component, which has an estimate from `needed` plots (C,) on, or, where
-    `immediate` (C,), at any scan with a plot. `settles` scans that count for all components settle all parameters."""
+    `immediate` (C,), at any scan with a plot. `settling_scans`: those that, counting for all components, determine all
+    parameters."""
     shape, needs = maps.shape[:2], np.array(needed)
     is_immediate = np.array(immediate or [False] * shape[1])
     sigma, kinds = np.full(shape, np.nan), []
     J, share, count = prior[None], np.ones(1), np.zeros((1, shape[1]), dtype=int)  # of patterns of plots so far
     mean, enumerating = prior.copy(), True
     count_probabilities = [
-        np.eye(1, n + 1)[0] for n in (*needed, settles)
+        np.eye(1, n + 1)[0] for n in (*needed, settling_scans)
     ]  # probabilities of 0, 1, … and of at least n plots
     for k, (p, information) in enumerate(zip(chance, gained, strict=True)):
         # A plot in this scan, with which there are still too few.
@@ -55,12 +56,12 @@ def missed_plots_bound(
             for probabilities, is_counted in zip(count_probabilities, of_scan, strict=True)
         ]
         enough_plots = np.array([probabilities[-1] for probabilities in count_probabilities[:-1]])
-        settled = np.minimum(enough_plots, count_probabilities[-1][-1])
+        enough_for_all = np.minimum(enough_plots, count_probabilities[-1][-1])
         likely = enough_plots + np.where(is_immediate & (counts[k] > 0), too_few, 0.0)
         mean = mean + p * information
         with np.errstate(divide="ignore", invalid="ignore"):
             enumerated = reduced = (
-                settled**2 / likely * sigma_from_information(decompose_information(mean), maps[k]) ** 2
+                enough_for_all**2 / likely * sigma_from_information(decompose_information(mean), maps[k]) ** 2
             )
             if enumerating:
                 (pattern, has_plot), share = likeliest_patterns(np.array([p, 1 - p])[:, None] * share)

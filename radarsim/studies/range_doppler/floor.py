@@ -63,7 +63,7 @@ def plot_bound(
     if (chance := spec.radar.detection_probability) == 1:
         return static.static_bound(prior_information, information, derivatives, not scenario.is_random(spec.target))
     multiplicity, plot_numbers = np.ones((scans, 3), dtype=int), (True, numbers == 2, False)
-    settles = 0 if prior.any() else -(-size // numbers)
+    settling_scans = 0 if prior.any() else -(-size // numbers)
     return missed_plots.missed_plots_bound(
         prior_information,
         information,
@@ -71,7 +71,7 @@ def plot_bound(
         np.full(scans, chance),
         multiplicity,
         (start,) * 3,
-        settles,
+        settling_scans,
         plot_numbers,
     )
 

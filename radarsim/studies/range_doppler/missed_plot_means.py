@@ -12,8 +12,8 @@ from radarsim.studies.range_doppler.missed_plot_patterns import (
     PATTERNS_AT_ONCE,
     Design,
     Mixture,
-    has_settled,
     is_close,
+    means_agree,
     mixture,
 )
 
@@ -78,7 +78,7 @@ def compute_means(design: Design, companions: Sequence[Design], designed_case: D
     mixtures = map(limited_mixture, PATTERN_LIMITS)
     coarse_mixture, fine_mixture = next(mixtures), next(mixtures)
     while (
-        not has_settled(fine_mixture, coarse_mixture, designed_case.asked_from_k)
+        not means_agree(fine_mixture, coarse_mixture, designed_case.asked_from_k)
         and (finer := next(mixtures, None)) is not None
     ):
         coarse_mixture, fine_mixture = fine_mixture, finer

@@ -115,7 +115,7 @@ def waiting_limit(start: int, scans: int, detection: float) -> int:
     return sum(math.comb(min(scans, start + misses), count) for count in range(start))
 
 
-def has_settled(fine_mixture: Mixture, coarse_mixture: Mixture, from_k: int = 0) -> bool:
+def means_agree(fine_mixture: Mixture, coarse_mixture: Mixture, from_k: int = 0) -> bool:
     """Whether every mean that there is changes by little when merged to a quarter as many patterns.
 
     from_k: of e² alone, from this scan on, counted from 1; 0: of e² and NEES, at every scan."""

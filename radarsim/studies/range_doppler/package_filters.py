@@ -175,7 +175,7 @@ def error_recursion(
     return E, S
 
 
-def settled_gain(filter_: LinearFilter) -> np.ndarray:
+def steady_gain(filter_: LinearFilter) -> np.ndarray:
     """The gain (3, 2) of a filter of a package at its end, not-a-number where it still changes there, or of another."""
     previous_gain, final_gain = filter_.gains[-2:]
     steady = filter_.has_given_gains and np.allclose(previous_gain, final_gain, rtol=STEADY_TOLERANCE, atol=0)

@@ -64,14 +64,16 @@ class PlotLikelihood:
         first = int(present[:, 0].argmax())
         rows = first + np.flatnonzero(present[first:].any(axis=1))
         t, z, present = columns["t_s"][rows], z[rows], present[rows]
-        settled = int(np.searchsorted(np.cumsum(present[:, 0]), START_RANGES, side="right"))
+        first_scored_row = int(np.searchsorted(np.cumsum(present[:, 0]), START_RANGES, side="right"))
         present[0, 0] = False  # it starts the track
         dt = np.diff(t, prepend=t[0])
         F, Q = np.stack([transition(step) for step in dt]), np.empty((len(dt), 6))
         recorded_rows.fill_noise(self.noise, dt, Q)
         H = np.tile(observation(self.observes), (len(t), 1, 1))
         model = F, unpack(Q.T), H
-        return _Problem(track, rows, *model, np.where(present, z, 0.0), z[0, 0], present, settled, dt / self.usual_s)
+        return _Problem(
+            track, rows, *model, np.where(present, z, 0.0), z[0, 0], present, first_scored_row, dt / self.usual_s
+        )
 
     def _score(self, problem: "_Problem", values: np.ndarray, law: ErrorLaw) -> tuple[np.ndarray, np.ndarray]:
         """The log-densities (n, m) of a track's numbers, and their probabilities to be no outliers."""
@@ -99,7 +101,7 @@ class PlotLikelihood:
         total = np.zeros(self.observes)
         for problem in self.problems:
             score, _ = self._score(problem, values, law)
-            total += score[problem.settled :].sum(axis=0)
+            total += score[problem.first_scored_row :].sum(axis=0)
         return total
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
@@ -128,5 +130,5 @@ class _Problem(NamedTuple):
     z: np.ndarray  #: (n, m) the numbers
     start: float  #: the first range
     present: np.ndarray  #: (n, m) which numbers count
-    settled: int  #: row from which the state is known
+    first_scored_row: int  #: row from which the state is known
     intervals: np.ndarray  #: (n,) time since the row before, in usual intervals

@@ -33,7 +33,7 @@ class RangeDopplerAxes(Axes):
     observes: np.ndarray  #: (F,) 1: filters of the range, 2: of range and velocity
     manoeuvre_variance: np.ndarray  #: (F,) D_M in (m/s³)²
     process_noise: tuple[str, ...]  #: forms of their Q; "" of a filter of a package
-    settled_gain: np.ndarray  #: (F, 3, 2) a package's gain in the long run; not-a-number where there is none
+    steady_gain: np.ndarray  #: (F, 3, 2) a package's gain in the long run; not-a-number where there is none
     sigma: np.ndarray  #: (2,) standard deviations of the plots, m and m/s
     scan_period_s: float
     C_theta: float  #: σ_r²/(Δt²σ_V²) (eq. 11), no unit
@@ -156,7 +156,7 @@ def axes(designed_case: DesignedCase) -> RangeDopplerAxes:
         observes=designed_case.observes,
         manoeuvre_variance=np.array(designed_case.variances),
         process_noise=tuple(f.process_noise if isinstance(f, Filter) else "" for f in spec.filters),
-        settled_gain=np.stack([package_filters.settled_gain(d) for d in designed_case.filters]),
+        steady_gain=np.stack([package_filters.steady_gain(d) for d in designed_case.filters]),
         sigma=designed_case.plots.sigma,
         scan_period_s=designed_case.dt,
         C_theta=float(designed_case.plots.sigma[0] ** 2 / (designed_case.dt**2 * designed_case.plots.sigma[1] ** 2)),

@@ -102,7 +102,7 @@ def steady_sigma(axes: RangeDopplerAxes, f: int) -> np.ndarray | None:
     period = axes.scan_period_s
     if noise := axes.process_noise[f]:
         return _settled(int(axes.observes[f]), float(axes.manoeuvre_variance[f]), tuple(axes.sigma), period, noise)
-    true = package_filters.steady_state(axes.settled_gain[f], axes.sigma, period)
+    true = package_filters.steady_state(axes.steady_gain[f], axes.sigma, period)
     return None if true is None else np.sqrt(np.diag(true))
 
 

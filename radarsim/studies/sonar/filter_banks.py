@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.studies.sonar.detector_arrays import AdaptiveRule, ModelPair
-from radarsim.studies.sonar.filter_design import FilterDesign, FilterSpec, settled_gain
+from radarsim.studies.sonar.filter_design import FilterDesign, FilterSpec, steady_gain
 from radarsim.studies.sonar.kernels import realisation_gains
 from radarsim.studies.sonar.kernels.adaptive import AdaptiveRules
 from radarsim.studies.sonar.kernels.detector import Detectors
@@ -82,21 +82,21 @@ def per_realisation_bank(
 ) -> realisation_gains.RealisationBank:
     """The bank of filters whose gains differ between realisations; nominal (C,) σ of a plot."""
     F, C = len(specs), len(nominal)
-    manoeuvre, settled = np.zeros((F, C)), np.zeros((F, C, 3))
+    manoeuvre, steady_gains = np.zeros((F, C)), np.zeros((F, C, 3))
     carry = np.zeros((F, len(t), C))
     for f, spec in enumerate(specs):
         for c, sigma in enumerate(nominal):
             manoeuvre[f, c] = spec.variance[c] * period ** (2 * spec.size) / sigma**2
             carry[f, :, c] = step_correlations(spec.rho[c], t, period)
             if spec.kind == "fixed_gain":
-                settled[f, c] = settled_gain(period, sigma, spec.size, spec.variance[c])
+                steady_gains[f, c] = steady_gain(period, sigma, spec.size, spec.variance[c])
     return realisation_gains.RealisationBank(
         kind=np.array([KINDS[f.kind] for f in specs]),
         size=np.array([f.size for f in specs]),
         length=np.array([f.length for f in specs]),
         carry=carry,
         manoeuvre=manoeuvre,
-        settled=settled,
+        steady_gains=steady_gains,
         memory=max([*detectors.plots.tolist(), *(f.length for f in specs if f.kind == "window")], default=0),
         period=period,
         sigma=nominal,

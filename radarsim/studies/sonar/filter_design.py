@@ -91,7 +91,7 @@ def design_recursion(
     return RecursionDesign(size, gain * np.append(scale, 1.0), carry, covariance, plots.moments())
 
 
-def settled_gain(period: float, sigma: float, size: int, manoeuvre_variance: float) -> tuple[float, float, float]:
+def steady_gain(period: float, sigma: float, size: int, manoeuvre_variance: float) -> tuple[float, float, float]:
     """Steady-state gains (3,) of the Kalman filter, α, β and γ (0 for size 2), from the algebraic Riccati equation."""
     from scipy.linalg import solve_discrete_are
 
@@ -148,8 +148,8 @@ def recursive_design(spec: FilterSpec, c: int, plots: Plots) -> RecursionDesign:
         case "kalman_augmented":
             return design_recursion(plots, size, spec.rho[c], variance)
         case "fixed_gain":
-            settled = settled_gain(plots.period, plots.sigma, size, variance)
-            return design_recursion(plots, size, 0.0, variance, spec.length, settled)
+            steady_gains = steady_gain(plots.period, plots.sigma, size, variance)
+            return design_recursion(plots, size, 0.0, variance, spec.length, steady_gains)
     raise ValueError(f"not a recursive filter: {spec.kind}")
 
 

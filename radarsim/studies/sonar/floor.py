@@ -45,9 +45,15 @@ def floor(spec: Keys, axes: GivenPlotsAxes) -> Floor | None:
         detection_probability[random_scans] = spec.sensor.detection_probability
         needed = tuple(1 + j for _ in range(is_measured.shape[1]) for j in range(size))
         # At least the coefficients of one coordinate: the others have two.
-        settles = rows.shape[2] - 2 * (rows.shape[1] - 1)
+        settling_scans = rows.shape[2] - 2 * (rows.shape[1] - 1)
         bound = missed_plots.missed_plots_bound(
-            no_prior, information, maps, detection_probability, np.repeat(is_measured, size, axis=1), needed, settles
+            no_prior,
+            information,
+            maps,
+            detection_probability,
+            np.repeat(is_measured, size, axis=1),
+            needed,
+            settling_scans,
         )
     return Floor(floors_bound.CRB, (bound,) * len(axes.filters), bound)
 

@@ -79,13 +79,13 @@ class PlotLikelihood:
         period = self.spec.sensor.scan_period_s
         noises = [unpack(manoeuvre_noise(1.0, step, period, size))[:size, :size] for step in steps.tolist()]
         Q = np.stack([np.kron(np.diag(scale), noise) for noise in noises])
-        settled = int(np.searchsorted(np.cumsum(is_whole), STARTING_PLOTS, side="right"))
+        first_scored_row = int(np.searchsorted(np.cumsum(is_whole), STARTING_PLOTS, side="right"))
         usual_interval_s = float(np.median(steps[1:])) if len(steps) > 1 else period
         rates = WIDE_RATE_SIGMAS * usual_interval_s ** -np.arange(1.0, size)
         is_used[0] = False  # it starts the track
         second_whole = int(is_whole[1:].argmax()) + 1 if is_whole[1:].any() else 0
         z, t = np.where(np.isfinite(z), z, 0.0), t - t[0]
-        problem = _TrackProblem(track, rows, F, Q, z, is_used, t, rates, second_whole, settled)
+        problem = _TrackProblem(track, rows, F, Q, z, is_used, t, rates, second_whole, first_scored_row)
         _, directions, variance = self._numbers(problem, self.stated[:C])  # the stated errors, whatever is tried
         position_sigma = np.sqrt(np.diag(directions[0].T @ np.diag(variance[0]) @ directions[0]))
         return problem._replace(rates=np.outer(rates, position_sigma))
@@ -142,7 +142,8 @@ class PlotLikelihood:
     def _score(self, values: np.ndarray, law: ErrorLaw) -> float:
         """The sum over all tracks; the first plots, which find the state, are left out."""
         return sum(
-            float(self._track_score(problem, values, law)[0][problem.settled :].sum()) for problem in self.problems
+            float(self._track_score(problem, values, law)[0][problem.first_scored_row :].sum())
+            for problem in self.problems
         )
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
@@ -176,7 +177,7 @@ class _TrackProblem(NamedTuple):
     t: np.ndarray  #: (n,) from the first plot
     rates: np.ndarray  #: (size - 1, C) σ of the rates of each order before the first plot
     second_whole: int  #: row of the second complete plot, 0 if there is none
-    settled: int  #: row from which the state is known
+    first_scored_row: int  #: row from which the state is known
 
 
 def likelihood(

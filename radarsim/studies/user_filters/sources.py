@@ -200,8 +200,8 @@ def digest_of(path: str, kind: Kind) -> str:
     current = signature(path)
     if current is None:
         return ""
-    settled = time.time_ns() - current[MODIFIED] > MIN_AGE_NS
-    return (_file_digest if settled else _file_digest.__wrapped__)(path, kind, current)
+    is_old = time.time_ns() - current[MODIFIED] > MIN_AGE_NS
+    return (_file_digest if is_old else _file_digest.__wrapped__)(path, kind, current)
 
 
 @lru_cache(maxsize=10_000)

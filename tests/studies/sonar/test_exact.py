@@ -47,7 +47,7 @@ def test_recursion_of_true_errors_is_that_of_the_weights(rho, size):
     for design in (
         filter_design.design_recursion(plots, size),
         filter_design.design_recursion(plots, size, 0.6, 1e-4),
-        filter_design.design_recursion(plots, size, 0.0, 1e-3, 0, filter_design.settled_gain(5.0, 30.0, size, 1e-3)),
+        filter_design.design_recursion(plots, size, 0.0, 1e-3, 0, filter_design.steady_gain(5.0, 30.0, size, 1e-3)),
     ):
         bias, S = exact_errors.recursive_errors(design.gain, design.carry, t, truth, steps, np.full(12, 30.0), 0.0)
         for m in range(4):

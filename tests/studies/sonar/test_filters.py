@@ -118,7 +118,7 @@ def test_missed_plot_has_no_gain_and_a_second_plot_at_one_time_averages():
             filter_design.design_recursion(plots(seen), size, 0.6, 1e-4),
             filter_design.design_recursion(plots(seen), size, 0.0, 1e-4),
             filter_design.design_recursion(
-                plots(seen), size, 0.0, 1e-4, 0, filter_design.settled_gain(PERIOD, SIGMA, size, 1e-4)
+                plots(seen), size, 0.0, 1e-4, 0, filter_design.steady_gain(PERIOD, SIGMA, size, 1e-4)
             ),
         ):
             assert not design.gain[0, 4:6].any()

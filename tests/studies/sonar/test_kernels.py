@@ -61,13 +61,13 @@ def twin(spec, z, sigma, rho, scale):
         case "kalman":
             return naive.kalman(t, z, size, sigma, variance)
         case "fixed_gain":
-            return naive.kalman(t, z, size, sigma, variance, settled(size, sigma, variance))
+            return naive.kalman(t, z, size, sigma, variance, steady_gains(size, sigma, variance))
         case "kalman_augmented":
             return naive.augmented(t, z, size, sigma, rho, variance, T)
     return naive.differenced(t, z, size, sigma, rho, T)
 
 
-def settled(size, sigma, variance):
+def steady_gains(size, sigma, variance):
     """Steady gains by running the Riccati recursion until it stands."""
     P, A, N = np.eye(size) * sigma**2, naive.F(T, size), naive.Q(T, size, variance)
     for _ in range(5000):

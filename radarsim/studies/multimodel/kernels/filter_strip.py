@@ -52,14 +52,14 @@ def prepare_model(work, first_row, moves, accelerates, sigma, dt):
 
 
 @kernel_part
-def prepare_step(work, size, models, transitions, interval, dt, settled):
+def prepare_step(work, size, models, transitions, interval, dt, none_waiting):
     """Write models and transition probabilities over the time since each lane's previous plot.
 
-    interval is the number of the interval dt since the previous scan; if lanes still wait for a plot (not settled),
+    interval is the number of the interval dt since the previous scan; if lanes still wait for a plot,
     T(a + b) = T(a) T(b), eq. (8)."""
     first = interval * size * size
     wait = full(dt)
-    if not settled:
+    if not none_waiting:
         wait = wait + get(work, layout.WAIT)
     put(work, layout.WAIT, wait)
     for i in range(size):
@@ -68,7 +68,7 @@ def prepare_step(work, size, models, transitions, interval, dt, settled):
     for j in range(size):
         for i in range(size):
             c = full(transitions[first + i * size + j])
-            if not settled:
+            if not none_waiting:
                 c = full(0.0)
                 for n in range(size):
                     c = c + transitions[first + i * size + n] * get(work, layout.TRANSITION + n * layout.MAX_MODELS + j)
@@ -137,7 +137,7 @@ def start_track(work, numbers, size, plots, weights, probabilities):
             put(work, i * layout.HYPOTHESIS + r, get(work, r))
     for r in range(layout.STATES):
         put(work, layout.ESTIMATE + r, get(work, layout.MEAN + r))
-    numbers[layout.CURRENT], numbers[layout.PREPARED], numbers[layout.SETTLED] = 0, -1, 1
+    numbers[layout.CURRENT], numbers[layout.PREPARED], numbers[layout.NONE_WAITING] = 0, -1, 1
 
 
 @inline
@@ -166,16 +166,16 @@ def start_block(work, e, plots, weights):
 def run_strip(work, numbers, listed, rules, models, transitions, scans, plots, frame, out):
     """Run one filter over scans, see `Scans`; all arguments are addresses.
 
-    work: rows (WORK,); numbers: CURRENT … SETTLED; listed: MAX_MODELS whole numbers; models (size * 3,): moves,
+    work: rows (WORK,); numbers: CURRENT … NONE_WAITING; listed: MAX_MODELS whole numbers; models (size * 3,): moves,
     accelerates (0 or 1), sigma of the acceleration per step in m/s²; transitions (U * size * size,): T over each
     distinct interval between scans, row by row; plots: PLOT rows a scan; frame: of the sensor, for the covariance at
     the prediction; out: OUTPUT rows a scan."""
     for k in range(scans.first, scans.stop):
         plot, interval, output = row(plots, k * layout.PLOT), scans.intervals[k], row(out, k * layout.OUTPUT)
         noise, detected = row(plot, layout.COVARIANCE), get(plot, layout.DETECTED)
-        if numbers[layout.PREPARED] != interval or numbers[layout.SETTLED] == 0:
-            dt, settled = scans.times[interval], numbers[layout.SETTLED] == 1
-            prepare_step(work, rules.size, models, transitions, interval, dt, settled)
+        if numbers[layout.PREPARED] != interval or numbers[layout.NONE_WAITING] == 0:
+            dt, none_waiting = scans.times[interval], numbers[layout.NONE_WAITING] == 1
+            prepare_step(work, rules.size, models, transitions, interval, dt, none_waiting)
             numbers[layout.PREPARED] = interval
         if rules.at_prediction == 1:
             noise = row(work, layout.NOISE)
@@ -197,9 +197,9 @@ def run_strip(work, numbers, listed, rules, models, transitions, scans, plots, f
                 put(work, layout.ESTIMATE + i, where_greater(detected, full(0.5), x, get(work, layout.ESTIMATE + i)))
         if lanes.any_greater(full(0.5), detected):
             keep_missed(work, old, new, rules.size, detected)
-            numbers[layout.SETTLED] = 0
-        elif numbers[layout.SETTLED] == 0:
-            numbers[layout.PREPARED], numbers[layout.SETTLED] = -1, 1
+            numbers[layout.NONE_WAITING] = 0
+        elif numbers[layout.NONE_WAITING] == 0:
+            numbers[layout.PREPARED], numbers[layout.NONE_WAITING] = -1, 1
         numbers[layout.CURRENT] = 1 - numbers[layout.CURRENT]
 
 

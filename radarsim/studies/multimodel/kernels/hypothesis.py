@@ -36,9 +36,9 @@ from radarsim.studies.multimodel.kernels import layout
 
 
 def work_arrays() -> tuple[np.ndarray, np.ndarray]:
-    """Allocate the memory of a filter for eight realisations: rows (WORK), and numbers CURRENT, PREPARED, SETTLED."""
+    """The memory of a filter for eight realisations: rows (WORK), and the numbers CURRENT, PREPARED, NONE_WAITING."""
     numbers = np.zeros(4, dtype=np.int64)
-    numbers[layout.CURRENT], numbers[layout.PREPARED], numbers[layout.SETTLED] = 0, -1, 1
+    numbers[layout.CURRENT], numbers[layout.PREPARED], numbers[layout.NONE_WAITING] = 0, -1, 1
     return rows(layout.WORK), numbers
 
 

@@ -43,7 +43,7 @@ WORK = MERGE_COUNTS + 2
 
 CURRENT = 0  # which of the two banks is in use
 PREPARED = 1  # the interval that the rows MODEL and TRANSITION hold for; -1: none
-SETTLED = 2  # 1 where no lane waits for a plot that it missed
+NONE_WAITING = 2  # 1 where no lane waits for a plot that it missed
 
 POSITION = 0  # z (3)
 COVARIANCE = 3  # R (6): xx, xy, xz, yy, yz, zz

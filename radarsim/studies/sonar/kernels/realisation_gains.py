@@ -33,7 +33,7 @@ class RealisationBank(NamedTuple):
     length: np.ndarray  #: (F,) of a window or of the start of a fixed-gain filter
     carry: np.ndarray  #: (F, K, C) correlation c that the filter assumes
     manoeuvre: np.ndarray  #: (F, C) variance q, in nominal plots and periods
-    settled: np.ndarray  #: (F, C, 3) gains of a fixed-gain filter, likewise
+    steady_gains: np.ndarray  #: (F, C, 3) gains of a fixed-gain filter, likewise
     memory: int  #: number of plots that are kept for windows and detectors
     period: float  #: s
     sigma: np.ndarray  #: (C,) of a nominal plot, m or rad
@@ -68,7 +68,7 @@ def filter_scan(bank, f, c, k, dt, filters, plots):
     elif kind == WINDOW:
         fit_window(filters, plots, f, c, length, size, period)
     else:
-        gain = bank.settled[f, c]
+        gain = bank.steady_gains[f, c]
         fixed = (gain[0], gain[1], gain[2])
         model = Model(size, max(size, length), bank.carry[f, k, c], bank.manoeuvre[f, c], fixed)
         update_recursive(filters, plots, f, c, kind != INFORMATION, model, dt, period)

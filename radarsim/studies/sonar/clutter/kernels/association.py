@@ -51,19 +51,19 @@ def associate_track(draws, rule, realisation, k, plot, gate, counts):
     S_inverse = (irr, irb, ibb)
     if plot[0] > 0.0:
         gated_plots = add_plot(gated_plots, nu_r, nu_b, 0.0, S_inverse, OPEN_GATE if is_known else rule.chi_square)
-        if gate.settled:
+        if gate.has_velocity:
             counts[TARGET_PLOT_COUNT] += 1.0
             counts[PLOTS_IN_GATE_COUNT] += distance_squared(nu_r, nu_b, S_inverse) <= rule.chi_square
     cells = draws.cells
     if cells.density > 0.0:
         with_false = add_false_plots(gated_plots, draws, realisation, k, gate, rule.chi_square)
-        if gate.settled:
+        if gate.has_velocity:
             counts[FALSE_IN_GATE_COUNT] += with_false.false_count
             counts[EXPECTED_FALSE_COUNT] += cells.density * gate_area(gate, det, rule.chi_square, cells)
         gated_plots = gated_plots if is_known else with_false
-    if gate.settled:
+    if gate.has_velocity:
         counts[GATE_COUNT] += 1.0
-    return associate_gated_plots(gated_plots, rule, gate.r, gate.S, gate.settled)
+    return associate_gated_plots(gated_plots, rule, gate.r, gate.S, gate.has_velocity)
 
 
 @kernel_part

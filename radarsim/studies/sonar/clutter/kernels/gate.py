@@ -40,7 +40,7 @@ class Gate(NamedTuple):
     r: float
     b: float
     S: tuple[float, float, float]
-    settled: bool
+    has_velocity: bool
 
 
 class GatedPlots(NamedTuple):
@@ -123,14 +123,14 @@ def add_plot(gated_plots, nu_r, nu_b, false, S_inverse, threshold):
 
 
 @inline
-def associate_gated_plots(gated_plots, rule, r, S, settled):
+def associate_gated_plots(gated_plots, rule, r, S, has_velocity):
     """Associate a track at range r with the plots in its gate.
 
     This is Bar-Shalom's parametric filter (Bar-Shalom, Daum, Huang 2009). With b = λ 2π √|S| (1 - P_D P_G) / P_D, no
     plot is the target's with probability β₀ = b / (b + Σe), and the covariance exceeds that after a certain plot by
     K (β₀ S + scatter) Kᵀ. λ is the density in range and bearing: the density per m² times the range. The score is the
-    logarithm of the likelihood ratio of all plots in the gate, with a target against without. A track of one plot (not
-    settled) takes the nearest."""
+    logarithm of the likelihood ratio of all plots in the gate, with a target against without. A track of one plot, of
+    unknown velocity, takes the nearest."""
     r = max(r, MIN_RANGE_M)
     density, root = rule.density * r, 2.0 * math.pi * math.sqrt(S[0] * S[2] - S[1] * S[1])
     miss_probability = 1.0 - rule.detection * rule.gate_probability
@@ -139,7 +139,7 @@ def associate_gated_plots(gated_plots, rule, r, S, settled):
     if gated_plots.count == 0.0:
         return Association(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, score)
     missed_weight = density * root * miss_probability / rule.detection
-    if rule.association != PDA or not settled or missed_weight + gated_plots.weight == 0.0:
+    if rule.association != PDA or not has_velocity or missed_weight + gated_plots.weight == 0.0:
         return Association(gated_plots.nu_r, gated_plots.nu_b, 0.0, 0.0, 0.0, 1.0, gated_plots.nearest_false, score)
     beta0 = missed_weight / (missed_weight + gated_plots.weight)
     # In an open gate all plots may be so far away that their likelihoods are zero.
@@ -158,19 +158,19 @@ def associate_gated_plots(gated_plots, rule, r, S, settled):
 
 
 @kernel
-def associate_innovations(rule, settled, r, S, nu_r, nu_b):
+def associate_innovations(rule, has_velocity, r, S, nu_r, nu_b):
     """Associate a track at range r, with innovation covariance S (rr, rb, bb), with plots of innovations (n,)."""
     irr, irb, ibb, _ = inverse_two(S[0], S[1], S[2])
     gated_plots = empty_gate()
     for i in range(nu_r.size):
         gated_plots = add_plot(gated_plots, nu_r[i], nu_b[i], 0.0, (irr, irb, ibb), rule.chi_square)
-    return associate_gated_plots(gated_plots, rule, r, S, settled)
+    return associate_gated_plots(gated_plots, rule, r, S, has_velocity)
 
 
 @inline
-def track_gate(position, S, settled, reach):
+def track_gate(position, S, has_velocity, reach):
     """The gate of a track; after one plot the velocity is unknown, and the target may have moved by `reach`, in m."""
     r, b = position
-    if not settled:
+    if not has_velocity:
         S = (S[0] + reach * reach, S[1], S[2] + (reach / max(r, MIN_RANGE_M)) ** 2)
-    return Gate(r, b, S, settled)
+    return Gate(r, b, S, has_velocity)

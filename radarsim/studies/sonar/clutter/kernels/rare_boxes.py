@@ -99,5 +99,5 @@ def associate_in_box(keys, rule, draw_index, gate, plot, box, law_probability, d
         gated_plots = kernels_gate.add_plot(
             gated_plots, plot[1] - gate.r, plot[2] - gate.b, 0.0, (irr, irb, ibb), rule.chi_square
         )
-    association = kernels_gate.associate_gated_plots(gated_plots, rule, gate.r, gate.S, gate.settled)
+    association = kernels_gate.associate_gated_plots(gated_plots, rule, gate.r, gate.S, gate.has_velocity)
     return association, h / p if any_in_box else (1.0 - h) / (1.0 - p), any_in_box
