@@ -1,21 +1,20 @@
-"""The kernel's problem of a case outside the paper's world, in which each realisation has gains of its own.
+"""The kernel and its problem for a case outside the paper's world, in which each realisation has gains of its own.
 
 Imported only to simulate: it loads the compiler."""
 
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.engine.sums import Layout
 from radarsim.kernels.kalman_algebra import pack
 from radarsim.studies.noise import noise_key
 from radarsim.studies.range_doppler import scenario
 from radarsim.studies.range_doppler.designed_case import DesignedCase
-from radarsim.studies.range_doppler.kernels import missed_block
+from radarsim.studies.range_doppler.kernels import missed_block as kernel
 
 
-def problem(case: Case, design: DesignedCase, baseline: int) -> missed_block.Problem:
+def problem(case: Case, design: DesignedCase, baseline: int) -> kernel.Problem:
     """What is simulated, as the kernel takes it."""
-    problem = missed_block.Problem(
+    problem = kernel.Problem(
         keys=np.stack([noise_key(case, stream) for stream in ("plots", "misses", "drawn")]),
         truth=design.x,
         sigma=design.plots.sigma,
@@ -34,20 +33,3 @@ def problem(case: Case, design: DesignedCase, baseline: int) -> missed_block.Pro
         believed=np.stack(pack(np.stack([d.believed for d in design.filters])), axis=-1),
     )
     return problem.plain()
-
-
-def layout(design: DesignedCase) -> Layout:
-    """The arrays of the sums, and their shapes."""
-    return Layout(**missed_block.shapes(len(design.filters), len(design.t)))
-
-
-def errors(problem: missed_block.Problem, first: int, count: int) -> np.ndarray:
-    """The errors (F, count, K, 3) of the realisations of a block; NaN where a filter has no estimate."""
-    return missed_block.errors(problem, first, count)
-
-
-def sums(problem: missed_block.Problem, layout_of_sums: Layout, first: int, count: int) -> np.ndarray:
-    """Sums (size,) of one block, in the order of the layout."""
-    block_sums = missed_block.Sums(**{name: np.zeros(shape) for name, shape in layout_of_sums.shapes.items()})
-    missed_block.simulate_block(problem, first, count, block_sums)
-    return layout_of_sums.pack(**block_sums._asdict())

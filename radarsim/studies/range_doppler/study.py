@@ -65,20 +65,19 @@ class Plan:
 
     @cached_property
     def layout(self) -> Layout:
-        layout: Layout = self.kernel.layout(self.design)
-        return layout
+        return Layout(**self.world.kernel.shapes(len(self.design.filters), len(self.design.t)))
 
     @cached_property
     def problem(self) -> "second_order.Problem | missed_block.Problem":
         """What is simulated, as the kernel takes it."""
         problem: second_order.Problem | missed_block.Problem
-        problem = self.kernel.problem(self.case, self.design, self.axes.baseline)
+        problem = self.world.problem(self.case, self.design, self.axes.baseline)
         return problem
 
     @property
-    def kernel(self) -> ModuleType:
-        """The module that simulates: for the paper's world with shared gains, for any other one with gains of each
-        realisation. Each loads the compiler and kernels of its own."""
+    def world(self) -> ModuleType:
+        """The module with the kernel and its problem: for the paper's world with shared gains, for any other one with
+        gains of each realisation. Each loads the compiler and kernels of its own."""
         if self.design.plain:
             from radarsim.studies.range_doppler import shared_gains_kernel
 
@@ -235,11 +234,13 @@ def exact_means(designed_case: DesignedCase, baseline: int) -> ExactErrors:
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
     """Sums of one block, in the order of the plan's layout."""
-    sums: np.ndarray = plan.kernel.sums(plan.problem, plan.layout, first, count)
-    return sums
+    kernel = plan.world.kernel
+    block_sums = kernel.Sums(**{name: np.zeros(shape) for name, shape in plan.layout.shapes.items()})
+    kernel.simulate_block(plan.problem, first, count, block_sums)
+    return plan.layout.pack(**block_sums._asdict())
 
 
 def errors(plan: Plan, first: int, count: int) -> np.ndarray:
     """The errors (F, count, K, 3) of its realisations."""
-    block_errors: np.ndarray = plan.kernel.errors(plan.problem, first, count)
+    block_errors: np.ndarray = plan.world.kernel.errors(plan.problem, first, count)
     return block_errors
