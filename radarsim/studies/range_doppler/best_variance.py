@@ -4,14 +4,15 @@ Many variances run through the exact recursion side by side. D_M is looked for i
 longer than the run to none at all, first ten to a decade, then ever closer about the best; it is given to four digits,
 which lie within the flat bottom of the curve and are the same on every machine."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.kernels.kalman_algebra import pack
 from radarsim.physics.motion import process_noise
-from radarsim.studies.range_doppler.config import Best, Filter, configured_variance
+from radarsim.studies.range_doppler import counted_scans
+from radarsim.studies.range_doppler.config import Best, Filter, Target, configured_variance
 from radarsim.studies.range_doppler.error_recursion import Plots, defects, scans, start_errors
 from radarsim.studies.range_doppler.filter_design import least_squares_start
 
@@ -34,26 +35,62 @@ class FilterInputs(NamedTuple):
     dt: float
     random_truth: np.ndarray | None = None
 
+    @property
+    def without_misses(self) -> "FilterInputs":
+        """The same with a plot at every scan."""
+        return self._replace(plots=self.plots._replace(detection=1.0))
 
-def manoeuvre_variances(filters: tuple[Filter, ...], filter_inputs: FilterInputs) -> tuple[float, ...]:
+
+def manoeuvre_variances(
+    filters: tuple[Filter, ...], criteria: Sequence[Best | None], filter_inputs: FilterInputs
+) -> tuple[float, ...]:
     """D_M of each filter, (m/s³)²: as given, or the best for these plots; not-a-number where it has none."""
     return tuple(
-        best_variance(filter_, variance, filter_inputs) if isinstance(variance, Best) else variance
-        for filter_ in filters
-        for variance in (configured_variance(filter_),)
+        variance if not isinstance(variance, Best) else best_variance(filter_, criterion or variance, filter_inputs)
+        for filter_, criterion in zip(filters, criteria, strict=True)
+        for variance in [configured_variance(filter_)]
     )
 
 
+def complete_criteria(
+    filters: tuple[Filter, ...], target: Target, filter_inputs: FilterInputs
+) -> tuple[Best | None, ...]:
+    """What each filter's D_M minimises, with the first scan that counts; None where its D_M is given.
+
+    By default that scan is the same for all filters: that of the manoeuvre, else the one at which they have settled
+    with the D_M that are best once they have started, with a plot at every scan."""
+    variances = [configured_variance(filter_) for filter_ in filters]
+    criteria = [variance if isinstance(variance, Best) else None for variance in variances]
+    undecided = [(f, given) for f, given in zip(filters, criteria, strict=True) if given and given.from_k is None]
+    if not undecided:
+        return tuple(criteria)
+    scans, plots, dt = len(filter_inputs.x), filter_inputs.plots, filter_inputs.dt
+    started, settled = counted_scans.started_scan([f for f, _ in undecided], plots.detection, scans), []
+    t = dt * np.arange(scans)
+    if counted_scans.manoeuvre_scan(target, t) is None:
+        for filter_, criterion in undecided:
+            early = with_first_scan(criterion, min(started, scans))
+            variance = best_variance(filter_, early, filter_inputs.without_misses)
+            options = variance, tuple(map(float, plots.sigma)), dt, plots.detection, scans
+            settled.append(counted_scans.settled_scans(filter_, *options)[COMPONENTS[early.minimise]])
+    k = counted_scans.counted_scans(target, t, started, settled, every=False).k
+    return tuple(criterion and with_first_scan(criterion, criterion.from_k or k) for criterion in criteria)
+
+
+def with_first_scan(criterion: Best, k: int) -> Best:
+    """A criterion with the first scan that counts."""
+    return criterion.model_copy(update={"from_k": k})
+
+
 def best_variance(filter_: Filter, criterion: Best, filter_inputs: FilterInputs) -> float:
-    """The manoeuvre variance that a filter's config asks for, (m/s³)², for these plots."""
+    """The manoeuvre variance with which a filter meets a complete criterion best, (m/s³)², for these plots."""
     low, high = limits(len(filter_inputs.x), filter_inputs.plots.sigma, filter_inputs.dt)
-    without_misses = filter_inputs._replace(plots=filter_inputs.plots._replace(detection=1.0))
 
     def cost(logs: np.ndarray, inputs: FilterInputs) -> np.ndarray:
         return objective(criterion, errors(filter_, 10.0**logs, inputs))
 
     grid = np.linspace(low, high, round((high - low) * POINTS_PER_DECADE) + 1)
-    middle = refine_minimum(grid, lambda logs: cost(logs, without_misses), REFINEMENTS)
+    middle = refine_minimum(grid, lambda logs: cost(logs, filter_inputs.without_misses), REFINEMENTS)
     if filter_inputs.plots.detection < 1:
         around_best = np.arange(-DECADES_AROUND, DECADES_AROUND + 1e-9, 1 / ROUGH_POINTS_PER_DECADE)
         middle = refine_minimum(np.clip(middle + around_best, low, high), lambda logs: cost(logs, filter_inputs), 1)
@@ -87,6 +124,7 @@ def is_at_limit(variance: float, scans: int, sigma: np.ndarray, dt: float) -> bo
 
 def objective(criterion: Best, sigma: np.ndarray) -> np.ndarray:
     """The criterion's value (B,), to be minimised, from σ (B, K, 3)."""
+    assert criterion.from_k is not None  # as complete_criteria leaves it
     sigma_of_component = sigma[:, criterion.from_k - 1 :, COMPONENTS[criterion.minimise]]
     if np.isnan(sigma_of_component).all():
         raise ValueError("no filter has an estimate there")

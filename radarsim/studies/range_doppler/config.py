@@ -115,8 +115,10 @@ class Best(Model):
     over: Literal["worst", "mean", "last"] = key(
         "taken over scans as", "value over the scans from from_k on: the greatest, their mean, or the last"
     )
-    from_k: Annotated[int, key_types.WholeNumber(1, MAX_SCANS)] = key(
-        "first scan that counts", "first scan that counts", 3
+    from_k: Annotated[int, key_types.WholeNumber(1, MAX_SCANS)] | None = key(
+        "first scan that counts",
+        "first scan that counts; default: the one at which the target's manoeuvre begins, else the filters settle",
+        None,
     )
 
 
@@ -217,7 +219,7 @@ class Keys(radial_keys.TimedStudyKeys):
                 f"filters.{i}.manoeuvre_variance",
                 f"must be a number: the best one of kind {filter_keys.kind} is not known",
             )
-        elif isinstance(best, Best) and best.from_k > self.plots:
+        elif isinstance(best, Best) and (best.from_k or 0) > self.plots:
             yield check_error(f"filters.{i}.manoeuvre_variance.from_k", f"must be <= the number of scans, {self.plots}")
 
     @cross_check

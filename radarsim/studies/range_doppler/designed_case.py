@@ -7,8 +7,8 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.errors import ConfigError
 from radarsim.studies.range_doppler import filter_design, package_filters, scenario
-from radarsim.studies.range_doppler.best_variance import FilterInputs, manoeuvre_variances
-from radarsim.studies.range_doppler.config import Filter, Keys
+from radarsim.studies.range_doppler.best_variance import FilterInputs, complete_criteria, manoeuvre_variances
+from radarsim.studies.range_doppler.config import Best, Filter, Keys
 from radarsim.studies.range_doppler.error_recursion import Plots
 
 
@@ -17,7 +17,7 @@ class DesignedCase:
     """A case's filters and what they see: truth x (K, 3) at times t (K,), plots, D_M (F,), gains of full detection.
 
     random_truth (K, 3, 1 + C): how the truth of realisations leaves the model beyond x, from `scenario.random_defects`.
-    asked_from_k, roughly: as of the case."""
+    criteria (F,): what a filter's D_M minimises, None where it is given. asked_from_k, roughly: as of the case."""
 
     spec: Keys
     t: np.ndarray
@@ -25,6 +25,7 @@ class DesignedCase:
     random_truth: np.ndarray
     plots: Plots
     variances: tuple[float, ...]
+    criteria: tuple[Best | None, ...]
     filters: tuple[filter_design.LinearFilter, ...]
     asked_from_k: int = 0
     roughly: bool = False
@@ -53,7 +54,9 @@ def design_case(case: Case) -> DesignedCase:
     random_truth = scenario.random_defects(spec.target, t, x)
     plots = radar_plots(spec)._replace(of_truth=random_truth.shape[2] - 1)
     try:
-        variances = manoeuvre_variances(spec.filters, FilterInputs(plots, x, dt, random_truth))
+        filter_inputs = FilterInputs(plots, x, dt, random_truth)
+        criteria = complete_criteria(spec.filters, spec.target, filter_inputs)
+        variances = manoeuvre_variances(spec.filters, criteria, filter_inputs)
     except ValueError as error:
         raise ConfigError(f"{case.name}: filters: manoeuvre_variance: {error}") from None
     linear_filters = (
@@ -62,9 +65,8 @@ def design_case(case: Case) -> DesignedCase:
         else package_filters.design_filter(f, plots.sigma, t)
         for f, variance in zip(spec.filters, variances, strict=True)
     )
-    return DesignedCase(
-        spec, t, x, random_truth, plots, variances, tuple(linear_filters), case.asked_from_k, case.roughly
-    )
+    filters = tuple(linear_filters)
+    return DesignedCase(spec, t, x, random_truth, plots, variances, criteria, filters, case.asked_from_k, case.roughly)
 
 
 def radar_plots(spec: Keys) -> Plots:

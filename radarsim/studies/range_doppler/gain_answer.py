@@ -7,12 +7,13 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, tr
+from radarsim.language.translate import join_names, term, tr
 from radarsim.report import case_selection, compared_value, gain_sentences, key_labels, sentences, tables
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import GAIN, RADIAL
 from radarsim.report.sentences import Sentence
 from radarsim.studies.range_doppler.config import configured_variance
+from radarsim.studies.range_doppler.counted_scans import CountedScans, case_scans
 from radarsim.studies.range_doppler.study import prepare
 from radarsim.studies.range_doppler.tables import Result, follows_the_model, steady_sigma
 
@@ -23,6 +24,12 @@ TablesByName = Mapping[str, "pd.DataFrame"]
 LONG_RUN_MARGIN = 1.0  # per cent: a gain further than this from that of the long run has not settled
 MIN_LOSS = 1.0  # per cent: from this loss on a case's worst gain is in the answer
 
+SINCE_TEXTS = {
+    "manoeuvre": term("from the manoeuvre on ({t_s:g} s)"),
+    "settled": term("once settled ({t_s:g} s)"),
+    "last": term("at the last scan, not settled before"),
+}
+
 
 def answer_gains(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
     """A sentence on the gains in each component; of an experiment with a single filter one on its σ."""
@@ -32,8 +39,15 @@ def answer_gains(results: Sequence[Result], tables_by_name: TablesByName) -> lis
     gains, all_gains = (tables.group_by(rows, "component") for rows in (unswept_gains, tables_by_name["gains"]))
     labels = {result.name: key_labels.plain_case_label(result) for result in results}
     of_components = [
-        _gain_sentence(unswept_results, gains[(component.name,)], all_gains[(component.name,)], component.words, labels)
-        for component in RADIAL
+        _gain_sentence(
+            unswept_results,
+            gains[(component.name,)],
+            all_gains[(component.name,)],
+            component.words,
+            labels,
+            {result.name: case_scans(result.spec, result.axes.manoeuvre_variance, c) for result in results},
+        )
+        for c, component in enumerate(RADIAL)
         if (component.name,) in gains
     ]
     return of_components or [_sigma_sentence(results[0], tables_by_name["curves"])]
@@ -45,12 +59,15 @@ def _gain_sentence(
     all_gains: "pd.DataFrame",
     quantity: str,
     labels: Mapping[str, str],
+    scans: Mapping[str, CountedScans],
 ) -> Sentence:
     """The gain in one quantity at the last scan, or at the last common time.
 
-    gains: of the cases in the sentence; all_gains: of all cases, among which the greatest loss is looked for."""
+    gains: of the cases in the sentence; all_gains: of all cases, among which the greatest loss is looked for; scans:
+    those of each case that count for extremes."""
     if all(gain_sentences.is_equal(compared_value.row_value(row, GAIN)) for _, row in all_gains.iterrows()):
         return _equality(results, all_gains, quantity)
+    best_clause: list[Sentence] = []
     compared, time_text = _rows_compared(gains)
     baseline = _than_baseline(results)
     has_several_filters = gains["filter"].nunique() > 1
@@ -77,11 +94,9 @@ def _gain_sentence(
             base=baseline,
         )
         clauses = [Sentence(text, final_gain.intervals), *_long_run_clause(_long_run_gain(results, shown))]
-        best, best_gain = compared_value.extreme(gains, GAIN)
-        if best["k"] != shown["k"]:
-            text = tr("at best {gain}, at {t_s:g} s", gain=_extreme_text(best_gain), t_s=best["t_s"])
-            clauses.append(Sentence(text, best_gain.intervals))
-    clauses += _worst_loss(all_gains, shown, labels)
+        if not all(map(follows_the_model, results)):  # else, once settled, the gain stays what it is at the end
+            best_clause = _best_gain(gains, shown, scans)
+    clauses += [*best_clause, *_worst_loss(all_gains, shown, labels, scans, says_since=not best_clause)]
     sentence = sentences.join("; ", clauses)
     return sentence.with_text(f"{sentence.text}.")
 
@@ -184,8 +199,30 @@ def _long_run_gain(results: Sequence[Result], row: "pd.Series[Any]") -> str:
     return text if result.axes.plain else tr("{gain} with every plot", gain=text)
 
 
-def _worst_loss(all_gains: "pd.DataFrame", sentence_row: "pd.Series[Any]", labels: Mapping[str, str]) -> list[Sentence]:
-    """The greatest loss of any case, unless it may be none or is the gain already given."""
+def _best_gain(
+    gains: "pd.DataFrame", sentence_row: "pd.Series[Any]", scans: Mapping[str, CountedScans]
+) -> list[Sentence]:
+    """The largest gain of a case at the scans that count, unless it is the gain already given."""
+    counted = scans[sentence_row["case"]]
+    best, gain = compared_value.extreme(gains[gains["k"] >= counted.k], GAIN)
+    if best["k"] == sentence_row["k"]:
+        return []
+    text = tr(
+        "{since} at best {gain}, at {t_s:g} s", since=since_text(counted), gain=_extreme_text(gain), t_s=best["t_s"]
+    )
+    return [Sentence(text, gain.intervals)]
+
+
+def _worst_loss(
+    all_gains: "pd.DataFrame",
+    sentence_row: "pd.Series[Any]",
+    labels: Mapping[str, str],
+    scans: Mapping[str, CountedScans],
+    says_since: bool,
+) -> list[Sentence]:
+    """The greatest loss of any case at the scans that count, unless it may be none or is the gain already given."""
+    first_scan = all_gains["case"].map({case: counted.k for case, counted in scans.items()})
+    all_gains = all_gains[all_gains["k"] >= first_scan]
     worst, loss = compared_value.extreme(all_gains, GAIN, largest=False)
     if not loss.estimate.hi < -MIN_LOSS or worst.name == sentence_row.name:
         return []
@@ -196,7 +233,15 @@ def _worst_loss(all_gains: "pd.DataFrame", sentence_row: "pd.Series[Any]", label
         text = tr("at worst {gain}, at {t_s:g} s, with {who}", who=label, **fields)
     else:
         text = tr("at worst {gain}, at {t_s:g} s", **fields)
+    counted = scans[worst["case"]]
+    if says_since and counted.reason != "last":
+        text = f"{since_text(counted)} {text}"
     return [Sentence(text, loss.intervals)]
+
+
+def since_text(counted: CountedScans) -> str:
+    """From when errors count, in words."""
+    return tr(SINCE_TEXTS[counted.reason], t_s=counted.t_s)
 
 
 def _than_baseline(results: Sequence[Result]) -> str:

@@ -11,7 +11,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Axes
 from radarsim.engine.sums import Layout
 from radarsim.studies.range_doppler import error_recursion, package_filters, scenario, steady_state
-from radarsim.studies.range_doppler.config import Filter, Keys
+from radarsim.studies.range_doppler.config import Best, Filter, Keys
 from radarsim.studies.range_doppler.designed_case import DesignedCase, design_case
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ class RangeDopplerAxes(Axes):
     exact_gain: np.ndarray  #: (F, K, 3) gain in per cent against the baseline, where both have an estimate
     observes: np.ndarray  #: (F,) 1: filters of the range, 2: of range and velocity
     manoeuvre_variance: np.ndarray  #: (F,) D_M in (m/s³)²
+    criteria: tuple[Best | None, ...]  #: what a filter's D_M minimises; None where it is given
     process_noise: tuple[str, ...]  #: forms of their Q; "" of a filter of a package
     steady_gain: np.ndarray  #: (F, 3, 2) a package's gain in the long run; not-a-number where there is none
     sigma: np.ndarray  #: (2,) standard deviations of the plots, m and m/s
@@ -154,6 +155,7 @@ def axes(designed_case: DesignedCase) -> RangeDopplerAxes:
         exact_gain=exact.gain,
         observes=designed_case.observes,
         manoeuvre_variance=np.array(designed_case.variances),
+        criteria=designed_case.criteria,
         process_noise=tuple(f.process_noise if isinstance(f, Filter) else "" for f in spec.filters),
         steady_gain=np.stack([package_filters.steady_gain(d) for d in designed_case.filters]),
         sigma=designed_case.plots.sigma,

@@ -14,13 +14,13 @@ from radarsim.engine.results import CaseResult
 from radarsim.report import case_selection, consistency_tables, interval_notes, key_labels, statistics
 from radarsim.report import tables as common
 from radarsim.studies.range_doppler import package_filters, steady_state
+from radarsim.studies.range_doppler.counted_scans import SETTLED, first_for_good
 from radarsim.studies.range_doppler.study import RangeDopplerAxes
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PERIODS = 10  # the paper: a manoeuvre variance is good when the error settles in under ten scan periods
-SETTLED = 0.05  # within this share of the steady value, for good; the paper gives no tolerance
 
 Result = CaseResult[RangeDopplerAxes]
 table = common.TableMakers()
@@ -146,8 +146,7 @@ def settling(sigma: statistics.Estimate, t: np.ndarray, steady_value: float) -> 
 
 
 def _for_good(settled: np.ndarray, t: np.ndarray) -> float:
-    wrong = np.flatnonzero(~settled)
-    first = wrong[-1] + 1 if wrong.size else 0
+    first = first_for_good(settled)
     return float(t[first]) if first < len(t) else np.inf
 
 

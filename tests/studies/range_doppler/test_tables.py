@@ -198,7 +198,7 @@ def test_answer_tells_the_last_gain_of_each_component(paper):
     assert len(told) == 3
     assert "at 140 s, the last scan, σ is 18.3 % (exact) lower" in told[0]
     assert "than with range alone" in told[0]
-    assert "at best 34.6 % (exact) lower" in told[0]
+    assert "at best" not in told[0]  # once settled, it stays what it is
     assert "RLS 1" in answer_texts(answer, paper, made_of(paper))[2]
     assert "higher (RLS 1)" in answer_texts(answer, paper, made_of(paper))[2]
 
@@ -206,7 +206,7 @@ def test_answer_tells_the_last_gain_of_each_component(paper):
 S_BAND = {"sigma_range_m": 60, "sigma_velocity_mps": 3, "scan_period_s": 4}
 
 
-@pytest.mark.parametrize(("detection", "words"), [(1, " in the long run;"), (0.9, " with every plot in the long run;")])
+@pytest.mark.parametrize(("detection", "words"), [(1, " in the long run"), (0.9, " with every plot in the long run")])
 def test_a_gain_that_has_not_settled_is_quoted_with_that_of_the_long_run(expected_radar, detection, words):
     """Against another solution of the steady state, by doubling."""
     C_theta, Lambda = 60**2 / (4 * 3) ** 2, 4**3 * 1e-3**0.5 / 60
@@ -265,7 +265,7 @@ def greatest_loss(made):
     rows = made["gains"][made["gains"]["component"] == "r"]
     row = rows.loc[rows["exact_percent"].idxmin()]
     assert row["exact_percent"] < -10
-    return f"; at worst {-row['exact_percent']:.1f} % (exact) higher, at {row['t_s']:g} s"
+    return f"at worst {-row['exact_percent']:.1f} % (exact) higher, at {row['t_s']:g} s"
 
 
 def test_answer_tells_the_greatest_loss(expected_radar):
@@ -274,11 +274,11 @@ def test_answer_tells_the_greatest_loss(expected_radar):
     results = [expected_radar("rls2", 1e-4, target=BRAKING, radar=sharp)]
     made = made_of(results)
     words = greatest_loss(made)
-    assert answer_texts(answer, results, made)[0].endswith(f"{words}.")
+    assert answer_texts(answer, results, made)[0].endswith(f"; {words}.")
     others = [expected_radar("rls2", name="calm"), expected_radar("rls5", name="fine"), *results]
     made = made_of(others)
     words = greatest_loss(made)
-    assert answer_texts(answer, others, made)[0].endswith(f"{words}, with RLS 2.")
+    assert answer_texts(answer, others, made)[0].endswith(f"; from the manoeuvre on (54 s) {words}, with RLS 2.")
 
 
 def test_answer_is_silent_of_a_loss_that_is_none(paper):
@@ -337,15 +337,20 @@ def test_answer_compares_at_a_common_time(expected_radar):
 def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, radar_config):
     from radarsim.api.configs import load
 
-    values = [1e-4, 1e-2, 1.0, 100.0]
+    values = [1e-4, 1e-2, 1.0, 10.0]
     source = {**radar_config("rls2", target=BRAKING), "sweep": {"manoeuvre_variance": values}}
     results = [expected_case(case) for case in load(source).cases]
-    worst = np.array([result.axes.exact_sigma[:, 2:, 0].max(axis=1) for result in results])
+    worst = np.array([result.axes.exact_sigma[:, 5:, 0].max(axis=1) for result in results])
     told = next(one for one in told_of(results) if one.startswith("Best manoeuvre variance"))
     for f, name in enumerate(("r", "r+Vr")):
         best = values[int(worst[:, f].argmin())]
-        text = key_labels.format_value(best, powers=True)
-        assert f"{name} {text} (σ at worst {worst[:, f].min():.4g} m, at " in told
+        equal = [value for value, sigma in zip(values, worst[:, f], strict=True) if sigma < 1.01 * worst[:, f].min()]
+        texts = [key_labels.format_value(value, powers=True) for value in equal]
+        if name == "r+Vr":
+            assert equal == [best]
+            assert f"{name} {texts[0]} (σ at worst {worst[:, f].min():.4g} m, at " in told
+        else:
+            assert f"{name} {texts[0]} and {texts[1]} do equally well (σ at worst 248 to 249 m)" in told
     assert not any("further cases break the model" in one for one in told_of(results))
 
 
@@ -366,6 +371,6 @@ def test_answer_gives_the_variance_that_was_looked_for(expected_radar):
     turning = expected_radar("rls2", target=BRAKING, filters=filters)
     found = float(turning.axes.manoeuvre_variance[0])
     said = told_of([turning])[-1]
-    assert f"r {found:g} (sigma_r is least at its worst from scan 3 on)" in said
+    assert f"r {found:g} (sigma_r is least at its worst from 50 s on)" in said
     calm = expected_radar("rls2", filters=filters)
     assert "no minimum inside" in told_of([calm])[-1]
