@@ -24,6 +24,7 @@ WIDEN = {
     "size": statistics.simultaneous_sizes,
     "gain": statistics.simultaneous_gains,
     "share": statistics.simultaneous_shares,
+    "signed": statistics.simultaneous_means,
 }
 
 
@@ -35,7 +36,7 @@ class ComparedValue:
     is_exact: bool
     intervals: tuple[sentences.MeasuredInterval, ...] = ()
     looks: int = 1  # measured values among which it was chosen, for all of which its interval holds
-    kind: Literal["size", "gain", "share"] = "size"
+    kind: Literal["size", "gain", "share", "signed"] = "size"
 
     @property
     def value(self) -> float:
@@ -68,13 +69,24 @@ class ComparedValue:
 
 def row_value(row: Row, quantity: Quantity = SIGMA) -> ComparedValue:
     """The exact value of a quantity in a row, else the measured one with its interval."""
-    kind: Any = "gain" if quantity.paired else "share" if quantity.kind == "share" else "size"
+    kind: Any = "gain" if quantity.paired else quantity.kind
     exact = float(row.get(quantity.exact_column, np.nan))
     if not np.isnan(exact):
         return ComparedValue(Estimate(exact, exact, exact), True, kind=kind)
     estimate = Estimate(*(float(row[name]) for name in (quantity.value, *quantity.ends)))
     rests_on = sentences.intervals(quantity.table, quantity.ends[0].removesuffix("_lo"), row) if has_label(row) else ()
     return ComparedValue(estimate, False, rests_on, kind=kind)
+
+
+def largest_bias(rows: "pd.DataFrame") -> "tuple[pd.Series[Any], ComparedValue]":
+    """The row of `curves` with the largest mean error of either sign, exact values first, and its value."""
+    exact = rows["exact_bias"].to_numpy(dtype=float)
+    row = rows.iloc[int(np.nanargmax(np.abs(tables.exact_first(rows, "bias", "exact_bias"))))]
+    known, value, half = float(row["exact_bias"]), float(row["bias"]), statistics.Z95 * float(row["bias_se"])
+    if not np.isnan(known):
+        return row, ComparedValue(Estimate(known, known, known), True, kind="signed")
+    measured = ComparedValue(Estimate(value, value - half, value + half), False, kind="signed")
+    return row, measured.chosen_among(int(np.isnan(exact).sum()))
 
 
 def has_label(row: Row) -> bool:

@@ -6,27 +6,12 @@ and S the covariances that the filter predicts. Both are 1 for a consistent filt
 its errors are larger than predicted. Below 1 it is pessimistic. (Bar-Shalom, Li & Kirubarajan, Estimation with
 Applications to Tracking and Navigation, 2001, 5.4.)"""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from radarsim.report import statistics, tables
 from radarsim.report.statistics import Estimate, Values
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-
 OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
-
-
-def sigma_over_believed(curves: "pd.DataFrame") -> Estimate:
-    """True over believed σ (rows,) of rows of curves, with the interval of the true σ alone.
-
-    Over 1 a filter is *optimistic*: its errors are larger than it believes. Under 1 it is *pessimistic*. The rows of a
-    radar that misses plots, whose believed σ is a sampled mean, cover 94 … 95 %."""
-    true = (curves[name].to_numpy(dtype=float) for name in ("sigma", "sigma_lo", "sigma_hi"))
-    return _quotient(Estimate(*true), curves["believed_sigma"].to_numpy(dtype=float))
 
 
 def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:

@@ -177,6 +177,12 @@ def simultaneous_sizes(estimate: Estimate, looks: Values) -> Estimate:
     return Estimate(estimate.value, low, high)
 
 
+def simultaneous_means(estimate: Estimate, looks: Values) -> Estimate:
+    """`simultaneous_sizes` of numbers of either sign, as means of errors: each end moves away in proportion."""
+    factor = quantile(looks) / Z95
+    return Estimate(estimate.value, *(estimate.value + factor * (end - estimate.value) for end in estimate[1:]))
+
+
 def simultaneous_gains(estimate: Estimate, looks: Values) -> Estimate:
     """`simultaneous_sizes` of gains in per cent, by the ratio of σ that a gain is."""
     ratio = simultaneous_sizes(Estimate(*(100 - np.asarray(end, float) for end in estimate)), looks)

@@ -59,12 +59,16 @@ def columns_of(tables) -> Iterator[Table]:
 
 
 def derived_columns(tables) -> Iterator[Table]:
-    """σ over what a filter believes, and σ by a paired gain over a baseline whose σ is exact."""
+    """σ over what a filter believes, biases known by formula, and σ by a paired gain over an exact σ."""
     curves, gains = tables["curves"], tables["gains"]
     ratios = [curves[name].to_numpy(float) for name in ("sigma", "sigma_lo", "sigma_hi")]
     with np.errstate(divide="ignore", invalid="ignore"):
         believed = curves["believed_sigma"].to_numpy(float)
-        yield Table("σ over believed", *(part / believed for part in ratios), np.full(len(curves), np.nan))
+        exact = curves["exact_sigma"].to_numpy(float) / believed
+        yield Table("σ over believed", *(part / believed for part in ratios), exact)
+    if "conversion" in tables:
+        biases = [tables["conversion"][name].to_numpy(float) for name in ("bias_m", "bias_lo", "bias_hi", "formula_m")]
+        yield Table("bias of a conversion", *biases)
     keys = ["case", "baseline", "component", "k"]
     exact = curves.rename(columns={"filter": "baseline"})[[*keys, "exact_sigma"]]
     paired = gains.merge(exact, on=keys, how="left")

@@ -12,6 +12,7 @@ from radarsim.language.translate import join_names, plural, tr
 from radarsim.report import case_selection, compared_value, key_labels, rare_events, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
+from radarsim.report.statistics import Estimate
 from radarsim.studies.ambiguous_doppler.kernels.layout import OFF_BY_HALF_SPAN_SUM
 from radarsim.studies.ambiguous_doppler.study import prepare, simulate
 from radarsim.studies.ambiguous_doppler.tables import Result
@@ -200,7 +201,7 @@ def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -
     comparisons: dict[str, list[_CaseComparison]] = {}
     for result in results if len(results) > 1 else ():
         for name in _reported_filters(result):
-            for clause in _as_good_clause(result, name, tables_by_name):
+            for clause in _as_good_clause(result, name, tables_by_name, looks=len(results)):
                 gains = _gains_over_oracle(result, name, tables_by_name)
                 since = _first_good_scan(gains) or np.inf
                 text = f"{key_labels.plain_case_label(result)}: {clause.text}"
@@ -245,8 +246,10 @@ def _near_the_limit(gains: "pd.DataFrame") -> tuple[sentences.MeasuredInterval, 
     return sentences.intervals("gains", "above_oracle", gains[sentences.would_exceed(AS_GOOD_PERCENT, low, high)])
 
 
-def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName) -> list[Sentence]:
-    """From which scan on σ of the velocity is within 5 % of the oracle's, for good; none without an oracle."""
+def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, looks: int = 1) -> list[Sentence]:
+    """From which scan on σ of the velocity is within 5 % of the oracle's, for good; none without an oracle.
+
+    looks: at how many cases, of which this is the worst."""
     gains = _gains_over_oracle(result, name, tables_by_name)
     if not len(gains):
         return []
@@ -259,11 +262,12 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName) -> 
     if final["above_oracle_percent"] > LOST_PERCENT:
         return [
             _lost_clause(
-                tables.select_rows(tables_by_name["folds"], case=result.name, filter=name).iloc[-1], final["k"]
+                tables.select_rows(tables_by_name["folds"], case=result.name, filter=name).iloc[-1], final["k"], looks
             )
         ]
-    values = (final[key] for key in ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi"))
-    fields = {"above": wording.estimate(values, "%", ".3g"), "k": final["k"]}
+    ratio = Estimate(*(100.0 + final[key] for key in ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")))
+    above = ComparedValue(ratio, is_exact=False).chosen_among(looks).mapped(lambda percent: percent - 100.0)
+    fields = {"above": above.text("%", ".3g") + above.choice_remark(), "k": final["k"]}
     if final["above_oracle_percent"] <= AS_GOOD_PERCENT:
         text = tr(
             "σ of the velocity is {above} above that of unfolded velocity at scan {k}, the last: too few realisations "
@@ -276,12 +280,14 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName) -> 
     return [Sentence(text, sentences.intervals("gains", "above_oracle", final))]
 
 
-def _lost_clause(folds: "pd.Series[Any]", k: int) -> Sentence:
+def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
     """The share of realisations whose velocity is off by more than half the span at the last scan, k."""
+    beyond = Estimate(*(float(folds[key]) for key in ("beyond", "beyond_lo", "beyond_hi")))
+    share = ComparedValue(beyond, is_exact=False, kind="share").chosen_among(looks)
     text = tr(
         "at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
         k=k,
-        share=wording.share(*(100 * folds[key] for key in ("beyond", "beyond_lo", "beyond_hi"))),
+        share=wording.share(*(100 * end for end in share.estimate)) + share.choice_remark(),
     )
     if folds["beyond"] > LOST_SHARE:
         text = tr("lost: {off}", off=text)

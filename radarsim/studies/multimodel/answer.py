@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import plural, shorten_names, term, tr
-from radarsim.report import case_selection, key_labels, sentences, tables, wording
+from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
+from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.studies.multimodel import stage_ranking
 from radarsim.studies.multimodel.tables import stage_bounds
@@ -39,7 +40,13 @@ def answer(results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataF
         return closest
     reported, remark = case_selection.select_reported(results, 4)
     quantities = [("y", term("the height")), *([("vy", term("the rate of climb"))] if len(results) == 1 else [])]
-    stage_sentences = [_least_sigma(result, stages, *quantity) for result in reported for quantity in quantities]
+    known = set(stages["component"])
+    stage_sentences = [
+        _least_sigma(result, stages, *quantity)
+        for result in reported
+        for quantity in quantities
+        if quantity[0] in known
+    ]
     return [*closest, *stage_sentences, *map(Sentence, remark)]
 
 
@@ -67,28 +74,42 @@ def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") 
     closest, second = worst_stages.iloc[0], worst_stages.iloc[1]
     # The second is further from the best only if it is surely worse than the first where it is worst itself.
     by_name = {result.name: result for result in results}
-    if (
-        not stage_ranking.paired_gain(by_name[second["case"]], second["stage"], closest["filter"], second["filter"]).lo
-        > 0
-    ):
+    if not stage_ranking.percent_above(by_name[second["case"]], second, closest["filter"], len(rows)).estimate.lo > 0:
         return []
-    fields = {"filter": closest["filter"], "second": second["filter"], "more": _percent(second["above"])}
+    best_by_stage = lowest_rows.set_index(["case", "stage"])["filter"]
+    above = [
+        _three_digits(
+            stage_ranking.percent_above(
+                by_name[row["case"]], row, best_by_stage.loc[(row["case"], row["stage"])], len(rows)
+            ),
+            "%",
+        )
+        for row in (closest, second)
+    ]
+    fields = {
+        "filter": closest["filter"],
+        "second": second["filter"],
+        "more": above[1],
+        "where": _stage_label(results, second),
+        "count": len(rows),
+    }
     if not closest["above"]:
-        text = tr("Least σ of the height in every stage: {filter}; next {second}, at most {more} above it.", **fields)
+        text = tr(
+            "Least σ of the height in every stage: {filter}; next {second}, at most {more} above it ({where}; interval "
+            "for all {count} compared).",
+            **fields,
+        )
         return [Sentence(text, sentences.intervals("stages", "sigma", second))]
-    best = lowest_rows[(lowest_rows["case"] == closest["case"]) & (lowest_rows["stage"] == closest["stage"])].iloc[0]
     text = tr(
         "Closest to the best filter of {every}: {filter}, σ of the height at most {percent} above the least "
-        "({where}: {sigma}; {best}: {least}); next {second}, {more}.",
+        "({closest_where}: {best}); next {second}, {more} ({where}); intervals for all {count} compared.",
         every=tr("each stage of every case") if len(results) > 1 else tr("each stage"),
-        percent=_percent(closest["above"]),
-        where=_stage_label(results, closest),
-        sigma=_sigma(closest),
-        best=best["filter"],
-        least=_sigma(best),
+        percent=above[0],
+        closest_where=_stage_label(results, closest),
+        best=best_by_stage.loc[(closest["case"], closest["stage"])],
         **fields,
     )
-    return [Sentence(text, sentences.intervals("stages", "sigma", closest, best))]
+    return [Sentence(text, sentences.intervals("stages", "sigma", closest, second))]
 
 
 def _stage_label(results: Sequence[CaseResult], row: "pd.Series[Any]") -> str:
@@ -100,23 +121,25 @@ def _stage_label(results: Sequence[CaseResult], row: "pd.Series[Any]") -> str:
     return f"{case_names[row['case']]}, {stage}" if len(results) > 1 else stage
 
 
-def _percent(value: float) -> str:
-    return f"{wording.number(value, 2)} %"
-
-
 def _least_sigma(result: CaseResult, stages: "pd.DataFrame", component: str, quantity: str) -> Sentence:
     """The filter of the least σ in each stage, with the interval, and those that noise alone places behind it."""
     rows = tables.select_rows(stages, case=result.name, component=component)
     best = rows.loc[rows.groupby("stage", sort=False)["sigma"].idxmin()]
+    looks = rows["filter"].nunique()
     clauses = [
-        f"{tr(str(row['stage']))}: {stage_ranking.least_filters(result, rows, row)}, {_sigma(row)}"
+        f"{tr(str(row['stage']))}: {stage_ranking.least_filters(result, rows, row)}, {_least_sigma_text(row, looks)}"
         for _, row in best.iterrows()
     ]
-    text = tr("Least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(clauses))
+    remark = compared_value.row_value(best.iloc[0]).chosen_among(looks).choice_remark()
+    text = tr("Least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(clauses) + remark)
     return Sentence(case_selection.after_swept_values(result, text), sentences.intervals("stages", "sigma", best))
 
 
-def _sigma(row: "pd.Series[Any]") -> str:
-    """σ of a row of the stages with its interval, to three digits."""
-    values = (float(f"{row[name]:.3g}") for name in ("sigma", "sigma_lo", "sigma_hi"))
-    return wording.estimate(values, key_labels.unit_label(row["unit"]), ",.10g")
+def _least_sigma_text(row: "pd.Series[Any]", looks: int) -> str:
+    """σ of a row of the stages, the least of so many."""
+    return _three_digits(compared_value.row_value(row).chosen_among(looks), key_labels.unit_label(row["unit"]))
+
+
+def _three_digits(value: ComparedValue, unit: str) -> str:
+    """A value with its interval, to three digits."""
+    return wording.estimate((float(f"{end:.3g}") for end in value.estimate), unit, ",.10g")

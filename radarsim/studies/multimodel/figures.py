@@ -13,16 +13,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, term, tr
-from radarsim.report import (
-    caption_remarks,
-    case_selection,
-    figure_lines,
-    key_labels,
-    math_text,
-    panel_layout,
-    tables,
-    wording,
-)
+from radarsim.report import caption_remarks, case_selection, figure_lines, key_labels, math_text, panel_layout, tables
 from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.studies.multimodel import stage_ranking
@@ -399,12 +390,11 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
     last_rows = rows[rows["stage"] == rows["stage"].iloc[-1]]
     best = last_rows.loc[last_rows["sigma"].idxmin()]
     headline = tr(
-        "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good} ({sigma} m). ",
-        **{"cheap": cheapest, "count": min_operations, "stage": cost_panels[-1].title},
-        **{
-            "good": key_labels.escape_dollars(stage_ranking.least_filters(result, rows, best)),
-            "sigma": wording.number(float(best["sigma"]), 3),
-        },
+        "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good}. ",
+        cheap=cheapest,
+        count=min_operations,
+        stage=cost_panels[-1].title,
+        good=key_labels.escape_dollars(stage_ranking.least_filters(result, rows, best)),
     )
     cost_panels = _with_legend(cost_panels, result, dash=None)
     caption = headline + tr(

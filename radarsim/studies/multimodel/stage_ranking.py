@@ -1,10 +1,13 @@
-"""Which filters have the least σ in a stage, as far as their gains on the same noise tell."""
+"""Which filters have the least σ in a stage, as far as their gains on the same noise tell.
+
+The least is chosen by the values themselves: a gain decides by an interval that holds for all pairs compared."""
 
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import shorten_names, tr
-from radarsim.report import gain_sentences
+from radarsim.report import gain_sentences, statistics
+from radarsim.report.compared_value import ComparedValue
 from radarsim.report.statistics import Estimate
 from radarsim.studies.multimodel.tables import stage_gain, stage_names
 
@@ -18,18 +21,30 @@ def least_filters(result: CaseResult, rows: "pd.DataFrame", best: "pd.Series[Any
     """The filter of the least σ in a stage, those equal to it, and those that cannot be distinguished from it.
 
     rows: of one component; best: the one of the least σ."""
+    names = list(rows.loc[rows["stage"] == best["stage"], "filter"])
+    pairs = len(names) * (len(names) - 1) // 2
     gains = {
-        name: paired_gain(result, best["stage"], best["filter"], name, best["component"])
-        for name in rows.loc[rows["stage"] == best["stage"], "filter"]
+        name: statistics.simultaneous_gains(
+            paired_gain(result, best["stage"], best["filter"], name, best["component"]), pairs
+        )
+        for name in names
         if name != best["filter"]
     }
     equal = [name for name, gain in gains.items() if gain.hi - gain.lo < gain_sentences.SINGLE and not gain.lo > 0]
     close = [name for name, gain in gains.items() if not gain.lo > 0 and name not in equal]
-    names = " = ".join([best["filter"], *equal])
+    equal_names = " = ".join([best["filter"], *equal])
     if not close:
-        return names
+        return equal_names
     others = shorten_names(close, MAX_CLOSE_NAMES)
-    return tr("{filter} (not distinguished from it: {others})", filter=names, others=others)
+    return tr("{filter} (not distinguished from it: {others})", filter=equal_names, others=others)
+
+
+def percent_above(result: CaseResult, row: "pd.Series[Any]", best_filter: str, looks: int) -> ComparedValue:
+    """By how many per cent σ of a row of the stages is above that of another filter, which was chosen as the least.
+
+    The interval is that of the gain on the same noise, for all `looks` at values among which they were chosen."""
+    gain = paired_gain(result, row["stage"], row["filter"], best_filter, row["component"])
+    return ComparedValue(gain, is_exact=False, kind="gain").chosen_among(looks).mapped(lambda percent: 0.0 - percent)
 
 
 def paired_gain(result: CaseResult, stage: str, name: str, other: str, component: str = "y") -> Estimate:

@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language.translate import join_names, term, tr
 from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
-from radarsim.report.quantities import Quantity
+from radarsim.report.quantities import LOCK, Quantity
 from radarsim.report.sentences import Sentence
 from radarsim.studies.pulses_to_tracks.tables import Result
 
@@ -143,8 +143,8 @@ def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters:
 def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:
     """The least share of a scan's bursts that lock, and σ of the range at the last scan over its idealisation's."""
     locks = tables.select_rows(tables_by_name["locks"], case=result.name, filter=name)
-    worst = locks.iloc[int(locks["lock_rate"].to_numpy().argmin())]
-    share = wording.share(*(100 * worst[key] for key in ("lock_rate", "lock_lo", "lock_hi")))
+    _, least = compared_value.extreme(locks, LOCK, largest=False)
+    share = wording.share(*(100 * end for end in least.estimate)) + least.choice_remark()
     locked = tr("at least {share} of the bursts of a scan lock", share=share)
     ratios = tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
     final = ratios.iloc[-1]
@@ -154,7 +154,7 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
         )
     else:
         ratio = tr("σ of the range at the last scan is {ratio} times its idealisation's", ratio=_ratio(final))
-    return Sentence(f"{locked}; {ratio}", (*sentences.intervals("locks", "lock", worst), *_ratio_intervals(final)))
+    return Sentence(f"{locked}; {ratio}", (*least.intervals, *_ratio_intervals(final)))
 
 
 def _ratio(row: "Mapping[Any, Any] | pd.Series[Any]", form: str = ".3g", looks: int = 1) -> str:

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from radarsim.config.experiment import Experiment
 from radarsim.language.translate import join_names, plural, tr
 from radarsim.report import compared_value, key_labels, sentences, tables
@@ -83,14 +81,14 @@ def _broken_model_sentences(results: Sequence[Result], tables_by_name: TablesByN
 def _worst_errors(rows: "pd.DataFrame", filter_name: str) -> Sentence:
     """The largest σ and the largest bias of a filter over some scans, as a clause."""
     worst, sigma = compared_value.extreme(rows, SIGMA)
-    bias = tables.exact_first(rows, "bias", "exact_bias")
-    largest_bias = int(np.abs(bias).argmax())
+    most_biased, bias = compared_value.largest_bias(rows)
     text = tr(
-        "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias:.4g} m at {bias_t_s:g} s",
-        sigma=sigma.text(tr("m")) + sigma.choice_remark(),
+        "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias} at {bias_t_s:g} s{chosen}",
+        sigma=sigma.text(tr("m")),
         t_s=worst["t_s"],
-        bias=bias[largest_bias],
-        bias_t_s=rows["t_s"].iloc[largest_bias],
+        bias=bias.text(tr("m")),
+        bias_t_s=most_biased["t_s"],
+        chosen=sigma.choice_remark() or bias.choice_remark(),
     )
     return Sentence(f"{filter_name}: {text}", sigma.intervals)
 

@@ -154,8 +154,7 @@ def _range_of_gains(
         "most": _extreme_text(highest[1]),
         "high": _case_label(highest[0], labels, has_several_filters),
     }
-    values = [compared_value.row_value(row, GAIN).estimate for _, row in compared.iterrows()]
-    if max(value.lo for value in values) <= min(value.hi for value in values):
+    if not compared_value.are_distinguished(lowest[1], highest[1]):
         text = tr(
             "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), not significantly different from "
             "each other, {base}",

@@ -3,9 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import shorten_names, tr
-from radarsim.report import case_selection, compared_value, consistency_tables, key_labels, sentences, tables, wording
+from radarsim.report import case_selection, compared_value, key_labels, statistics, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.axes import SonarAxes
@@ -48,42 +50,33 @@ def answer(results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[st
     optimistic = _most_optimistic(results, tables_by_name)
     if _has_correlated_errors([result.spec for result in results]):
         return [*optimistic, *sigma, *map(Sentence, remark)]
-    return [*_bias_of_conversion(results, tables_by_name), *sigma, *optimistic, *map(Sentence, remark)]
+    return [*map(Sentence, _bias_of_conversion(results, tables_by_name)), *sigma, *optimistic, *map(Sentence, remark)]
 
 
 def _bias_of_conversion(
     results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
-) -> list[Sentence]:
-    """The largest bias of plots that are converted plainly, and of unbiased ones; none if none are plain."""
+) -> list[str]:
+    """The largest bias of plots that are converted plainly, by its formula; none if none are plain."""
     if "conversion" not in tables_by_name:
         return []
-    conversion = tables_by_name["conversion"]
-    worst = {
-        str(frame): rows.iloc[int(rows["bias_m"].abs().to_numpy().argmax())]
-        for frame, rows in conversion.groupby("frame", sort=False)
-    }
-    if "cartesian" not in worst:
+    plain = tables.select_rows(tables_by_name["conversion"], frame="cartesian")
+    if not len(plain):
         return []
+    worst = plain.iloc[int(plain["formula_m"].abs().to_numpy().argmax())]
+    result = next(result for result in results if result.name == worst["case"])
+    ratio = float(worst["formula_m"] / worst["sigma_range_m"])
     text = tr(
-        "Largest bias of a plot along the line of sight, converted plainly: {bias}, {ratio} σ of the range ({case})",
-        **_bias_fields(results, worst["cartesian"]),
-    )
-    rows = [worst["cartesian"]]
-    if "cartesian_unbiased" in worst:
-        rows.append(worst["cartesian_unbiased"])
-        text += "; " + tr("converted without bias: {bias}, {ratio} σ ({case})", **_bias_fields(results, rows[-1]))
-    return [Sentence(f"{text}.", sentences.intervals("conversion", "bias", *rows))]
-
-
-def _bias_fields(results: Sequence[CaseResult[SonarAxes]], row: "pd.Series[Any]") -> dict[str, str]:
-    result = next(result for result in results if result.name == row["case"])
-    return {
-        "bias": wording.estimate((row[key] for key in ("bias_m", "bias_lo", "bias_hi")), tr("m"), ".3g"),
-        "ratio": wording.number(float(row["bias_to_sigma_range"]), 3),
-        "case": key_labels.without_markup(
+        "Largest bias of a plot along the line of sight, converted plainly: {bias} (exact), {ratio} σ of the range "
+        "({case})",
+        bias=f"{wording.number(float(worst['formula_m']), 3)} {tr('m')}",
+        ratio=wording.number(ratio, 3),
+        case=key_labels.without_markup(
             key_labels.swept_description(result, without=["frame"]) or key_labels.config_device(result)
         ),
-    }
+    )
+    if any(tables_by_name["conversion"]["frame"] == "cartesian_unbiased"):
+        text += "; " + tr("converted without bias: none (exact)")
+    return [f"{text}."]
 
 
 def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd.DataFrame]") -> Sentence:
@@ -95,21 +88,33 @@ def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd
     order = final["exact_sigma"] if final["exact_sigma"].notna().all() else final["sigma"]
     order = order.round(SIGMA_DECIMALS)
     lowest, highest = (final.loc[order == extreme] for extreme in (order.min(), order.max()))
-    values = [compared_value.sigma_value(rows.iloc[0], tables_by_name) for rows in (lowest, highest)]
+    looks = int(final["exact_sigma"].isna().sum())
+    values = [
+        compared_value.sigma_value(rows.iloc[0], tables_by_name).chosen_among(looks) for rows in (lowest, highest)
+    ]
+    remark = next(filter(None, (value.choice_remark() for value in values)), "")
     fields = {
         "quantity": COMPONENTS_BY_NAME[component].words,
         "t_s": final["t_s"].iloc[0],
         "least": _filters_and_sigma(lowest, values[0]),
-        "most": _filters_and_sigma(highest, values[1]),
+        "most": _filters_and_sigma(highest, values[1]) + remark,
     }
     if order.nunique() == 1:
         text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)
-    elif compared_value.sigma_gain(lowest.iloc[0], highest.iloc[0], tables_by_name).lo > 0:
+    elif _is_surely_less(lowest.iloc[0], highest.iloc[0], tables_by_name, looks=len(final)):
         text = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **fields)
     else:
         text = tr("σ of the {quantity} after {t_s:g} s: {least}, and {most}, not distinguished.", **fields)
     intervals = [interval for value in values for interval in value.intervals]
     return Sentence(case_selection.after_swept_values(result, text), tuple(intervals))
+
+
+def _is_surely_less(
+    row: "pd.Series[Any]", other: "pd.Series[Any]", tables_by_name: "Mapping[str, pd.DataFrame]", looks: int
+) -> bool:
+    """Whether σ of a row is less than that of another, where they are the extremes of so many."""
+    gain = compared_value.sigma_gain(row, other, tables_by_name)
+    return bool(statistics.simultaneous_gains(gain, looks * (looks - 1) // 2).lo > 0)
 
 
 def _filters_and_sigma(rows: "pd.DataFrame", sigma: ComparedValue) -> str:
@@ -125,10 +130,15 @@ def _most_optimistic(
     curves = curves[curves["case"].isin([result.name for result in results])]
     complete = set(tables_by_name["consistency"][["case", "filter", "k"]].itertuples(index=False, name=None))
     curves = curves[[key in complete for key in curves[["case", "filter", "k"]].itertuples(index=False, name=None)]]
-    ratio = consistency_tables.sigma_over_believed(curves)
-    curves = curves.assign(ratio=ratio.value, ratio_lo=ratio.lo, ratio_hi=ratio.hi)
-    worst = curves.iloc[int(curves["ratio"].argmax())]
-    if worst["ratio_lo"] <= MIN_OPTIMISM:
+    believed = curves["believed_sigma"].to_numpy(dtype=float)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        decides = np.nan_to_num(tables.exact_first(curves, "sigma", "exact_sigma") / believed, nan=0.0)
+    curves = curves.assign(ratio=decides)
+    worst = curves.iloc[int(decides.argmax())]
+    looks = int(curves["exact_sigma"].isna().sum())
+    true = compared_value.sigma_value(worst, tables_by_name).chosen_among(looks)
+    ratio = true.mapped(lambda sigma: sigma / float(worst["believed_sigma"]))
+    if ratio.estimate.lo <= MIN_OPTIMISM:
         return []
     result = next(result for result in results if result.name == worst["case"])
     filters = tables.select_rows(curves, case=worst["case"], component=worst["component"], k=worst["k"])
@@ -137,8 +147,8 @@ def _most_optimistic(
     text = tr(
         "Most optimistic: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan {k}).",
         filter=f"{equal} ({swept})" if swept else equal,
-        ratio=wording.estimate((worst[key] for key in ("ratio", "ratio_lo", "ratio_hi")), form=".2f"),
+        ratio=ratio.text(form=".2f"),
         quantity=COMPONENTS_BY_NAME[worst["component"]].words,
-        k=worst["k"],
+        k=f"{worst['k']}{ratio.choice_remark()}",
     )
-    return [Sentence(text, sentences.intervals("curves", "sigma", worst))]
+    return [Sentence(text, ratio.intervals)]

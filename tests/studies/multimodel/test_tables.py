@@ -1,6 +1,7 @@
 """P2's tables, figures and claims, on a small run of the shipped config."""
 
 import json
+import re
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -141,10 +142,14 @@ def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     wide = stages[stages["component"] == "y"].pivot_table(index="stage", columns="filter", values="sigma")
     above = 100 * (wide.div(wide.min(axis=1), axis=0) - 1)
     (best, smallest), (second, more) = above.max().sort_values().iloc[:2].items()
-    stage = above[best].idxmax()
-    assert f"stage: {best}, σ of the height at most {smallest:.2g} % above the least ({stage}: " in first
-    assert f"; {wide.loc[stage].idxmin()}: {wide.loc[stage].min():.3g} m [" in first
-    assert first.endswith(f"; next {second}, {more:.2g} %.")
+    stage, looks = above[best].idxmax(), wide.size
+    assert f"stage: {best}, σ of the height at most {smallest:.3g} % [" in first
+    assert f"] above the least ({stage}: {wide.loc[stage].idxmin()}); next {second}, {more:.3g} % [" in first
+    assert first.endswith(f"] ({above[second].idxmax()}); intervals for all {looks} compared.")
+    gain = stage_ranking.paired_gain(result.cases[0], stage, best, wide.loc[stage].idxmin())
+    low, high = (float(end) for end in re.search(r"at most .*? % \[(.*?), (.*?)\]", first).groups())
+    assert low < -gain.hi < -gain.lo < high  # paired on the same noise, and wider, as it was chosen
+    assert height.endswith(f" (interval for all {wide.shape[1]} compared).")
 
 
 def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
@@ -154,7 +159,7 @@ def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
     stages = stages.assign(case="one", stage="start", sigma_lo=1.0, sigma_hi=99.0, component="y", unit="m")
 
     def paired_gain(result, stage, name, other, component="y"):
-        low, high = gains[other]
+        low, high = gains[other] if name == "a" else sorted(-end for end in gains[name])
         return Estimate((low + high) / 2, low, high)
 
     monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
@@ -175,14 +180,24 @@ def test_answer_on_several_cases_is_one_sentence(monkeypatch):
     columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
     stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
     cases = [SimpleNamespace(name=name, swept_values=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
-    monkeypatch.setattr(stage_ranking, "paired_gain", lambda *_: Estimate(9.0, 8.0, 10.0))
+    sigma = stages.set_index(["case", "stage", "filter"])["sigma"]
+
+    def paired_gain(result, stage, name, other, component="y"):
+        gain = 100 * (1 - sigma[result.name, stage, name] / sigma[result.name, stage, other])
+        return Estimate(gain, gain - 1, gain + 1)
+
+    monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
     (sentence,) = answer_texts(answer, cases, {"stages": stages})
-    assert "every case: a, σ of the height at most 10 % above the least (one, start: 11 m [1, 99]; b: 10 m" in sentence
+    assert "every case: a, σ of the height at most 10 % [8.73, 11.3] above the least (one, start: b); " in sentence
+    assert sentence.endswith("; next b, 100 % [98.7, 101] (two, start); intervals for all 4 compared.")
     single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})
     assert [line.rpartition("start: ")[2] for line in single_answer] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
     vy_stages = pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)
     sentence, *_ = answer_texts(answer, cases[1:], {"stages": vy_stages})
-    assert sentence == "Least σ of the height in every stage: a; next b, at most 100 % above it."
+    assert sentence == (
+        "Least σ of the height in every stage: a; next b, at most 100 % [98.9, 101] above it (start; interval for all "
+        "2 compared)."
+    )
 
 
 def test_time_per_update_is_only_in_the_record_and_the_report(tmp_path):

@@ -79,10 +79,14 @@ def test_the_worst_is_named_by_exact_values():
     """A sample that errs puts the largest σ and bias at another scan; the sentence names the scan of the exact ones."""
     rows = pd.DataFrame({"t_s": [10.0, 20.0], "sigma": [5.2, 5.0], "exact_sigma": [4.9, 5.1]})
     rows = rows.assign(
-        sigma_lo=rows["sigma"] - 0.3, sigma_hi=rows["sigma"] + 0.3, bias=[-2.0, 1.9], exact_bias=[-1.8, 2.1]
+        sigma_lo=rows["sigma"] - 0.3,
+        sigma_hi=rows["sigma"] + 0.3,
+        bias=[-2.0, 1.9],
+        bias_se=0.1,
+        exact_bias=[-1.8, 2.1],
     )
     clause = answer._worst_errors(rows, "r")
-    assert clause.text.endswith("worst σ of the range 5.1 m (exact) at 20 s, largest bias 2.1 m at 20 s")
+    assert clause.text.endswith("worst σ of the range 5.1 m (exact) at 20 s, largest bias 2.1 m (exact) at 20 s")
 
 
 def test_no_best_where_nothing_is_compared(paper):

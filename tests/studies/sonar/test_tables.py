@@ -47,17 +47,21 @@ def test_filters_of_equal_accuracy_are_named_together(results):
     assert optimistic.startswith("Most optimistic: growing and kalman (target = sonar turning); the true σ is ")
     first, second, *_ = results["sonar_correlated"].answer
     assert first.startswith("Most optimistic: naive (ρ = 0.9")
+    curves = results["sonar_correlated"].tables["curves"]
+    assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.2f} (exact) times" in first
     assert "least with augmented and differenced, " in second
 
 
 def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several(results):
     table = results["sonar_conversion"].tables["conversion"]
     plain = table[table["frame"] == "cartesian"]
-    worst = plain.loc[plain["bias_m"].abs().idxmax()]
+    worst = plain.loc[plain["formula_m"].abs().idxmax()]
     told = results["sonar_conversion"].answer[0]
-    ratio = f"{worst['bias_to_sigma_range']:.3g}".replace("-", "−")
-    assert f"plainly: {worst['bias_m']:.3g}".replace("-", "−") in told
-    assert f", {ratio} σ of the range (σ_β = 8°); converted without bias: " in told
+    bias, ratio = worst["formula_m"], worst["formula_m"] / worst["sigma_range_m"]
+    words = f"plainly: {bias:.3g} m (exact), {ratio:.3g} σ of the range (σ_β = 8°); converted".replace("-", "−")
+    assert f"{words} without bias: none (exact)." in told
+    assert (plain["bias_lo"] <= plain["formula_m"]).mean() > 0.9
+    assert (plain["formula_m"] <= plain["bias_hi"]).mean() > 0.9
     assert conversion_figure(table[table["across_m"] == table["across_m"].max()]) is None
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import term, tr
 from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
@@ -70,14 +72,16 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
     if not ranked:
         return []
     extremes = ranked[:: len(ranked) - 1 or 1]
-    values = [compared_value.row_value(row, ALARM).chosen_among(len(ranked)) for row in extremes]
+    looks = sum(np.isnan(row.get(ALARM.exact_column, np.nan)) for row in ranked)
+    values = [compared_value.row_value(row, ALARM).chosen_among(looks) for row in extremes]
+    remark = next(filter(None, (value.choice_remark() for value in values)), "")
     texts = [f"{row['filter']}, {value.text(form='.3g')}" for row, value in zip(extremes, values, strict=True)]
     if len(texts) == 1 or not compared_value.are_distinguished(*values):
         text = tr(
             "probability of an alarm in a test at the end of the manoeuvre, at about {usual:g} false alarms a test: "
             "{one}.",
             usual=USUAL_FALSE_ALARM_RATE,
-            one="; ".join(texts),
+            one="; ".join(texts) + remark,
         )
     else:
         text = tr(
@@ -85,7 +89,7 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
             "most with {most}, least with {least}.",
             usual=USUAL_FALSE_ALARM_RATE,
             most=texts[-1],
-            least=texts[0] + values[0].choice_remark(),
+            least=texts[0] + remark,
         )
     intervals = [interval for value in values for interval in value.intervals]
     return [Sentence(case_selection.after_swept_values(result, text), tuple(intervals))]
