@@ -1,15 +1,22 @@
-"""Reads sentences back: every value with an interval, and every exact one, must stand in a row of the tables.
+"""Reads sentences back: every value with an interval, and every exact one, must stand in the row that is named.
 
-A value that is quoted as measured though its row has an exact one is a fault, and so is a value that no row has. An
-interval that is wider than its row's must be said to hold for all values compared. Both languages write numbers in
-their own way, so that the sentences of each are read by the same tables."""
+A value that is quoted as measured though its row has an exact one is a fault, and so is a value that no row has of what
+the sentence names: case, filter, component, stage, time and scan. An interval that is wider than its row's must be said
+to hold for all values compared. Both languages write numbers in their own way, so that the sentences of each are read
+by the same tables."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+
+from radarsim.language.translate import tr, translate_names
+from radarsim.report import case_selection, key_labels
+from radarsim.report.quantities import RADIAL
+from radarsim.studies.multimodel.tables import stage_gain, stage_names
+from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 
 NUMBER = r"[−-]?(?:\d[\d,\u202f\u00a0]*(?:\.\d+)?|∞)(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 UNIT = r"(?:[ \u00a0](?:%|°|k?m/s²|k?m/s|k?m|s|к?м/с²|к?м/с|к?м|с|Hz\S*|Гц\S*|rad\S*|рад\S*|m²|м²))?"
@@ -18,12 +25,21 @@ EXACT = re.compile(rf"(?P<value>{NUMBER}){UNIT}(?: (?:lower|higher))? \((?:exact
 FOR_ALL = re.compile(r"intervals? for all|интервал\w* сразу для всех")
 RUSSIAN_COMMA = re.compile(r"(?<=\d),(?=\d)")
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+TIME = re.compile(rf"(?<!= )(?<![\d.,])({NUMBER})[ \u00a0][sс](?![\w/]| \[)")
+SCAN = re.compile(r"(?:scan|обзор\w*) (\d+)")
+LAST = re.compile(r"the last scan|последн\w+ обзор")
+OF_THE_LAST = re.compile(r"^(?: \w+)?(?: \w+)? \([^)]*\)")  # in brackets behind a number: what that is of
 CHANGES = (  # how sentences write a column: itself, in per cent, of a gain the loss and the factor
     lambda x: x,
     lambda x: 100 * x,
     lambda x: -x,
     lambda x: 1 - x / 100,
 )
+WORDS = {  # of components in English, which does not inflect them
+    **{component.name: component.words for component in (*RADIAL, *COMPONENTS_BY_NAME.values())},
+    **{"y": "height", "vy": "rate of climb"},
+}
+NO_COMPONENT = re.compile(r"range alone")  # a baseline
 
 
 WITHOUT_COLUMN = re.compile(r"over the bound|отнесённое к границе")  # σ over the posterior bound, which no table has
@@ -37,13 +53,14 @@ class Reading(NamedTuple):
 
 
 class Table(NamedTuple):
-    """The measured columns of all tables: values with their ends (n,), and exact values, NaN where unknown."""
+    """A measured column: values with their ends (n,), exact values, NaN where unknown, and the labels of its rows."""
 
     name: str
     value: np.ndarray
     low: np.ndarray
     high: np.ndarray
     exact: np.ndarray
+    labels: pd.DataFrame
 
 
 def columns_of(tables) -> Iterator[Table]:
@@ -55,26 +72,76 @@ def columns_of(tables) -> Iterator[Table]:
                 known = [c for c in columns if c in (f"exact_{value}", f"exact_{value.removeprefix('gain_')}", "exact")]
                 numbers = [pd.to_numeric(table[c], "coerce").to_numpy(float) for c in (value, low, high, *known[:1])]
                 exact = numbers[3] if known else np.full(len(table), np.nan)
-                yield Table(f"{name}.{value}", *numbers[:3], exact)
+                yield Table(f"{name}.{value}", *numbers[:3], exact, table)
 
 
-def derived_columns(tables) -> Iterator[Table]:
-    """σ over what a filter believes, biases known by formula, and σ by a paired gain over an exact σ."""
+def derived_columns(tables, results=()) -> Iterator[Table]:
+    """σ over what a filter believes, biases, σ by a paired gain over an exact σ, and paired gains of stages."""
     curves, gains = tables["curves"], tables["gains"]
     ratios = [curves[name].to_numpy(float) for name in ("sigma", "sigma_lo", "sigma_hi")]
     with np.errstate(divide="ignore", invalid="ignore"):
         believed = curves["believed_sigma"].to_numpy(float)
         exact = curves["exact_sigma"].to_numpy(float) / believed
-        yield Table("σ over believed", *(part / believed for part in ratios), exact)
+        yield Table("σ over believed", *(part / believed for part in ratios), exact, curves)
     if "conversion" in tables:
-        biases = [tables["conversion"][name].to_numpy(float) for name in ("bias_m", "bias_lo", "bias_hi", "formula_m")]
-        yield Table("bias of a conversion", *biases)
+        names = ("bias_m", "bias_lo", "bias_hi", "formula_m")
+        biases = [tables["conversion"][name].to_numpy(float) for name in names]
+        yield Table("bias of a conversion", *biases, tables["conversion"])
+    if "bias_se" in curves:
+        bias, half = curves["bias"].to_numpy(float), 1.96 * curves["bias_se"].to_numpy(float)
+        yield Table("bias", bias, bias - half, bias + half, curves["exact_bias"].to_numpy(float), curves)
     keys = ["case", "baseline", "component", "k"]
     exact = curves.rename(columns={"filter": "baseline"})[[*keys, "exact_sigma"]]
     paired = gains.merge(exact, on=keys, how="left")
     base = paired["exact_sigma"].to_numpy(float)
     parts = [base * (1 - paired[name].to_numpy(float) / 100) for name in ("gain_percent", "gain_hi", "gain_lo")]
-    yield Table("paired σ", *parts, np.full(len(paired), np.nan))
+    yield Table("paired σ", *parts, np.full(len(paired), np.nan), paired)
+    for result in results if "stages" in tables else ():
+        yield _paired_stages(result)
+
+
+def _paired_stages(result) -> Table:
+    """The gain of every filter over every other one in every stage of a case."""
+    filters, components = result.axes.filters, [name for name, _ in result.axes.components]
+    numbers = [
+        (f, other, s, c)
+        for s in range(len(stage_names(result)))
+        for c in range(len(components))
+        for f in range(len(filters))
+        for other in range(len(filters))
+        if f != other
+    ]
+    gains = np.array([stage_gain(result, *each) for each in numbers], float).T
+    labels = [
+        {"case": result.name, "filter": filters[f], "stage": stage_names(result)[s], "component": components[c]}
+        for f, _, s, c in numbers
+    ]
+    return Table("paired gain of a stage", *gains, np.full(len(numbers), np.nan), pd.DataFrame(labels))
+
+
+def names_of(results: Sequence, language: str = "en") -> dict[str, dict[str, str]]:
+    """What the language in use calls cases, filters, stages and components: by column of tables, the label by name."""
+    cases: dict[str, str] = {}
+    for result, name in zip(results, case_selection.distinct_case_names(results), strict=True):
+        described = key_labels.without_markup(key_labels.swept_description(result))
+        for text in filter(None, (name, key_labels.plain_case_label(result), described, result.name)):
+            cases.setdefault(translate_names(text), result.name)
+    has_stages = all(result.study == "multimodel" for result in results)
+    by_column = {
+        "case": cases if len(results) > 1 else {},
+        "filter": {translate_names(name): name for result in results for name in _filters(result)},
+        "stage": {tr(name): name for result in results for name in stage_names(result)} if has_stages else {},
+        "component": {words: name for name, words in WORDS.items()} if language == "en" else {},
+    }
+    if language != "en":
+        by_column = {
+            column: {_as_english(name): label for name, label in names.items()} for column, names in by_column.items()
+        }
+    return by_column
+
+
+def _filters(result) -> list[str]:
+    return [*result.axes.filters, *(member.name for member in result.user_filters or ())]
 
 
 def number(text: str) -> tuple[float, float]:
@@ -94,35 +161,112 @@ def near(column: np.ndarray, text: str) -> np.ndarray:
         return (np.abs(column - value) <= 2 * half) | (column == value)
 
 
-def read_sentence(sentence: str, tables: Mapping, language: str = "en", derived=()) -> Reading:
+def read_sentence(
+    sentence: str, tables: Mapping, language: str = "en", derived: Sequence[Table] = (), names: Mapping | None = None
+) -> Reading:
     """Each number with an interval, and each exact one, by the row that it stands in.
 
-    derived: further columns (`Table`) that sentences may take their numbers from, as σ by a paired ratio."""
+    derived: further columns that sentences may take their numbers from, as σ by a paired ratio. names: without them
+    any row may hold a number."""
     if language != "en":
-        sentence = RUSSIAN_COMMA.sub(".", sentence).replace("; ", ", ")
+        sentence = _as_english(sentence)
     columns, read, faults = [*columns_of(tables), *derived], [], []
     sentence = WITHOUT_COLUMN.split(sentence)[0]
-    for match in MEASURED.finditer(sentence):
+    matches = sorted([*MEASURED.finditer(sentence), *EXACT.finditer(sentence)], key=lambda match: match.start())
+    for i, match in enumerate(matches):
+        before = sentence[matches[i - 1].end() if i else 0 : match.start()]
+        before = OF_THE_LAST.sub("", before) if i else before
+        after = sentence[match.end() : matches[i + 1].start() if i + 1 < len(matches) else len(sentence)]
+        place = _Place(before.rpartition("; ")[2], after.partition("; ")[0], sentence)
         text = match[0]
-        rows = [found for column in columns for found in _rows(column, match, bool(FOR_ALL.search(sentence)))]
+        if match.re is EXACT:
+            is_known = any(
+                (near(change(column.exact), match["value"]) & place.rows(column, names)).any()
+                for column in columns
+                for change in CHANGES
+            )
+            (read if is_known else faults).append(text if is_known else f"{text}: in no exact column")
+            continue
+        rows = [
+            row
+            for column in columns
+            for row in _rows(column, match, bool(FOR_ALL.search(sentence)), place.rows(column, names))
+        ]
         if not rows:
             faults.append(f"{text}: in no row")
         elif all(not np.isnan(exact) for _, exact in rows):
             faults.append(f"{text}: measured, though {rows[0][0]} is known exactly, {rows[0][1]:.6g}")
         else:
             read.append(text)
-    for match in EXACT.finditer(sentence):
-        is_known = any(near(change(column.exact), match["value"]).any() for column in columns for change in CHANGES)
-        (read if is_known else faults).append(match[0] if is_known else f"{match[0]}: in no exact column")
     return Reading(read, faults)
 
 
-def _rows(column: Table, match: re.Match, may_be_wider: bool) -> Iterator[tuple[str, float]]:
-    """The name and the exact value of the rows of a column that hold a value and the ends of its interval."""
+def _as_english(sentence: str) -> str:
+    """A sentence with decimal commas and intervals [1,5; 2,5] as English writes it."""
+    sentence = RUSSIAN_COMMA.sub(".", sentence)
+    return re.sub(rf"\[({NUMBER}); ({NUMBER})\]", r"[\1, \2]", sentence)
+
+
+class _Place(NamedTuple):
+    """Where a number stands: the text of its clause before it and after it, up to the next number; the sentence."""
+
+    before: str
+    after: str
+    sentence: str
+
+    def rows(self, column: Table, names: Mapping | None) -> np.ndarray:
+        """Which rows (n,) of a column are of what is named: next to the number, else anywhere in the sentence."""
+        chosen = np.full(len(column.labels), True)
+        if names is None:
+            return chosen
+        for label, of_names in names.items():
+            if label in column.labels:
+                values = column.labels[label].to_numpy()
+                parts = (self.sentence,) if label == "component" else (self.before, self.after, self.sentence)
+                named = next(filter(None, (_named(part, of_names) for part in parts)), set())
+                if label == "component":
+                    named &= set(values)
+                if named and label == "filter" and "baseline" in column.labels:  # a gain is of both
+                    chosen &= np.isin(values, list(named)) | np.isin(column.labels["baseline"], list(named))
+                elif named:
+                    chosen &= np.isin(values, list(named))
+        if "t_s" in column.labels:
+            times = self._numbers(TIME)
+            if times:
+                t_s = column.labels["t_s"].to_numpy(float)
+                chosen &= np.any([np.abs(t_s - time) <= 1e-5 * max(time, 1) for time in times], axis=0)
+        if "k" in column.labels:
+            k = column.labels["k"].to_numpy(float)
+            scans = self._numbers(SCAN)
+            if scans:
+                chosen &= np.isin(k, list(scans))
+            elif LAST.search(f"{self.before} | {self.after}") and not self._numbers(TIME):
+                chosen &= k == column.labels.groupby("case")["k"].transform("max").to_numpy(float)
+        return chosen
+
+    def _numbers(self, pattern: re.Pattern) -> set[float]:
+        """The times or scans next to the number, else those in the sentence."""
+        for part in (f"{self.before} | {self.after}", self.sentence):
+            if found := {number(text)[0] for text in pattern.findall(part)}:
+                return found
+        return set()
+
+
+def _named(text: str, names: Mapping[str, str]) -> set[str]:
+    """The labels whose names stand in a text; of names within others the longest."""
+    if not names:
+        return set()
+    pattern = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
+    text = NO_COMPONENT.sub("", text)
+    return {names[match] for match in re.findall(rf"(?<![\w+])(?:{pattern})(?![\w+])", text)}
+
+
+def _rows(column: Table, match: re.Match, may_be_wider: bool, chosen: np.ndarray) -> Iterator[tuple[str, float]]:
+    """The name and the exact value of the chosen rows of a column that hold a value and the ends of its interval."""
     for change in CHANGES:
         value, ends = change(column.value), np.sort([change(column.low), change(column.high)], axis=0)
         has_value = near(value, match["value"])
         is_same = near(ends[0], match["low"]) & near(ends[1], match["high"])
         if may_be_wider:
             is_same |= (number(match["low"])[0] <= ends[0] + 1e-9) & (ends[1] - 1e-9 <= number(match["high"])[0])
-        yield from ((column.name, exact) for exact in column.exact[has_value & is_same])
+        yield from ((column.name, exact) for exact in column.exact[chosen & has_value & is_same])

@@ -8,7 +8,7 @@ from radarsim.api import result_content
 from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.language import current
-from tests.report.sentence_reader import derived_columns, read_sentence
+from tests.report.sentence_reader import derived_columns, names_of, read_sentence
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 RANGE = {"observes": ["range"], "manoeuvre_variance": 1e-3}
@@ -25,12 +25,12 @@ ODD = {
 
 def faults_of(result):
     """Faults of all sentences of an answer, in every language, and how many numbers were read."""
-    faults, count = [], 0
+    faults, count, derived = [], 0, list(derived_columns(result._tables, result.cases))
     for code in current.language_codes():
         with current.use_language(code):
-            texts = result_content.make_answer(result.cases, result._tables).texts
+            texts, names = result_content.make_answer(result.cases, result._tables).texts, names_of(result.cases, code)
         for text in texts:
-            reading = read_sentence(text, result._tables, code, list(derived_columns(result._tables)))
+            reading = read_sentence(text, result._tables, code, derived, names)
             faults += [f"{code}: {text}: {fault}" for fault in reading.faults]
             count += len(reading.read)
     return faults, count
@@ -49,6 +49,35 @@ def test_the_reader_notices_what_contradicts_a_table():
     assert read_sentence("at worst 32.0 % (exact) higher", exact).faults
     assert read_sentence("33.8 % [29.0, 38.0]", measured).faults
     assert read_sentence("33.8 % [29.0, 38.0] (interval for all 14 compared)", measured).read
+
+
+def test_the_reader_notices_the_number_of_another_row():
+    """Of another case, filter, component or time than those next to the number."""
+    rows = [
+        *(("one", "r", "r", 10.0, 7.0), ("one", "r+Vr", "r", 10.0, 5.0), ("one", "r", "r", 20.0, 6.0)),
+        *(("two", "r", "r", 20.0, 4.0), ("one", "r", "Vr", 10.0, 3.0)),
+    ]
+    curves = pd.DataFrame(rows, columns=["case", "filter", "component", "t_s", "sigma"])
+    curves.insert(4, "k", curves["t_s"] / 10)
+    curves = curves.assign(sigma_lo=curves["sigma"] - 1, sigma_hi=curves["sigma"] + 1, exact_sigma=np.nan)
+    names = {
+        "case": {"a = 1": "one", "a = 2": "two"},
+        "filter": {"r": "r", "r+Vr": "r+Vr"},
+        "component": {"range": "r", "radial velocity": "Vr"},
+    }
+    for sentence, is_right in {
+        "a = 1: σ of the range at 10 s: least with r+Vr, 5.0 m [4.0, 6.0], largest with r, 7.0 m [6.0, 8.0].": True,
+        "a = 1: σ of the range at 10 s: least with r, 5.0 m [4.0, 6.0], largest with r+Vr, 7.0 m [6.0, 8.0].": False,
+        "a = 1: σ of the radial velocity of r at 10 s is 3.0 m [2.0, 4.0].": True,
+        "a = 1: σ of the range of r at 10 s is 3.0 m [2.0, 4.0].": False,
+        "r: σ of the range is 4.0 m [3.0, 5.0] (a = 2) to 6.0 m [5.0, 7.0] (a = 1) at scan 2": True,
+        "r: σ of the range is 4.0 m [3.0, 5.0] (a = 1) to 6.0 m [5.0, 7.0] (a = 2) at scan 2": False,
+        "r: σ of the range at the last scan is 6.0 m [5.0, 7.0]": True,
+        "r: σ of the range at the last scan is 7.0 m [6.0, 8.0]": False,
+        "r: at best 6.0 m [5.0, 7.0], at 20 s; at worst 7.0 m [6.0, 8.0], at 10 s": True,
+        "r: at best 6.0 m [5.0, 7.0], at 10 s; at worst 7.0 m [6.0, 8.0], at 20 s": False,
+    }.items():
+        assert (read_sentence(sentence, {"curves": curves}, names=names).faults == []) is is_right, sentence
 
 
 @pytest.mark.parametrize("odd", ODD)
