@@ -329,8 +329,8 @@ def register(radar: str, other: str, as_json: bool) -> None:
     their address, callsign or Mode 3/A code at that time, interpolated in between. A bias is what to subtract:
     range_scale from 1, the share of the range; time_s from the times, which are then too late. Outliers have no weight;
     errors may be correlated within an aircraft. What the flights cannot show is unknown, with the reason. OTHER is
-    taken as right; for a radar that is tilted, or has moved, there is no model. ID is the track, address, callsign or
-    code of the plots to which a lone receiver's positions belong.
+    taken as right. Errors that these biases do not describe are named first, with what they go with. ID is the track,
+    address, callsign or code of the plots to which a lone receiver's positions belong.
 
     \b
     Example

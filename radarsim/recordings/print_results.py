@@ -147,7 +147,8 @@ def print_registration(registration: "Registration", positions_file: str) -> Non
     interpolation_text = tr("positions in between err by less than {most:.2g} m (95 %)", most=registration.bent_m)
     lines += [labelled_line("", f"{aircraft}; {offset_text}; {interpolation_text}")]
     lines += [labelled_line("", tr("left out: {what}", what=reason)) for reason in registration.left_out]
+    lines += sentences.finding_lines(registration)
     lines.append(tr("Biases of the plots with 95 % intervals, {file} taken as right", file=positions_file))
-    lines += sentences.registration_lines(registration)
+    lines += sentences.bias_lines(registration)
     for line in lines:
         print_line(sys.stdout, line)

@@ -3,6 +3,7 @@
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
@@ -163,6 +164,8 @@ class RegistrationResult(Displayable):
 
     biases: a row for each of range_m, range_scale, bearing_rad, time_s with value, lo, hi (95 %), identifiable, why (it
     is not). aircraft: a row for each with its remaining errors: range_m, bearing_rad (medians), time_s, sigma_time_s.
+    findings: a row for each error that the biases do not describe: coordinate, companion (what it goes with), cause (''
+    if unknown), keys, rivals (causes that the plots do not exclude); coefficients: of the causes, as biases.
     sigma_range_m, sigma_bearing_rad: of a plot, without outliers. plots, matched: their number, and those with a
     position of their aircraft."""
 
@@ -170,8 +173,11 @@ class RegistrationResult(Displayable):
         import pandas as pd
 
         self._registration = registration
-        self.biases, self.aircraft = (
-            pd.DataFrame(result.registration_document(registration)[name]) for name in ("biases", "aircraft")
+        document = result.registration_document(registration)
+        self.biases, self.aircraft = (pd.DataFrame(document[name]) for name in ("biases", "aircraft"))
+        self.findings, self.coefficients = (
+            pd.DataFrame(document[name], columns=[field.name for field in fields(row_type)])
+            for name, row_type in (("findings", result.Finding), ("coefficients", result.Bias))
         )
         self.sigma_range_m, self.sigma_bearing_rad = registration.adjustment.sigma
         self.plots, self.matched = registration.plots, registration.matched

@@ -21,6 +21,8 @@ from radarsim.recordings.formats.import_recording import import_recording
 from radarsim.recordings.formats.records import BIASES
 from radarsim.recordings.formats.sites import Site, parse_sites
 from radarsim.recordings.registration import bias_fit, register, sentences
+from radarsim.recordings.registration.matched_plots import MatchedPlots
+from radarsim.recordings.registration.robust_fit import BIWEIGHT_LIMIT, CONVERGENCE_STEP
 from radarsim.report.statistics import Z95
 from tests.recordings.formats.example_files import block, plot_048, position_021
 from tests.tolerances import rounding, share_error, sigma_error
@@ -76,7 +78,7 @@ def pairs(rng, flown, biases, sigma=(0.0, 0.0), plots=60, own=0.0, outliers=0.0,
         r, b = measured(flight, t, biases) + errors
         rows.append(np.stack([t, r, b % (2 * np.pi), np.full(len(t), number)]))
     t, r, b, path = np.concatenate(rows, axis=1)
-    return bias_fit.MatchedPlots(t, r, b, path.astype(int), lambda number, at: paths[number](at))
+    return MatchedPlots(t, r, b, path.astype(int), lambda number, at: paths[number](at))
 
 
 def predicted(flown, made, biases):
@@ -114,7 +116,7 @@ def test_an_independent_search_finds_the_same():
     flown = flights(rng, 8, turn=0.0)
     made = pairs(rng, flown, SOME, (50.0, 0.0015), outliers=0.05)
     ours = bias_fit.fit_biases(made)
-    limit = bias_fit.BIWEIGHT_LIMIT**2
+    limit = BIWEIGHT_LIMIT**2
 
     def errors(scaled):
         biases = scaled * [100.0, 1e-3, 1e-3, 1.0]
@@ -129,12 +131,12 @@ def test_an_independent_search_finds_the_same():
     theirs = least_squares(errors, np.zeros(4), loss=tukey, xtol=1e-15, ftol=1e-15, gtol=1e-12).x
     for one, value in zip(ours.biases, theirs * [100.0, 1e-3, 1e-3, 1.0], strict=True):
         # Steps end below so many standard errors; ten times that is left where each is 0.9 of the one before.
-        assert abs(one.value - value) < 10 * bias_fit.CONVERGENCE_STEP * (one.hi - one.lo) / (2 * Z95)
+        assert abs(one.value - value) < 10 * CONVERGENCE_STEP * (one.hi - one.lo) / (2 * Z95)
     for sigma, own in zip(ours.sigma, errors(theirs).reshape(2, -1) * np.array(ours.sigma)[:, None], strict=True):
         # Of the outliers 16 % are within 4 σ, which adds 1.7 %; the biweight is as good as 90 % of the errors would be.
         inner = own[np.abs(own) < 4 * sigma]
         assert sigma == pytest.approx(np.std(inner), rel=0.017 + sigma_error(len(inner), z=3) * np.sqrt(1 / 0.9 - 1))
-    spoilt = np.abs(errors(theirs).reshape(2, -1)).max(axis=0) >= bias_fit.BIWEIGHT_LIMIT
+    spoilt = np.abs(errors(theirs).reshape(2, -1)).max(axis=0) >= BIWEIGHT_LIMIT
     assert ours.outliers == spoilt.sum()
 
 

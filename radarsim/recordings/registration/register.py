@@ -25,7 +25,8 @@ from radarsim.recordings.aircraft_match import (
 from radarsim.recordings.formats.records import DAY_S
 from radarsim.recordings.formats.sites import Site
 from radarsim.recordings.grouping import rows_by_name
-from radarsim.recordings.registration.bias_fit import MatchedPlots, fit_biases
+from radarsim.recordings.registration.bias_fit import fit_biases
+from radarsim.recordings.registration.matched_plots import MatchedPlots
 from radarsim.recordings.registration.read_recording import (
     PLOT_CHOICES,
     POSITION_CHOICES,

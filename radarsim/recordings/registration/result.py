@@ -35,9 +35,23 @@ class AircraftResiduals:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """What the four biases do not hold: the coordinate in which plots err, what the error goes with, its cause and the
+    keys of its coefficients, none if it is unknown, and the causes that these flights do not distinguish from it."""
+
+    coordinate: str
+    companion: str
+    cause: str
+    keys: tuple[str, ...]
+    rivals: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Adjustment:
     """Biases in the order of BIASES; σ of range and bearing of a plot; residuals (n, 2); plots without weight; the
-    number of independent clusters; lag of each aircraft beyond time_s and its σ, by number."""
+    number of independent clusters; lag of each aircraft beyond time_s and its σ, by number; the coefficients of errors
+    beyond the biases; which errors these are; σ that the biases alone leave, and σ by differences of successive
+    plots."""
 
     biases: tuple[Bias, ...]
     sigma: tuple[float, float]
@@ -45,6 +59,10 @@ class Adjustment:
     outliers: int
     clusters: int
     lags: dict[int, tuple[float, float]]
+    coefficients: tuple[Bias, ...]
+    findings: tuple[Finding, ...]
+    sigma_of_biases_alone: tuple[float, float]
+    sigma_of_steps: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -80,4 +98,8 @@ def registration_document(registration: Registration) -> dict[str, Any]:
         "interpolation_m": registration.bent_m,
         "left_out": registration.left_out,
         "aircraft": [asdict(aircraft) for aircraft in registration.aircraft],
+        "coefficients": [asdict(coefficient) for coefficient in registration.adjustment.coefficients],
+        "findings": [asdict(finding) for finding in registration.adjustment.findings],
+        "sigma_of_biases_alone": registration.adjustment.sigma_of_biases_alone,
+        "sigma_of_steps": registration.adjustment.sigma_of_steps,
     }
