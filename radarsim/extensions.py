@@ -91,6 +91,10 @@ class Extension:
         """Its tables of a result, brought up to date with what is stored under `out`."""
         return {}
 
+    def stored_tables(self, tables: Tables, study_name: str) -> "dict[str, pd.DataFrame]":
+        """Its tables of a stored result, without what no longer follows from the code that is here."""
+        return {}
+
     def figures(self, tables: Tables) -> "dict[str, Figure]":
         """The figures that it adds to a result, from the result's tables."""
         return {}

@@ -16,6 +16,7 @@ from radarsim.api.result_folder import ResultFolder, choose_result
 from radarsim.api.stored_runs import stored_result
 from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError, StoreError
+from radarsim.extensions import extensions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,7 +50,10 @@ class TableResult(Result):
     @cached_property
     def _tables(self) -> "dict[str, pd.DataFrame]":
         tables = {name: self.stored.files.table(name) for name in self.stored.files.table_names}
-        return {name: table for name, table in tables.items() if table is not None}
+        found = {name: table for name, table in tables.items() if table is not None}
+        for extension in extensions():
+            found |= extension.stored_tables(found, str(self.stored.record["study"]))
+        return found
 
     @property
     def tables(self) -> "dict[str, pd.DataFrame]":

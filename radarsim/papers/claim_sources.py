@@ -1,8 +1,8 @@
 """What a verdict follows from besides the words of its claim: measures, the code of a package, the keys of its config.
 
 Of radarsim's own papers only the words and the calls of measures count: their classes are shipped with the code. Of a
-user's package all of its code counts, and of the user's packages that it imports, without comments, docstrings and the
-text of its claims, which counts as what is declared in it."""
+user's package all of its code and data counts, and of the user's packages that it imports, without comments, docstrings
+and the text of its claims, which counts as what is declared in it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,9 +11,11 @@ from radarsim.api import configs
 from radarsim.config.identity import identity_keys
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.measure_call import MeasureCall
-from radarsim.studies.sources import RADARSIM, code_digest
+from radarsim.papers.paper_keys import CLAIMS_FILE, INTERPRETATIONS_FILE
+from radarsim.studies.sources import RADARSIM, package_digest
 
 CLAIMS_TEXT = "claims_yaml"  # the attribute of a study in one file that holds its claims
+CLAIMS_FILES = (CLAIMS_FILE, INTERPRETATIONS_FILE)  # of a package of several files
 
 
 def plain_data(value: Any) -> Any:
@@ -47,7 +49,7 @@ def package_sources(claim: Claim, module: str) -> Any:
     if not user_packages:
         return None
     return [
-        code_digest(tuple(user_packages), CLAIMS_TEXT),
+        package_digest(tuple(user_packages), CLAIMS_TEXT, CLAIMS_FILES),
         [_case_keys(case) for case in configs.shipped(claim.config) or ()],
     ]
 

@@ -51,7 +51,7 @@ COLUMNS = (
     *("expected_lo", "expected_hi", "what", "unit", "place", "interpretation", "overall"),
     *("exact", "margin", "miss", "class", "holds", "of", "depends_on", "old_verdict", "original"),
     *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "number", "why", "as_shipped"),
-    *("judged_lo", "judged_hi"),
+    *("judged_lo", "judged_hi", "declared"),
 )
 CLASS_COLUMNS = ("verdict", "overall", "class", "as_shipped")  # of these columns
 # Of these columns; empty where there is none.
@@ -59,6 +59,7 @@ NUMBER_COLUMNS = (
     *("measured", "lo", "hi", "expected_lo", "expected_hi", "exact", "margin", "miss", "holds", "of"),
     *("ceiling", "n", "worst_miss", "needed", "judged_lo", "judged_hi"),
 )
+NOT_RUN_CELLS = dict.fromkeys(NUMBER_COLUMNS, "") | dict.fromkeys(CLASS_COLUMNS, NOT_RUN)  # of a claim without verdict
 
 
 def claims_table(
@@ -333,6 +334,11 @@ def empty_row(claim: Claim, paper: str) -> dict[str, Any]:
     }
 
 
+def not_run_row(claim: Claim, paper: str) -> dict[str, Any]:
+    """The row of a claim without a stored verdict."""
+    return empty_row(claim, paper) | NOT_RUN_CELLS
+
+
 def _table_number(value: float) -> float:
     """A number for a table: twelve digits, NaN for infinity."""
     return float(f"{value:.12g}") if math.isfinite(value) else math.nan
@@ -346,8 +352,7 @@ def claim_rows(papers: Sequence[PaperClaims], stored: Mapping[str, Sequence[Mapp
     for paper, claim in ((paper_claims.paper, claim) for paper_claims in papers for claim in paper_claims.claims):
         claim_rows_of = [dict(row) for row in stored.get(claim.config, ()) if row["claim"] == claim.id]
         if not claim_rows_of:
-            claim_rows_of = [empty_row(claim, paper) | dict.fromkeys(CLASS_COLUMNS, NOT_RUN)]
-            claim_rows_of[0] |= dict.fromkeys(NUMBER_COLUMNS, "")
+            claim_rows_of = [not_run_row(claim, paper)]
         rows += [row | {"config": claim.config} for row in claim_rows_of]
     return rows
 

@@ -49,7 +49,7 @@ class PapersExtension(Extension):
     }
     figure_names = (CLAIMS,)
     table_names = (CLAIMS,)
-    columns_from_elsewhere: Mapping[str, Sequence[str]] = {CLAIMS: ("overall", "class", "as_shipped")}
+    columns_from_elsewhere: Mapping[str, Sequence[str]] = {CLAIMS: ("overall", "class", "as_shipped", "declared")}
     stop_rule = UntilDecided()
 
     def study_label(self, study: Any) -> str:
@@ -79,6 +79,13 @@ class PapersExtension(Extension):
         from radarsim.papers import result_claims
 
         return {CLAIMS: result_claims.with_stored_classes(tables[CLAIMS], study_name, out)}
+
+    def stored_tables(self, tables: "Tables", study_name: str) -> "dict[str, pd.DataFrame]":
+        from radarsim.papers import result_claims
+
+        if CLAIMS not in tables:
+            return {}
+        return {CLAIMS: result_claims.without_outdated_verdicts(tables[CLAIMS], study_name)}
 
     def figures(self, tables: "Tables") -> "dict[str, Figure]":
         claims = tables[CLAIMS]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from radarsim.api import arguments, configs, repeat_command
 from radarsim.api.display import Displayable
 from radarsim.api.load_experiments import load_all
-from radarsim.config.experiment import Case, Experiment
+from radarsim.config.experiment import Experiment
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import tr
 from radarsim.papers.claim import PaperClaims
@@ -18,15 +18,14 @@ from radarsim.papers.claim_rows import classes_in_words, group_by_claim, verdict
 from radarsim.papers.claims_table import claim_rows, rows_without_results
 from radarsim.papers.interpretations import PaperInterpretations
 from radarsim.papers.open_papers import open_papers
+from radarsim.papers.outdated_verdicts import current_marks, current_rows
 from radarsim.papers.paper_keys import paper_key
 from radarsim.papers.stored_verdicts import known_classes, stored_claims
-from radarsim.papers.study_claims import claims_of, paper_claims
+from radarsim.papers.study_claims import by_study, claims_of, paper_claims
 from radarsim.papers.verdict_classes import add_classes, rows_in_words
 from radarsim.report import atomic_files
 from radarsim.report.csv_text import read_rows
-from radarsim.report.stored_tables import find_record
 from radarsim.studies import registry
-from radarsim.studies.sources import computing_packages
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,12 +115,13 @@ def claims(
     stems = dict.fromkeys(
         [*(experiment.stem for experiment in experiments), *(config_of[claim] for claim in requested)]
     )
-    cases = {experiment.stem: experiment.cases for experiment in experiments}
+    marks = {
+        name: mark for of_study in by_study(current_marks, keys).values() for name, mark in (of_study or {}).items()
+    }
     stored = {
-        stem: rows
+        stem: current_rows(rows, papers, marks)
         for stem in stems
         if (rows := stored_claims(Path(out) / stem)) is not None
-        and not _is_of_other_code(Path(out) / stem, cases.get(stem) or configs.shipped(stem) or ())
     }
     rows = [row for experiment in experiments for row in _experiment_rows(experiment, papers, stored)]
     listed = {(row["claim"], row["config"]) for row in rows}
@@ -132,16 +132,6 @@ def claims(
     own_names = [row["claim"] for row in own_rows]
     interpretations = [interpretations for interpretations, _ in with_choices]
     return Claims(add_classes(rows, classes) + own_rows, interpretations, own_names)
-
-
-def _is_of_other_code(folder: Path, cases: Sequence[Case]) -> bool:
-    """Whether a user's package has changed since a result was stored: its verdicts need not follow any longer."""
-    record = find_record(folder)
-    recorded = {} if record is None else record.get("packages", {})
-    current = (
-        {name: package for case in cases for name, package in computing_packages(case).items()} if recorded else {}
-    )
-    return any(name in current and package["sha256"] != current[name].sha256 for name, package in recorded.items())
 
 
 def _own_claim_rows(

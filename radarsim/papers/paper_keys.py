@@ -9,6 +9,7 @@ from radarsim.studies.interface import Study
 
 PACKAGE = "radarsim.papers"
 CLAIMS_FILE = "claims.yaml"
+INTERPRETATIONS_FILE = "interpretations.yaml"
 
 
 def paper_key(study: Study) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from radarsim.errors import StoreError
+from radarsim.errors import ConfigError, StoreError
 from radarsim.extensions import IndexEntry, ReportSection
 from radarsim.language.translate import term, tr
 from radarsim.papers.claim_rows import (
@@ -15,14 +15,15 @@ from radarsim.papers.claim_rows import (
     shown_interval,
     verdict_sentence,
 )
-from radarsim.papers.claims_table import TABLES_READ
+from radarsim.papers.claims_table import NOT_RUN_CELLS, TABLES_READ
+from radarsim.papers.outdated_verdicts import current_marks, current_rows
 from radarsim.papers.reasons import translate_reason
 from radarsim.papers.stored_verdicts import FILE, recorded_claims
-from radarsim.papers.study_claims import choices_of
+from radarsim.papers.study_claims import choices_of, claims_of
 from radarsim.papers.verdict_classes import rows_in_words
 from radarsim.report import page_tables, render_page, typeset
-from radarsim.report.stored_tables import TableKind, read_rows
-from radarsim.studies.registry import study
+from radarsim.report.stored_tables import TableKind, find_record, read_rows
+from radarsim.studies.registry import is_study, study
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -109,13 +110,26 @@ def index_entry(folder: Path) -> IndexEntry | None:
         content = recorded_claims(folder)
         if content is None:
             return None
-        rows = read_rows(folder / FILE, content, INDEX_TABLE, dict)
+        rows = _with_edited_claims_not_run(folder, read_rows(folder / FILE, content, INDEX_TABLE, dict))
         looks = [_css_class(parts[0]["class"]) for parts in group_by_claim(rows)]
         marks = {look: looks.count(look) for look in (*MARKED_CLASSES, "unclear") if look in looks}
         paper = rows[0]["paper"].partition(",")[0] if rows else ""
         return IndexEntry(tr(HEADING), classes_in_words(rows), marks, paper)
     except (StoreError, LookupError):
         return None
+
+
+def _with_edited_claims_not_run(folder: Path, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows of a result's claims; only those of a user's package can have been edited since."""
+    record = find_record(folder) or {}
+    if not record.get("packages") or not is_study(record["study"]):
+        return rows
+    try:
+        case_study = study(record["study"])
+        paper, marks = claims_of(case_study), current_marks(case_study)
+    except ConfigError:
+        return [row | NOT_RUN_CELLS for row in rows]
+    return current_rows(rows, [paper] if paper else [], marks)
 
 
 def _measured_value(part: Mapping[str, Any]) -> str:

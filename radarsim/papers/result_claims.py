@@ -1,18 +1,22 @@
 """The claims that a result judges: claims.csv with its classes, and the claims by class."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from radarsim.api import configs
 from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError
 from radarsim.papers.claim_rows import CLASS_ORDER, group_by_claim, is_extension
-from radarsim.papers.claims_table import NOT_JUDGED, claims_table, first_rows
+from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN_CELLS, NUMBER_COLUMNS, claims_table, first_rows
+from radarsim.papers.outdated_verdicts import current_marks, current_rows
 from radarsim.papers.stored_verdicts import known_classes
 from radarsim.papers.study_claims import choices_of, claims_of
-from radarsim.papers.verdict_classes import CLASS_COLUMNS, add_classes, is_judged_only_as_shipped
+from radarsim.papers.verdict_classes import CLASS_COLUMNS, add_classes, declaration_digest, is_judged_only_as_shipped
+from radarsim.report.tables import frame
 from radarsim.report.user_filters import rows as user_filters_rows
-from radarsim.studies.registry import study
+from radarsim.studies.registry import is_study, study
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,8 +30,34 @@ def claims_of_results(
 ) -> "pd.DataFrame":
     """claims.csv of results, with the shipped classes; see `Extension.tables`."""
     tables = user_filters_rows.tables_for_claims(measured, user_filters)
-    verdicts = claims_table(claims_of(study(results[0].study)), results, tables, configs.shipped, stem)
-    return with_stored_classes(verdicts, results[0].study)
+    case_study = study(results[0].study)
+    paper_claims, choices = claims_of(case_study), choices_of(case_study)
+    verdicts = claims_table(paper_claims, results, tables, configs.shipped, stem)
+    claims = paper_claims.claims if paper_claims and len(verdicts) else ()
+    marks = {claim.id: declaration_digest(choices, claim) for claim in claims}
+    marked = verdicts.assign(declared=[marks[claim] for claim in verdicts["claim"]])
+    return with_stored_classes(marked, results[0].study)
+
+
+def without_outdated_verdicts(claims: "pd.DataFrame", study_name: str) -> "pd.DataFrame":
+    """claims.csv as it was stored, with claims that have been edited since as not run: all of them where the study's
+    claims cannot be read, none where there is no such study here."""
+    if not is_study(study_name):
+        return claims
+    try:
+        case_study = study(study_name)
+        papers, marks = [claims_of(case_study)], current_marks(case_study)
+    except ConfigError:
+        papers, marks = [], {}
+    stored: Any = claims.to_dict("records")
+    rows = current_rows(stored, [paper for paper in papers if paper], marks)
+    if not papers:
+        rows = [dict(row) | NOT_RUN_CELLS for row in first_rows(stored)]
+    if rows == stored:
+        return claims
+    columns = {str(name): [row.get(str(name), "") for row in rows] for name in claims}
+    numbers = {name: [math.nan if cell == "" else cell for cell in columns[name]] for name in NUMBER_COLUMNS}
+    return frame({**columns, **numbers})
 
 
 def with_stored_classes(claims: "pd.DataFrame", study_name: str, out: Path | None = None) -> "pd.DataFrame":

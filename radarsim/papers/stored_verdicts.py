@@ -26,7 +26,8 @@ OLD_FILES = {  # names in results of earlier versions, read where the new file i
     CLASSES: Path("readings", "classes.csv"),
 }
 OLD_COLUMNS = {"reading": "interpretation"}
-CLAIMS_TABLE = TableKind("table of claims", COLUMNS, OLD_COLUMNS)
+NEW_COLUMNS = {"declared"}  # of claims.csv, which earlier versions wrote without
+CLAIMS_TABLE = TableKind("table of claims", [name for name in COLUMNS if name not in NEW_COLUMNS], OLD_COLUMNS)
 SHIPPED_CLASSES = Path(__file__).with_name("classes.csv")
 
 

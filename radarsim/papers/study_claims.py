@@ -13,12 +13,18 @@ from radarsim.papers.claim import PaperClaims
 from radarsim.papers.claim_files import load_choices, load_claims
 from radarsim.papers.interpretations import Choice, OpenChoices, PaperInterpretations, ShippedChoices
 from radarsim.papers.paper_cases import ShippedCases
-from radarsim.papers.paper_keys import CLAIMS_FILE, PACKAGE, claim_folders, has_shipped_claims, paper_key
+from radarsim.papers.paper_keys import (
+    CLAIMS_FILE,
+    INTERPRETATIONS_FILE,
+    PACKAGE,
+    claim_folders,
+    has_shipped_claims,
+    paper_key,
+)
 from radarsim.studies import registry
 from radarsim.studies.interface import Paper, Study
 
 Declared = TypeVar("Declared")
-INTERPRETATIONS_FILE = "interpretations.yaml"
 
 
 def claims_of(study: Any) -> PaperClaims | None:

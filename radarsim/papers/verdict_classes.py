@@ -67,9 +67,10 @@ class VerdictClass:
 KnownClasses = Mapping[str, VerdictClass | None]
 
 
-def declaration_digest(choices: OpenChoices, claim: Claim) -> str:
+def declaration_digest(choices: OpenChoices | None, claim: Claim) -> str:
     """A mark of all that a verdict follows from: a claim's assertions and what measures them, and the choices that
-    affect it, with what they set; see `claim_sources`. A changed mark means another claim."""
+    affect it, with what they set (None: its paper leaves nothing open); see `claim_sources`. A changed mark means
+    another claim."""
     part_declarations = [
         [
             *(part.what, part.unit, part.statement, part.number, part.variant, part.against_print, part.asserted),
@@ -88,10 +89,10 @@ def declaration_digest(choices: OpenChoices, claim: Claim) -> str:
                 for alternative in choice.alternatives
             ),
         ]
-        for choice in choices.choices
+        for choice in (choices.choices if choices else ())
         if choice.affects(claim.id)
     ]
-    sources = package_sources(claim, choices.module)
+    sources = package_sources(claim, choices.module if choices else "")
     return digest([part_declarations, claim.judging_options, choice_declarations, sources])[:16]
 
 

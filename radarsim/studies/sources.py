@@ -25,6 +25,7 @@ from radarsim.user_code.module_sources import module_digest, module_source, modu
 
 RADARSIM = __package__.partition(".")[0]
 ENGINE = "radarsim.api.case_work", "radarsim.engine.collect"  # what takes a case through the engine
+SHIPPED = "shipped"  # the folder of a package with what is for users, such as configs
 SHOW_RESULTS = "radarsim.report", "radarsim.language", "radarsim.papers", "radarsim.extensions"
 
 _COMMENT = re.compile(r"#.*")
@@ -159,11 +160,16 @@ def _data_digests(top: str) -> dict[str, str]:
     """SHA-256 of the files of a top-level package that are no sources, by their paths in it.
 
     What it ships for users is no part of how it computes: a config counts where it is run."""
+    return {name: digest for name, digest in _file_digests(top).items() if SHIPPED not in Path(name).parts}
+
+
+def _file_digests(top: str) -> dict[str, str]:
+    """As `_data_digests`, with what it ships for users."""
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
         for folder in _folders(top)
         for path in folder.rglob("*")
-        if path.is_file() and path.suffix != ".py" and not {"__pycache__", "shipped"} & set(path.parts)
+        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
     }
 
 
@@ -180,13 +186,20 @@ def _installed_versions() -> list[tuple[str, str]]:
 
 
 @cache
-def code_digest(packages: tuple[str, ...], ignored_name: str) -> str:
-    """SHA-256 of the code of user packages and of those that they import, without comments and docstrings.
+def package_digest(packages: tuple[str, ...], ignored_name: str, ignored_files: tuple[str, ...]) -> str:
+    """SHA-256 of the code and the data of user packages and of those that they import: without comments, docstrings
+    and the YAML that they ship, such as configs.
 
-    ignored_name: of variables and attributes that do not count."""
+    ignored_name: of variables and attributes that do not count; ignored_files: names of data files."""
     first = [name for package in packages for name in (package, *_all_modules(package))]
     modules = sorted(name for name in computing_modules(tuple(first)) if name.partition(".")[0] != RADARSIM)
     texts = [f"{name}: {_plain_code(module_source(name), ignored_name)}" for name in modules]
+    for top in sorted({name.partition(".")[0] for name in modules}):
+        for name, digest in sorted(_file_digests(top).items()):
+            path = Path(name)
+            is_shipped_yaml = SHIPPED in path.parts and path.suffix in (".yaml", ".yml")
+            if not is_shipped_yaml and path.name not in ignored_files:
+                texts.append(f"{top}/{name}: {digest}")
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()
 
 

@@ -2,7 +2,9 @@
 
 import csv
 import dataclasses
+import json
 import math
+import shutil
 from types import SimpleNamespace
 
 import pytest
@@ -130,22 +132,128 @@ def edit(package, old, new):
     package.file.write_text(text.replace(old, new), encoding="utf-8")
 
 
-@pytest.mark.slow
-def test_a_class_does_not_outlive_the_edit_of_its_measure(package):
-    package.command("run", NAME, "-n", "2000", "--no-figures", "-q")
-    first = package.command("interpretations", NAME, "--no-figures").stdout
-    assert f"{NAME}.1" in first
-    before = package.command("claims", NAME, "--parts").stdout
-    assert "other interpretations not judged" not in before
-    edit(
-        package,
-        "measure: {gain: {filter: kalman, component: x}}, expected: {above: 10}",
-        "measure: {sigma: {filter: fixed, component: x, at: 1}}, expected: {above: 10}",
+GAIN = "measure: {gain: {filter: kalman, component: x}}, expected: {above: 10}"
+STUDY_FILE, CONFIG = "__init__.py", f"shipped/configs/{NAME}.yaml"
+EDITS = {  # of what: in which file, from what, to what
+    "source of the measure": (STUDY_FILE, "(value / limit for", "(2 * value / limit for"),
+    "source of a module that it calls": ("helper.py", "1.0", "2.0"),
+    "data": ("factor.txt", "1.0", "2.0"),
+    "shipped data": ("shipped/factor.txt", "1.0", "2.0"),
+    "measure": (STUDY_FILE, GAIN, GAIN.replace("gain: {", "sigma: {")),
+    "arguments": (STUDY_FILE, GAIN, GAIN.replace("component: x", "component: x, at: 1")),
+    "cases": (
+        STUDY_FILE,
+        "of: [{target.sigma_step_m: 0.5}], what: gain",
+        "of: [{target.sigma_step_m: 0.1}], what: gain",
+    ),
+    "expected": (STUDY_FILE, GAIN, GAIN.replace("10", "30")),
+    "margin": (STUDY_FILE, "{same: [1, 0.01]}", "{same: [1, 1e-12]}"),
+    "what an alternative sets": (STUDY_FILE, "sets: {target.sigma_start_m: 0}", "sets: {target.sigma_start_m: 1}"),
+    "choices": (STUDY_FILE, "- {name: hardly anything,", "- {name: nothing,"),
+    "config": (CONFIG, "scans: 30", "scans: 29"),
+}
+DOORS = f"""
+import json, sys
+import radarsim
+from radarsim.errors import RadarsimError
+
+def overall(rows):
+    return {{row["claim"]: row["overall"] for row in rows}}
+
+def claims():
+    return overall(radarsim.claims("{NAME}").rows)
+
+def loaded():
+    return overall(radarsim.load("{NAME}").tables["claims"].to_dict("records"))
+
+def reported():
+    result = radarsim.load("{NAME}", overrides={{"realisations": 1000}})
+    result.write("results", figures=False)
+    return claims()
+
+def run():
+    radarsim.run("{NAME}", realisations=1000, out="results", figures=False, replace=True)
+    return claims()
+
+shown = {{}}
+for door in claims, loaded, reported, run:
+    try:
+        shown[door.__name__] = door()
+    except RadarsimError as error:
+        shown[door.__name__] = {{}}
+json.dump(shown, sys.stdout)
+"""
+
+
+@pytest.fixture(scope="module")
+def judged_package(tmp_path_factory, warm):
+    """A folder with a package whose claims have been judged under every interpretation, and what its doors show."""
+    folder = tmp_path_factory.mktemp("judged")
+    (folder / "site").mkdir()
+    command = example_packages.beside(warm, folder / "site", folder)
+    command("new-study", NAME)
+    example_packages.installed(folder / NAME, folder / "site")
+    source = folder / NAME / "src" / NAME
+    study = source / STUDY_FILE
+    text = study.read_text(encoding="utf-8").replace(
+        "import numpy as np\n", "from pathlib import Path\n\nimport numpy as np\n", 1
     )
-    assert f"{NAME}.1 not run" in " ".join(package.command("claims", NAME).stdout.split())
-    package.command("run", NAME, "-n", "2000", "--no-figures", "-q")
-    after = package.command("claims", NAME, "--parts").stdout
-    assert f"{NAME}.1 refuted as shipped; other interpretations not judged" in " ".join(after.split())
+    text = text.replace("from radarsim", f"from {NAME} import helper\nfrom radarsim", 1)
+    factor = "helper.FACTOR"
+    for file in ("factor.txt", "shipped/factor.txt"):
+        (source / file).write_text("1.0\n")
+        factor += f" * float((Path(__file__).parent / '{file}').read_text())"
+    study.write_text(text.replace("    limit = STUDY", f"    limit = {factor} * STUDY", 1), encoding="utf-8")
+    (source / "helper.py").write_text("FACTOR = 1.0\n")
+    config = source / CONFIG
+    config.write_text(
+        config.read_text(encoding="utf-8") + "sweep: {target.sigma_step_m: [0.5, 0.1]}\n", encoding="utf-8"
+    )
+    command("run", NAME, "-n", "1000", "--no-figures", "-q")
+    command("interpretations", NAME, "--no-figures", "-q")
+    return folder
+
+
+def shown_by_the_doors(warm, folder):
+    ended = warm.run(code=DOORS, path=[folder / "site"], cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    return json.loads(ended.stdout)
+
+
+@pytest.mark.slow
+def test_unedited_claims_keep_their_class_at_every_door(warm, judged_package, tmp_path):
+    shown = shown_by_the_doors(warm, a_copy(judged_package, tmp_path))
+    assert [*shown] == ["claims", "loaded", "reported", "run"]
+    for door in ("claims", "reported", "run"):
+        assert set(shown[door].values()) == {"confirmed"}
+    assert {words.partition(" ")[0] for words in shown["loaded"].values()} == {"confirmed"}
+
+
+def a_copy(package, folder):
+    """The folder with package and results, and the package's metadata, to be edited."""
+    shutil.copytree(package, folder, symlinks=True, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / "site" / NAME).unlink()
+    (folder / "site" / NAME).symlink_to(folder / NAME / "src" / NAME)
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", EDITS)
+def test_no_door_shows_a_verdict_that_was_made_before_an_edit(warm, judged_package, tmp_path, what):
+    file, old, new = EDITS[what]
+    folder = a_copy(judged_package, tmp_path)
+    path = folder / NAME / "src" / NAME / file
+    text = path.read_text(encoding="utf-8")
+    assert text.count(old) == 1, old
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    shown = shown_by_the_doors(warm, folder)
+    edited = f"{NAME}.1" if GAIN in old or "gain" in old else f"{NAME}.2"
+    assert shown["claims"].get(edited, "not run") == "not run"
+    for door, verdicts in shown.items():
+        assert verdicts.get(edited) != "confirmed", door
+    if what in ("source of the measure", "source of a module that it calls", "data", "shipped data", "expected"):
+        assert shown["run"][edited].startswith("refuted as shipped")
+        assert not shown["loaded"][edited].startswith("confirmed")
 
 
 @pytest.mark.slow
