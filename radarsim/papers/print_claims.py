@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
-from radarsim.api import repeat_command
+from radarsim.api import configs, repeat_command
 from radarsim.cli.console import PIPED_WIDTH, print_field, print_line
 from radarsim.language.translate import join_names, plural, term, tr
 from radarsim.papers.claim_rows import (
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 Row = Mapping[str, Any]
 
 MAX_STATEMENT_WORDS = 12  # of a claim in a list
+MIN_SHOWN_MISS = 1e-3  # margins; less is rounding
 MAX_NAMED_CONFIGS = 6  # that would judge claims; of more, one line says what runs them all
 NOTHING_IS_RUN = term(
     "nothing is run here: `make reproduce-figures` runs all configs of the four papers; "
@@ -47,8 +48,9 @@ NOTHING_IS_RUN = term(
 
 def verdict_lines(result: "Result") -> list[tuple[str, str]]:
     """The claims of a run by their class over all interpretations, with those that differ as shipped."""
-    if any(case.user_filters for case in result.cases):  # the paper's claims are none of a user filter
-        return []
+    shipped = configs.shipped(configs.shipped_stem(result.experiment)) or ()
+    if any(case.user_filters for case in result.cases) and not any(case.user_filters for case in shipped):
+        return []  # the paper's claims are none of a filter that a user has added
     by_class, as_shipped = claims_by_class(result), claims_by_class(result, "as_shipped")
     lines = []
     for kind, names in by_class.items():
@@ -181,7 +183,7 @@ def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
         words.append(
             tr("{value} (exact)", value=four_digits(exact) if exact == round(exact) else format_if_known(exact))
         )
-    if miss := cell_number(row["miss"]):
+    if (miss := cell_number(row["miss"])) is not None and miss >= MIN_SHOWN_MISS:
         words.append(tr("off by {miss:.3g} margins", miss=miss))
     if row["verdict"] == NOT_JUDGED:
         words.append(translate_reason(row["why"]))

@@ -273,3 +273,9 @@ def test_claims_and_reports_are_told_to_be_of_before_only_where_they_are_of_the_
     facts["resolved"]["cases"][0]["radar"]["sigma_range_m"] = 51.0  # run before the config was changed
     record.write_text(json.dumps(facts))
     assert "verdicts of before" not in " ".join(radarsim(*interpretations).stdout.split())
+
+
+@pytest.mark.slow
+def test_a_run_says_the_verdicts_on_filters_of_python_that_a_packages_config_has(radarsim):
+    lines = radarsim("run", "upf", "-n", "100", "--no-figures").stdout.splitlines()
+    assert any(line.startswith("claims ") and "upf.1" in line for line in lines)
