@@ -316,32 +316,24 @@ class OneFile(Study):
 
     def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """σ of the leading component at the last scan, and the gain of each filter."""
-        from radarsim.report import (
-            case_selection,
-            compared_value,
-            gain_sentences,
-            key_labels,
-            sentences,
-            tables,
-            wording,
-        )
+        from radarsim.report import case_selection, compared_value, gain_sentences, key_labels, sentences, tables
 
         leading = self.components[0]
-        last = tables.select_rows(tables_by_name["last"], case=result.name, component=leading.name)
-        keys: tuple[str, ...] = ("last_sigma", "last_lo", "last_hi")
-        sigmas = [
-            f"{row['filter']} {wording.estimate((row[key] for key in keys), key_labels.unit_label(row['unit']))}"
-            for row in last.to_dict("records")
+        curves = tables.select_rows(tables_by_name["curves"], case=result.name, component=leading.name)
+        last = [row for _, row in curves[curves["k"] == curves["k"].max()].iterrows()]
+        sigmas = [compared_value.sigma_value(row, tables_by_name) for row in last]
+        texts = [
+            f"{row['filter']} {sigma.text(key_labels.unit_label(row['unit']))}"
+            for row, sigma in zip(last, sigmas, strict=True)
         ]
         text = tr(
             "σ of the {quantity} after {t:g} s: {filters}.",
             quantity=self._term(leading.words or leading.name),
             t=float(result.axes.t_s[-1]),
-            filters=join_names(sigmas),
+            filters=join_names(texts),
         )
-        yield sentences.Sentence(
-            case_selection.after_swept_values(result, text), sentences.intervals("last", "last", last)
-        )
+        intervals = tuple(interval for sigma in sigmas for interval in sigma.intervals)
+        yield sentences.Sentence(case_selection.after_swept_values(result, text), intervals)
         gains = tables.select_rows(tables_by_name["gains"], case=result.name, component=leading.name)
         gains = gains[gains["k"] == gains["k"].max()]
         if len(gains):

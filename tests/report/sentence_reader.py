@@ -97,7 +97,8 @@ def derived_columns(tables, results=()) -> Iterator[Table]:
     parts = [base * (1 - paired[name].to_numpy(float) / 100) for name in ("gain_percent", "gain_hi", "gain_lo")]
     yield Table("paired σ", *parts, np.full(len(paired), np.nan), paired)
     for result in results if "stages" in tables else ():
-        yield _paired_stages(result)
+        if len(result.axes.filters) > 1:
+            yield _paired_stages(result)
 
 
 def _paired_stages(result) -> Table:

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from radarsim.api import result_content
+from radarsim.api.configs import load
 from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.language import current
@@ -24,12 +25,13 @@ ODD = {
 
 
 def faults_of(result):
-    """Faults of all sentences of an answer, in every language, and how many numbers were read."""
+    """Faults of all sentences of an answer and its captions, in every language, and how many numbers were read."""
     faults, count, derived = [], 0, list(derived_columns(result._tables, result.cases))
     for code in current.language_codes():
         with current.use_language(code):
             texts, names = result_content.make_answer(result.cases, result._tables).texts, names_of(result.cases, code)
-        for text in texts:
+            figures = result_content.case_figures(result.cases, result._tables, result.experiment).values()
+        for text in (*texts, *(figure.caption for figure in figures)):
             reading = read_sentence(text, result._tables, code, derived, names)
             faults += [f"{code}: {text}: {fault}" for fault in reading.faults]
             count += len(reading.read)
@@ -86,6 +88,39 @@ def test_odd_variants_contradict_no_table(odd):
     faults, count = faults_of(run(config, realisations=200, overrides=overrides))
     assert faults == []
     assert count or odd == "equal"
+
+
+ODD_OF_STUDIES = {  # of the first config of each part; keys of odd values, and values to sweep
+    "multimodel_1hz": {"scans": 4, "sensor.detection_probability": 0.3},
+    "multimodel_families_1hz": {"sweep": {"sensor.detection_probability": [0.5, 1]}},
+    "sonar_smoothing": {"scans": 4, "sensor.detection_probability": 0.3},
+    "sonar_missed": {"sweep": {"sensor.detection_probability": [0.3, 1]}},
+    "sonar_manoeuvre": {"scans": 40},
+    "sonar_clutter": {"sensor.detection_probability": 0.3},
+    "ambiguous_rls2": {"scans": 2, "radar.detection_probability": 0.3},
+    "orders": {"scans": 4},
+    "pulses_rls2": {"scans": 4, "sweep": {"radar.sigma_range_m": [100, 400]}},
+    "discriminator_rival": {"sweep": {"truth.amplitude": [1, 2]}},
+}
+
+
+def odd_filters(config):
+    """Filters, or estimators, of a config in another order, twice the same, and one alone; its last as the baseline."""
+    spec = load(config).cases[0].spec
+    key = "estimators" if hasattr(spec, "estimators") else "filters"
+    filters = [one.model_dump(mode="json", exclude_unset=True) for one in getattr(spec, key)]
+    yield {key: filters[::-1]}
+    yield {key: [{**filters[0], "name": name} for name in "AB"]}
+    yield {key: filters[:1]}
+    if key == "filters":
+        yield {"baseline": filters[-1]["name"]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", ODD_OF_STUDIES)
+def test_odd_variants_of_every_study_contradict_no_table(config):
+    for overrides in (*odd_filters(config), *({key: odd} for key, odd in ODD_OF_STUDIES[config].items())):
+        assert faults_of(run(config, realisations=60, overrides=overrides))[0] == [], overrides
 
 
 @pytest.mark.slow

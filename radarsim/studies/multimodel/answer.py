@@ -122,16 +122,23 @@ def _stage_label(results: Sequence[CaseResult], row: "pd.Series[Any]") -> str:
 
 
 def _least_sigma(result: CaseResult, stages: "pd.DataFrame", component: str, quantity: str) -> Sentence:
-    """The filter of the least σ in each stage, with the interval, and those that noise alone places behind it."""
+    """The filter of the least σ in each stage, with the interval, and those that noise alone places behind it.
+
+    Equal filters are not ranked, and no noise has chosen among them."""
     rows = tables.select_rows(stages, case=result.name, component=component)
     best = rows.loc[rows.groupby("stage", sort=False)["sigma"].idxmin()]
-    looks = rows["filter"].nunique()
+    looks = int(rows["sigma"].map("{:.9g}".format).groupby(rows["stage"]).nunique().max())
     clauses = [
         f"{tr(str(row['stage']))}: {stage_ranking.least_filters(result, rows, row)}, {_least_sigma_text(row, looks)}"
         for _, row in best.iterrows()
     ]
     remark = compared_value.row_value(best.iloc[0]).chosen_among(looks).choice_remark()
-    text = tr("Least σ of {quantity} by stage: {stages}.", quantity=quantity, stages="; ".join(clauses) + remark)
+    fields = {"quantity": quantity, "stages": "; ".join(clauses) + remark}
+    text = (
+        tr("Least σ of {quantity} by stage: {stages}.", **fields)
+        if looks > 1
+        else tr("σ of {quantity} by stage: {stages}.", **fields)
+    )
     return Sentence(case_selection.after_swept_values(result, text), sentences.intervals("stages", "sigma", best))
 
 

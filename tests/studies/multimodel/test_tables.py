@@ -170,6 +170,9 @@ def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
         "Least σ of the height by stage: start: a = same (not distinguished from it: near), 10 m"
     )
 
+    sentence, *_ = answer_texts(answer, [case], {"stages": stages[:2]})
+    assert sentence == "σ of the height by stage: start: a = same, 10 m [1, 99]."  # nothing is least
+
 
 def test_answer_on_several_cases_is_one_sentence(monkeypatch):
     """Of the filters that all cases have; one that is best everywhere is never above the least."""
