@@ -63,7 +63,8 @@ def files_of(folder):
 
 def test_a_result_is_computed_again_from_its_folder_alone(config, tmp_path, monkeypatch):
     drawn = config.stem == "boat"
-    ran = radarsim.run(config, overrides=["radar.sigma_range_m=20"], seed=5, out=tmp_path / "out", figures=drawn)
+    overrides = ["radar.sigma_range_m=20", "figures=[sigma_r]"]
+    ran = radarsim.run(config, overrides=overrides, seed=5, out=tmp_path / "out", figures=drawn)
     moved = tmp_path / "elsewhere" / "a folder"
     shutil.copytree(ran.written.folder, moved)
     shutil.rmtree(config.parent)
@@ -76,7 +77,7 @@ def test_a_result_is_computed_again_from_its_folder_alone(config, tmp_path, monk
 
 
 def test_no_file_of_a_result_names_folders_of_the_author(config, tmp_path):
-    ran = radarsim.run(config, out=tmp_path / "out", figures=config.stem == "boat")
+    ran = radarsim.run(config, overrides=["figures=[sigma_r]"], out=tmp_path / "out", figures=config.stem == "boat")
     for path in ran.written.folder.rglob("*"):
         assert path.is_dir() or str(tmp_path).encode() not in path.read_bytes(), path
 
@@ -113,7 +114,7 @@ def test_values_keep_the_words_and_units_of_the_user(tmp_path):
 
 
 def test_data_files_go_with_the_config(tmp_path, monkeypatch):
-    ran = radarsim.run("multimodel_recorded", realisations=200, out=tmp_path / "out", figures=False)
+    ran = radarsim.run("multimodel_recorded", realisations=20, out=tmp_path / "out", figures=False)
     assert (ran.written.folder / "recorded.csv").is_file()
     shutil.copytree(ran.written.folder, tmp_path / "copy")
     again = radarsim.run(tmp_path / "copy", out=tmp_path / "again", figures=False)

@@ -50,6 +50,8 @@ class SeedRecorder:
             if name.partition(".")[0] in ("numpy", "torch", "jax") and name not in SEEDING:
                 continue
             names = getattr(module, "__dict__", {})
+            if replacements.keys().isdisjoint(map(id, list(names.values()))):  # as nearly all of a thousand modules
+                continue
             for key, value in [(key, value) for key, value in list(names.items()) if id(value) in replacements]:
                 changed.append((names, key, value))
                 names[key] = replacements[id(value)][1]
