@@ -91,6 +91,7 @@ at_options = (
 @command_group.main.command(cls=QuantityCommand)
 @options.config_argument
 @click.argument("key", metavar="KEY")
+@options.phrase_option
 @click.option("--filter", "filter_name", metavar="NAME", help="The filter, if there are several.")
 @at_options[0]
 @at_options[1]
@@ -105,15 +106,17 @@ at_options = (
 def solve(config: str, key: str, filter_name: str | None, as_json: bool, **values: Any) -> None:
     """Find the value of KEY at which a quantity reaches a target.
 
-    KEY is any key that holds a number, by its dotted path as for --set; a bare filter key applies to all filters. If
-    the quantity is known exactly (linear filters), the answer is exact. Otherwise each value is simulated with the same
-    noise, and the answer has a 95 % interval. If the target is not attainable, the nearest attainable value is printed
-    and the exit code is 3. A positive key is searched from a thousandth to a thousand times its value, unless --between
-    is given.
+    The quantity is said by --for, or by an option of its own with --at. KEY is any key that holds a number, by its
+    dotted path as for --set; a bare filter key applies to all filters. If the quantity is known exactly (linear
+    filters), the answer is exact. Otherwise each value is simulated with the same noise, and the answer has a 95 %
+    interval. If the target is not attainable, the nearest attainable value is printed, and that of the long run;
+    the exit code is 3. A positive key is searched from a thousandth to a thousand times its value, unless --between is
+    given.
 
     \b
     Examples
-      radarsim solve rls2 radar.sigma_velocity_mps --gain r --filter r+Vr --at 60 --equals 30
+      radarsim solve rls2 radar.sigma_velocity_mps --for "gain r at 60 s" --filter r+Vr --equals 30
+      radarsim solve rls2 radar.sigma_velocity_mps --for "sigma r in the long run" --filter r+Vr --equals 120
       radarsim solve rls2 radar.scan_period_s --sigma Vr --filter r --at 60 --equals 5
       radarsim solve discriminator burst.noise_variance --lock sequence --equals 95 -n 1000
       radarsim solve sonar_clutter sensor.detection_probability --loss nearest --equals 5 --between 0.6 1 \\
@@ -140,13 +143,7 @@ def solve(config: str, key: str, filter_name: str | None, as_json: bool, **value
 @command_group.main.command()
 @options.config_argument
 @click.option("--filter", "filter_name", metavar="NAME", help="The filter, if there are several.")
-@click.option(
-    "--for",
-    "quantity",
-    required=True,
-    metavar="TEXT",
-    help="Quantity, as in 'sigma r at 60 s', 'gain r', 'lock at k 6'.",
-)
+@options.required_phrase_option
 @click.option(
     "--free",
     multiple=True,
@@ -166,9 +163,7 @@ def solve(config: str, key: str, filter_name: str | None, as_json: bool, **value
 @options.threads_option
 @click.option("--write", metavar="FILE.yaml", help="Also write a config with the tuned values.")
 @options.json_option
-def tune(
-    config: str, filter_name: str | None, quantity: str, write: str | None, as_json: bool, **arguments: Any
-) -> None:
+def tune(config: str, filter_name: str | None, wanted: str, write: str | None, as_json: bool, **arguments: Any) -> None:
     """Find the best values of a filter's keys, and the gain.
 
     The quantity is one of `radarsim solve`. Over several cases the root of the mean of σ², or the mean of a rate, is
@@ -179,7 +174,7 @@ def tune(
     \b
     Examples
       radarsim tune rls2 --filter r+Vr --for "sigma r at 60 s" --over turn --over jerk_pulse
-      radarsim tune rls2_manoeuvres --filter r+Vr --for "sigma r" --free manoeuvre_variance --free initial_scans=2:7
+      radarsim tune rls2_manoeuvres --filter r+Vr --for "worst sigma r" --free initial_scans=2:7
       radarsim tune multimodel --filter MMA2-11 --for "sigma y at 60 s" --free models -n 500
     """
     from radarsim.api import json_output, new_configs
@@ -193,7 +188,7 @@ def tune(
     with cli_progress.Progress(config, quiet=as_json) as progress:
         notify = None if as_json else console.print_error_line
         arguments |= {"filter": filter_name, "progress": progress.update, "notify": notify}
-        result = design_tune.tune(config, quantity, **arguments)
+        result = design_tune.tune(config, wanted, **arguments)
     if as_json:
         click.echo(json_output.text(json_output.tuning(result)))
     else:
@@ -238,6 +233,7 @@ def chart(configs: tuple[str, ...], drawing: options.Drawing, as_json: bool, **a
 
 @command_group.main.command()
 @options.config_argument
+@options.phrase_option
 @at_options[0]
 @at_options[1]
 @click.option("--of", metavar="NAME", help="Quantity (`radarsim solve --help` lists them); default: σ and gain.")
@@ -261,7 +257,7 @@ def sensitivity(config: str, drawing: options.Drawing, as_json: bool, **argument
     \b
     Examples
       radarsim sensitivity rls2
-      radarsim sensitivity rls2 --at 60 --component Vr
+      radarsim sensitivity rls2 --for "sigma Vr at 60 s"
       radarsim sensitivity discriminator --of lock -n 2000
     """
     from radarsim.api import json_output

@@ -187,6 +187,12 @@ threads_option = click.option(
     is_eager=True,
     help="Number of threads; default: all cores. 0: no further thread is started.",
 )
+PHRASE_HELP = (
+    "What is asked: 'sigma r at 60 s', 'worst sigma r' (from the manoeuvre on, or once settled), 'mean sigma r from 60 "
+    "s', 'sigma r in the long run', 'gain of Vr at the end', 'lock at k 6'."
+)
+phrase_option = click.option("--for", "wanted", metavar="TEXT", help=PHRASE_HELP)
+required_phrase_option = click.option("--for", "wanted", metavar="TEXT", required=True, help=PHRASE_HELP)
 quantity_option = click.option(
     "--of",
     metavar="NAME",

@@ -23,12 +23,7 @@ if TYPE_CHECKING:
     type=click.Choice(["tuned"]),
     help="Also judge it against the config's filters as `radarsim tune` tunes them.",
 )
-@click.option(
-    "--for",
-    "tuned_quantity",
-    metavar="TEXT",
-    help="What the answer is about, and what they are tuned for; default: as the study's own answer.",
-)
+@options.phrase_option
 @options.realisations_option
 @options.seed_option
 @options.set_option
@@ -45,7 +40,7 @@ def judge(
     estimates: str,
     name: str,
     against: str | None,
-    tuned_quantity: str | None,
+    wanted: str | None,
     realisations: int | None,
     seed: int | None,
     overrides: tuple[str, ...],
@@ -89,12 +84,9 @@ def judge(
         from radarsim.api import load_experiments, precision_target
 
         (loaded,) = load_experiments.load_all([config], load_experiments.combine_overrides(overrides, None, seed))
-        tuned: dict[str, Any] = {"against": against, "wanted": tuned_quantity}
+        tuned: dict[str, Any] = {"against": against, "wanted": wanted}
         option_words = [
-            word
-            for option, value in (("--against", against), ("--for", tuned_quantity))
-            if value
-            for word in (option, value)
+            word for option, value in (("--against", against), ("--for", wanted)) if value for word in (option, value)
         ]
         experiment, warnings = api_judge.add_user_filter(loaded, estimates, name, realisations=realisations, **tuned)
         if precision is not None:

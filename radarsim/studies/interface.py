@@ -115,6 +115,19 @@ class Study(ABC):
         Raises ConfigError where the whole case is impossible."""
         return case
 
+    def counted_from_s(self, case: "Case", component: str | None) -> float | None:
+        """The time, s, from which on a worst or a mean error counts: that of a manoeuvre, or at which filters have
+        settled. Default: None, from the first estimate on."""
+        return None
+
+    def in_the_long_run(self, case: "Case") -> "Case | None":
+        """A case whose last scan is that of the same filters once settled, without a manoeuvre. Default: None."""
+        return None
+
+    def steady_sigma(self, case: "Case") -> "np.ndarray | None":
+        """The exact σ (F, C) of a case's filters in the long run, without a manoeuvre. Default: None."""
+        return None
+
     def exact_but_for(self, case: "Case") -> str:
         """A qualification of a case's exact values, as text, where they are approximate in the digits printed.
 

@@ -23,7 +23,7 @@ from tests.tolerances import Z, assert_rounded, mean_error, recursion_rounding, 
 
 def solve(config, key, wanted, equals, **given):
     """`radarsim.solve` for a quantity in one piece."""
-    name, chosen, component, at_s, at_k = wanted
+    name, chosen, component, at_s, at_k = wanted[:5]
     own = {"filter": chosen, name: component} if component else {name: chosen}
     return radarsim.solve(config, key, equals=equals, at_s=at_s, at_k=at_k, **own, **given)
 

@@ -8,10 +8,9 @@ import pytest
 import radarsim
 from radarsim.api.configs import load
 from radarsim.api.design import tuning_space
-from radarsim.api.design.quantities import QuantityName, check_quantity, exact_value, plan_labels
+from radarsim.api.design.quantities import QuantityName, check_quantity, exact_value, parse_quantity, plan_labels
 from radarsim.api.design.solve import solve
 from radarsim.api.design.tune import tune
-from radarsim.api.design.tuning_space import parse_target
 from radarsim.errors import ConfigError
 from radarsim.studies import registry
 from tests.api import matched_world, test_judge
@@ -353,7 +352,7 @@ def test_the_command_prints_and_writes(tmp_path):
     ],
 )
 def test_what_is_wanted_is_read_from_text(text, asked):
-    assert parse_target(text, "f") == asked
+    assert parse_quantity(text, "f") == asked
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.config.find_files import did_you_mean
+from radarsim.config.quantity_phrase import Over, PhraseError, parse_phrase
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import term, tr
@@ -23,19 +24,37 @@ if TYPE_CHECKING:
 
 
 UNKNOWN_ESTIMATE = Estimate(np.nan, np.nan, np.nan)
+OVER_TEXTS = {  # by what is taken, and whether a time is given
+    ("worst", True): term("worst {what} from {t_s:g} s on"),
+    ("worst", False): term("worst {what}"),
+    ("mean", True): term("mean {what} from {t_s:g} s on"),
+    ("mean", False): term("mean {what}"),
+}
 UNPAIRED_FACTOR = 4  # factor on the realisations where a change moves the scans, so that the noise is not common
 
 
 class QuantityName(NamedTuple):
     """A quantity as a user names it: the names of the quantity, of the filter and of the component.
 
-    A quantity over scans is taken at time at_s, linear between two scans, or at scan at_k; by default at the last."""
+    A quantity over scans is taken at time at_s, linear between two scans, or at scan at_k; by default at the last. over
+    and from_s: as in `QuantityPhrase`."""
 
     name: str
     filter: str | None = None
     component: str | None = None
     at_s: float | None = None
     at_k: int | None = None
+    over: Over = "at"
+    from_s: float | None = None
+
+
+def parse_quantity(text: str, filter_name: str | None) -> QuantityName:
+    """The quantity named by a phrase such as `sigma r at 60 s`. Raises ConfigError."""
+    try:
+        phrase = parse_phrase(text)
+    except PhraseError as error:
+        raise ConfigError(f"{argument('wanted', '--for')}: {error}") from None
+    return QuantityName(filter=filter_name, **phrase._asdict())
 
 
 @dataclass(frozen=True)
@@ -47,6 +66,13 @@ class MeasuredQuantity:
     component: str | None = None
     at_s: float | None = None
     at_k: int | None = None
+    over: Over = "at"
+    from_s: float | None = None
+
+    @property
+    def is_over_scans(self) -> bool:
+        """Whether it is the worst or the mean of several scans."""
+        return self.over in ("worst", "mean")
 
     @property
     def words(self) -> str:
@@ -54,7 +80,10 @@ class MeasuredQuantity:
         component_words = f" in {self.definition.place(self.component)}" if self.component else ""
         time_words = f" at {self.at_s:g} s" if self.at_s is not None else ""
         time_words = f" at k = {self.at_k}" if self.at_k is not None else time_words
-        return f"{self.definition.words} of {self.filter}{component_words}{time_words}"
+        time_words = f" from {self.from_s:g} s on" if self.from_s else time_words
+        time_words = " in the long run" if self.over == "long run" else time_words
+        over_words = f"{self.over} " if self.is_over_scans else ""
+        return f"{over_words}{self.definition.words} of {self.filter}{component_words}{time_words}"
 
     @property
     def translated_words(self) -> str:
@@ -64,6 +93,10 @@ class MeasuredQuantity:
         subject = (
             tr("{kind} of {filter} in {component}", **fields) if self.component else tr("{kind} of {filter}", **fields)
         )
+        if self.is_over_scans:
+            return tr(OVER_TEXTS[self.over, bool(self.from_s)], what=subject, t_s=self.from_s or 0.0)
+        if self.over == "long run":
+            return tr("{what} in the long run", what=subject)
         if self.at_k is not None:
             return tr("{what} at k = {k}", what=subject, k=str(self.at_k))
         return subject if self.at_s is None else tr("{what} at {t_s:g} s", what=subject, t_s=self.at_s)
@@ -77,11 +110,22 @@ class Series(NamedTuple):
     values: Estimate
 
 
+def parse_request(text: str, filter_name: str | None, at_s: float | None, at_k: int | None) -> QuantityName:
+    """The quantity named by a phrase beside options for the time, of which one may say it. Raises ConfigError."""
+    request = parse_quantity(text, filter_name)
+    if (at_s, at_k) == (None, None):
+        return request
+    if (request.over, request.at_s, request.at_k) != ("at", None, None):
+        option = argument("at_s", "--at") if at_k is None else argument("at_k", "--at-k")
+        raise ConfigError(f"{option}: the time stands in {argument('wanted', '--for')} already: {text!r}")
+    return request._replace(at_s=at_s, at_k=at_k)
+
+
 def check_quantity(request: QuantityName, case: Case, user_filters: Sequence[str] = ()) -> MeasuredQuantity:
     """Check a request before anything is prepared. Raises ConfigError for an unknown quantity or filter.
 
     user_filters: names of the config's filters that are written in Python; the case does not hold them."""
-    name, filter_name, component, at_s, at_k = request
+    name, filter_name, component, at_s, at_k, over, from_s = request
     definition = registry.quantity(name, case)
     if not definition.per:
         if filter_name is not None and component is not None:
@@ -98,7 +142,9 @@ def check_quantity(request: QuantityName, case: Case, user_filters: Sequence[str
                 f"only those of {', '.join(filter_names)}"
             )
         check_name(filter_name, filter_names)
-    return MeasuredQuantity(definition, filter_name, component, at_s, at_k)
+    if over in ("worst", "mean") and from_s is None:
+        from_s = registry.study(case.study).counted_from_s(case, component)
+    return MeasuredQuantity(definition, filter_name, component, at_s, at_k, over, from_s)
 
 
 def check_name(name: str, names: Sequence[str], item: str = "filter") -> None:
@@ -137,7 +183,22 @@ def unit(quantity: MeasuredQuantity, axes: Axes) -> str:
 
 def shorten_case(quantity: MeasuredQuantity, case: Case) -> Case:
     """The case shortened to the scans that a quantity needs. Raises ConfigError where the whole case is invalid."""
+    if quantity.over == "long run" and registry.study(case.study).steady_sigma(case) is not None:
+        return registry.study(case.study).shortened(case, None, 1)
+    if quantity.over != "at":
+        return case_read(quantity, case)
     return registry.study(case.study).shortened(case, quantity.at_s, quantity.at_k)
+
+
+def case_read(quantity: MeasuredQuantity, case: Case) -> Case:
+    """The case in which a quantity is read: of the long run one that lasts until its filters have settled, without a
+    manoeuvre. Raises ConfigError where a study has none."""
+    if quantity.over != "long run":
+        return case
+    long_case = registry.study(case.study).in_the_long_run(case)
+    if long_case is None:
+        raise ConfigError(f"{case.name}: in the long run: study {case.study} knows none of it; give a time")
+    return long_case
 
 
 def plan_labels(quantity: MeasuredQuantity, case: Case) -> Axes:
@@ -159,6 +220,8 @@ def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
         return np.nan
     f = axes.filters.index(str(quantity.filter))
     c = [name for name, _ in axes.components].index(str(quantity.component))
+    if quantity.over == "long run" and (sigma := registry.study(case.study).steady_sigma(case)) is not None:
+        return _steady_value(quantity, sigma[:, c], f, axes.baseline)
     available = axes.available[f, :, c]
     if quantity.definition.paired:
         if f == axes.baseline:
@@ -168,6 +231,13 @@ def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
     values = np.where(available, exact_values[f, :, c], np.nan)
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
     return float(estimate_at(quantity, Series(k, t_s, Estimate(values, values, values))).value)
+
+
+def _steady_value(quantity: MeasuredQuantity, sigma: np.ndarray, f: int, baseline: int | None) -> float:
+    """σ of filter f, or its gain, from σ (F,) of all."""
+    if not quantity.definition.paired:
+        return float(sigma[f])
+    return np.nan if baseline in (None, f) else float(100 * (1 - sigma[f] / sigma[baseline]))
 
 
 def sampled_value(quantity: MeasuredQuantity, result: CaseResult) -> tuple[Estimate, float]:
@@ -228,6 +298,9 @@ def interval_note(quantity: MeasuredQuantity, result: CaseResult) -> str:
     rows = table[table["filter"] == quantity.filter]
     if quantity.component is not None:
         rows = rows[rows[quantity.definition.per].astype(str) == quantity.component]
+    if quantity.is_over_scans and "t_s" in rows:
+        rows = rows[rows["t_s"] >= (quantity.from_s or 0.0)]
+        return next(filter(None, rows["note"]), "")
     if quantity.at_k is not None:
         rows = rows[rows["k"] == quantity.at_k]
     elif quantity.at_s is not None and "t_s" in rows:
@@ -237,9 +310,10 @@ def interval_note(quantity: MeasuredQuantity, result: CaseResult) -> str:
 
 
 def scan_number(quantity: MeasuredQuantity, axes: Axes) -> int:
-    """The scan at which a quantity is read for its time, the later of two; 0 where the scan number is given."""
+    """The scan at which a quantity is read for its time, the later of two; 0 where the scan number is given, and over
+    several scans."""
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
-    if quantity.at_k is not None or not len(k):
+    if quantity.at_k is not None or quantity.over != "at" or not len(k):
         return 0
     last = len(k) - 1
     return int(k[last if quantity.at_s is None else min(int(np.searchsorted(t_s, quantity.at_s * (1 - 1e-12))), last)])
@@ -251,9 +325,16 @@ def estimate_at(quantity: MeasuredQuantity, series: Series) -> Estimate:
     k, t_s, values = series
     if not len(k):
         return UNKNOWN_ESTIMATE
+    if not k.any() and quantity.over != "at":
+        raise ConfigError(
+            f"{argument('wanted', '--for')}: the {quantity.definition.words} has one value, not one a scan: "
+            f"leave {quantity.over!r} out"
+        )
     if not k.any() and (quantity.at_s, quantity.at_k) != (None, None):
         option = argument("at_s", "--at") if quantity.at_k is None else argument("at_k", "--at-k")
         raise ConfigError(f"{option}: the {quantity.definition.words} has one value, not one a scan: leave it out")
+    if quantity.is_over_scans:
+        return _over_scans(quantity, series)
     if quantity.at_k is not None:
         if quantity.at_k > k[-1] or quantity.at_k < 1:
             option = argument("at_k", "--at-k")
@@ -271,3 +352,22 @@ def estimate_at(quantity: MeasuredQuantity, series: Series) -> Estimate:
     if len(matches_of_time):
         return Estimate(*(float(column[matches_of_time[0]]) for column in values))
     return Estimate(*(float(np.interp(quantity.at_s, t_s, column)) for column in values))
+
+
+def _over_scans(quantity: MeasuredQuantity, series: Series) -> Estimate:
+    """The worst or the mean of a series over the scans that count; of a mean the ends are means too, as if all erred
+    together. Raises ConfigError for a time beyond the run."""
+    from_s = quantity.from_s or 0.0
+    if not 0 <= from_s <= series.t_s[-1] * (1 + 1e-12):
+        raise ConfigError(
+            f"{argument('wanted', '--for')}: from must be from 0 to {series.t_s[-1]:g} s, the last scan's time, "
+            f"got {from_s:g}"
+        )
+    counted = np.flatnonzero((series.t_s >= from_s * (1 - 1e-12)) & ~np.isnan(series.values.value))
+    if not len(counted):
+        return UNKNOWN_ESTIMATE
+    columns = [np.asarray(column, dtype=float)[counted] for column in series.values]
+    if quantity.over == "mean":
+        return Estimate(*(float(column.mean()) for column in columns))
+    worst = int(columns[0].argmin() if quantity.definition.more_is_better else columns[0].argmax())
+    return Estimate(*(float(column[worst]) for column in columns))

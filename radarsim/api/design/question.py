@@ -135,6 +135,7 @@ class Question:
     unit: str
     overrides: tuple[str, ...]
     realisations: int | None = None
+    last_s: float | None = None
 
     def command(self, value: float) -> str:
         """The run that confirms a value, with independent noise and the requested number of realisations, in a
@@ -290,7 +291,8 @@ class Curve:
         return quantities.sampled_value(self.quantity, result)
 
     def _result(self, case: Case, realisations: int) -> CaseResult:
-        case = replace(case, further_baselines=())  # a question is of gains against the first
+        # A question is of gains against the first baseline.
+        case = replace(quantities.case_read(self.quantity, case), further_baselines=())
         work = CaseWork(case)
         return case_result(case, work, collect(work, realisations, threads=self.threads))
 
@@ -360,6 +362,7 @@ def make_answer(
         high=question.search_range.high,
         command=question.command(confirmed_value),
         notes=notes,
+        last_s=question.last_s,
     )
 
 

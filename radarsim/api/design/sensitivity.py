@@ -28,11 +28,12 @@ from radarsim.api.load_experiments import combine_overrides
 from radarsim.config import numeric_keys
 from radarsim.config.experiment import Case
 from radarsim.config.labels import Label, label
+from radarsim.config.quantity_phrase import Over
 from radarsim.config.study_keys import StudyKeys
 from radarsim.engine.collect import collect
 from radarsim.engine.results import Axes, CaseResult
-from radarsim.errors import ConfigError
-from radarsim.language.translate import tr
+from radarsim.errors import ConfigError, argument
+from radarsim.language.translate import term, tr
 from radarsim.report import atomic_files, csv_text
 from radarsim.report import tables as common
 from radarsim.report.drawing.model import Figure
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 
 CHANGE = 0.1
 FOLDER = "sensitivity"
+SPAN_TEXTS = {"worst": term("at its worst from {t_s:g} s on"), "mean": term("on average from {t_s:g} s on")}
 LABELS = ("case", "filter", "component", "unit", "key", "value", "changed_value")
 
 
@@ -119,6 +121,7 @@ class Sensitivity(Displayable):
 def sensitivity(
     config: Config,
     *,
+    wanted: str | None = None,
     at_s: float | None = None,
     at_k: int | None = None,
     of: str | None = None,
@@ -134,9 +137,10 @@ def sensitivity(
 ) -> Sensitivity:
     """Show what +10 % of each key changes in σ and gain, or in another quantity `of`; largest effect first.
 
-    Taken at time at_s, s, or at scan at_k, counted from 1; default: the last scan. Rows are sorted by `component`, by
-    default the first. `table` has a row for each key, filter and component: the value, in the component's unit or per
-    cent, and its change, in per cent or points, with a 95 % interval if simulated. out: directory for table and figure.
+    wanted says quantity, component and scans in one, as in `tune`: `"worst sigma r from 60 s"`. Otherwise taken at time
+    at_s, s, or at scan at_k, counted from 1; default: the last scan. Rows are sorted by `component`, by default the
+    first. `table` has a row for each key, filter and component: the value, in the component's unit or per cent, and its
+    change, in per cent or points, with a 95 % interval if simulated. out: directory for table and figure.
     Raises ConfigError.
 
     >>> found = sensitivity("rls2", at_s=60)
@@ -148,6 +152,15 @@ def sensitivity(
         overrides, out=out, figures=figures, width_mm=width_mm, **scan_options(at_s, at_k)
     )
     cases, count = Cases(config, combine_overrides(checked, None, seed), case), arguments.whole_number(realisations)
+    over: Over = "at"
+    from_s = None
+    if wanted is not None:
+        if of is not None or component is not None:
+            option = argument("of", "--of") if of is not None else argument("component", "--component")
+            raise ConfigError(f"{option}: stands in {argument('wanted', '--for')} already: {wanted!r}")
+        of, _, component, at_s, at_k, over, from_s = quantities.parse_request(wanted, None, at_s, at_k)
+        if over in ("worst", "mean") and from_s is None:
+            from_s = registry.study(cases.base.study).counted_from_s(cases.base, component)
     definitions = _definitions(of, cases.base)
     is_planned = quantities.is_planned(definitions[0])
     if is_planned:
@@ -159,9 +172,9 @@ def sensitivity(
     quantities.check_name(leading, [name for name, _ in components], definitions[0].per or "component")
     study = registry.study(cases.base.study)
     axes = study.prepare(cases.base).axes
-    if study.exact_errors and is_planned and at_s is None and at_k is None:
+    if study.exact_errors and is_planned and over == "at" and at_s is None and at_k is None:
         at_s = float(axes.t_s[-1])
-    quantity = MeasuredQuantity(definitions[0], at_s=at_s, at_k=at_k)
+    quantity = MeasuredQuantity(definitions[0], at_s=at_s, at_k=at_k, over=over, from_s=from_s)
     sample = SensitivitySample(quantity, definitions, axes, components, count or cases.base.realisations)
     base = sample.case_values(cases.base)
     if not np.isfinite(base.all_realisations[0]).any():
@@ -272,6 +285,10 @@ def changed_case(cases: Cases, key: numeric_keys.NumericKey) -> tuple[float, Cas
 
 def scan_text(quantity: MeasuredQuantity) -> str:
     """The time or scan, in words."""
+    if quantity.over == "long run":
+        return tr("in the long run")
+    if quantity.is_over_scans:
+        return tr(SPAN_TEXTS[quantity.over], t_s=quantity.from_s or 0.0)
     if quantity.at_k is not None:
         return tr("at k = {k}", k=str(quantity.at_k))
     return tr("at the last scan") if quantity.at_s is None else tr("at {t_s:g} s", t_s=quantity.at_s)
@@ -326,8 +343,9 @@ class SensitivitySample:
             False,
         )
         if not quantities.is_planned(self.quantity.definition):
-            work = CaseWork(case)
-            result = case_result(case, work, collect(work, 1))
+            read = quantities.case_read(self.quantity, case)
+            work = CaseWork(read)
+            result = case_result(read, work, collect(work, 1))
             exact_values = self._result_values(result, exact_only=True)
             without_ends = self.quantity.definition.ends[0] not in quantities.quantity_table(
                 self.quantity.definition, result
@@ -349,7 +367,9 @@ class SensitivitySample:
         return np.array(values).reshape(len(self.definitions), len(self.axes.filters), len(self.components))
 
     def _sampled(self, case: Case) -> QuantityArrays:
-        total_values, batch_values, axes = leave_one_out(case, self._result_values, self.realisations)
+        total_values, batch_values, axes = leave_one_out(
+            quantities.case_read(self.quantity, case), self._result_values, self.realisations
+        )
         return QuantityArrays(total_values, np.stack(batch_values, axis=1), np.asarray(axes.t_s))
 
     def _result_values(self, result: CaseResult, exact_only: bool = False) -> np.ndarray:

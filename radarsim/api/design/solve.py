@@ -5,11 +5,12 @@ the same noise at every value (`sampled_solve`)."""
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from radarsim.api import arguments, configs
 from radarsim.api.configs import Config
-from radarsim.api.design import quantities, root_search
+from radarsim.api.design import quantities, root_search, solve_answer
 from radarsim.api.design.quantities import QuantityName
 from radarsim.api.design.question import (
     JUMP_NOTE,
@@ -34,6 +35,7 @@ from radarsim.api.design.sampled_solve import solve_by_sampling
 from radarsim.api.design.solve_answer import Answer
 from radarsim.api.load_experiments import combine_overrides
 from radarsim.config import numeric_keys
+from radarsim.config.labels import label
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import tr
 from radarsim.report.statistics import Estimate
@@ -45,6 +47,7 @@ JUMP = (
 )
 STEP = 1e-3  # on the scale of the search, the step of a rough derivative
 ROUGH_VALUES_PER_PLACE = 2  # rough values for each place of the scan, including those around roots and turns
+TIME_KEYS = {"scans", "duration_s", "radar.scan_period_s", "sensor.scan_period_s"}  # which move the last scan
 TINY = 1e-300  # instead of zero
 CLOSING_VALUES = 12  # values, besides those of the scan, to close a bracket to rounding and take the slope
 TARGET_TOLERANCE = (
@@ -61,6 +64,7 @@ def solve(
     key: str,
     *,
     equals: float,
+    wanted: str | None = None,
     filter: str | None = None,
     at_s: float | None = None,
     at_k: int | None = None,
@@ -77,10 +81,11 @@ def solve(
 ) -> Answer:
     """Find the value of a key at which a quantity equals `equals`, in its unit; gains and rates in per cent.
 
-    The quantity is given as an argument named after an option of `radarsim solve`: `gain="r"` or `sigma="Vr"` of a
-    component, for the `filter`; or a rate of a filter, `lock="sequence"`, `loss="nearest"`, … It is taken at time at_s,
-    s, or at scan at_k, counted from 1; default: the last scan. between: the range of the key to search. case: the case,
-    if the config has several. realisations: the number for each simulated value, if nothing exact is known; sampled:
+    wanted says the quantity, as in `tune`: `"sigma r at 60 s"`, `"worst sigma r from 60 s"`, `"sigma r in the long
+    run"`. Or it is given as an argument named after an option of `radarsim solve`: `gain="r"` or `sigma="Vr"` of a
+    component, for the `filter`; or a rate of a filter, `lock="sequence"`, `loss="nearest"`, …, taken at time at_s, s,
+    or at scan at_k, counted from 1; default: the last scan. between: the range of the key to search. case: the case, if
+    the config has several. realisations: the number for each simulated value, if nothing exact is known; sampled:
     simulate even if it is. notify is called with a line on what a search of some seconds will do.
 
     `value` lies between `lo` and `hi` (95 %; equal where `exact`). If the target cannot be attained, value is None, and
@@ -91,9 +96,9 @@ def solve(
     13.7212 m/s True
     """
     requested = {name: value for name, value in quantity.items() if value is not None}
-    if len(requested) != 1:
-        given_names = ", ".join(requested) or "none"
-        examples = f"{argument('sigma=…', '--sigma')}, {argument('gain=…', '--gain')}"
+    if len(requested) + (wanted is not None) != 1:
+        given_names = ", ".join([*requested, *([argument("wanted", "--for")] if wanted is not None else [])]) or "none"
+        examples = f"{argument('wanted=…', '--for')}, {argument('sigma=…', '--sigma')}, {argument('gain=…', '--gain')}"
         raise ConfigError(f"name one quantity, as `radarsim solve --help` lists them: {examples}, …; got {given_names}")
     texts = combine_overrides(
         arguments.check_arguments(overrides, threads=threads, equals=equals, **scan_options(at_s, at_k)), None, seed
@@ -104,19 +109,22 @@ def solve(
         raise ConfigError(f"between: must be two rising numbers, got {between!r}")
     if not math.isfinite(equals):
         raise ConfigError(f"{argument('equals')}: must be a finite number, got {equals:g}")
-    ((name, component),) = requested.items()
+    if wanted is None:
+        ((name, component),) = requested.items()
+        request = QuantityName(name, filter, component, at_s, at_k)
+    else:
+        request = quantities.parse_request(wanted, filter, at_s, at_k)
     cases, count = Cases(config, texts, case), arguments.whole_number(realisations)
     matching_keys = numeric_keys.find_numeric_keys(cases.base.spec, key)
-    measured = quantities.check_quantity(
-        QuantityName(name, filter, component, at_s, at_k), cases.base, cases.user_filters
-    )
+    measured = quantities.check_quantity(request, cases.base, cases.user_filters)
     axes = quantities.plan_labels(measured, cases.base)
     measured = quantities.resolve_scan(measured, axes)
     search_range = key_range(matching_keys, key, between)
     curve = Curve(cases, key, measured, threads, progress, count or cases.base.realisations)
     config_value = matching_keys[0].value if len({numeric_key.value for numeric_key in matching_keys}) == 1 else None
     question = Question(
-        cases, key, measured, equals, search_range, config_value, quantities.unit(measured, axes), texts, count
+        *(cases, key, measured, equals, search_range, config_value, quantities.unit(measured, axes), texts, count),
+        last_s=float(axes.t_s[-1]) if len(axes.t_s) and key not in TIME_KEYS else None,
     )
     work = _solve_exactly if not sampled and curve.is_exact(axes) else solve_by_sampling
     return work(question, curve, notify or (lambda line: None))
@@ -158,9 +166,8 @@ def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], Non
     answer = partial(make_answer, question, attained_now, exact=True)
     if not values:
         limit = search_result.nearest_value + question.equals
-        return answer(
-            limit=limit, limit_at=search_result.nearest, notes=boundary_note(question, curve, search_result.nearest)
-        )
+        notes = boundary_note(question, curve, search_result.nearest) + _long_run_notes(question, curve)
+        return answer(limit=limit, limit_at=search_result.nearest, notes=notes)
     value = nearest_value(values, question)
     approximation = study.exact_but_for(
         quantities.shorten_case(question.quantity, question.cases.case_with_value(question.key, value))
@@ -178,6 +185,28 @@ def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], Non
         + ((WHOLE_NUMBER_NOTE,) if question.search_range.whole_numbers and attained != question.equals else ())
         + ((tr("σ is {what}", what=tr(approximation)),) if approximation else ()),
     )
+
+
+def _long_run_notes(question: Question, curve: Curve) -> tuple[str, ...]:
+    """What is attainable in the long run, of a target that is not attainable at a time; none where that is unknown."""
+    case = question.cases.base
+    study = registry.study(case.study)
+    if question.quantity.over != "at" or not quantities.is_planned(question.quantity.definition):
+        return ()
+    quantity = replace(question.quantity, over="long run", at_s=None, at_k=None)
+    try:
+        long_case = quantities.shorten_case(quantity, case)
+        long_run = Curve(question.cases, question.key, quantity, curve.threads, None, curve.realisations)
+        long_run.has_rough_values = study.costly(long_case) and not question.search_range.whole_numbers
+        result = roots(replace(question, quantity=quantity), long_run)
+    except (ConfigError, root_search.UndefinedFunctionError):
+        return ()
+    at = nearest_value(result.roots, question) if result.roots else result.nearest
+    fields = {"key": question.key, "at": solve_answer.with_unit(at, label(case.spec, question.key).unit)}
+    if result.roots:
+        return (tr("in the long run {key} = {at} attains it", **fields),)
+    limit = solve_answer.with_unit(result.nearest_value + question.equals, question.unit)
+    return (tr("in the long run the nearest is {limit}, at {at}", limit=limit, **fields),)
 
 
 def roots(question: Question, curve: Curve) -> root_search.Roots:

@@ -44,6 +44,7 @@ class Answer(Displayable):
     high: float
     command: str
     notes: tuple[str, ...] = ()
+    last_s: float | None = None
 
     @property
     def table(self) -> "pd.DataFrame":
@@ -77,12 +78,20 @@ class Answer(Displayable):
         if self.value is not None or limit is None or limit_key_value is None:
             return ()
         fields = {
-            **{"quantity": self.quantity.translated_words, "key": self.key, "wanted": self._quantity(self.equals)},
+            **{"quantity": self._quantity_at_the_end, "key": self.key, "wanted": self._quantity(self.equals)},
             **{"low": format_number(self.low), "high": with_unit(self.high, self.unit)},
             **{"limit": self._quantity(limit), "at": with_unit(limit_key_value, self.unit)},
         }
         line = tr(AT_MOST, **fields) if limit < self.equals else tr(AT_LEAST, **fields)
         return (line, *(tr("note: {words}", words=tr(note)) for note in self.notes))
+
+    @property
+    def _quantity_at_the_end(self) -> str:
+        """The quantity in words, with its time where that is the last scan's."""
+        quantity = self.quantity
+        if self.last_s is None or (quantity.over, quantity.at_s, quantity.at_k) != ("at", None, None):
+            return quantity.translated_words
+        return tr("{what} at the last scan ({t_s:g} s)", what=quantity.translated_words, t_s=self.last_s)
 
     def _answer_lines(self) -> list[str]:
         return [labelled_line(label, words).strip() for label, words in self.lines]

@@ -35,7 +35,6 @@ from radarsim.api.design.tuning_space import (
     from_scale,
     is_at_end,
     parse_range,
-    parse_target,
     rename_arguments_in_errors,
     searched_keys,
     set_at_path,
@@ -167,7 +166,7 @@ def tune(
     cases, user_filters = family_cases(config, settings, members, [case] if isinstance(case, str) else case)
     option_names = dict.fromkeys((argument("at_k", "--at-k"), argument("at_s", "--at")), argument("wanted", "--for"))
     with rename_arguments_in_errors(option_names):
-        quantity = quantities.check_quantity(parse_target(wanted, filter), cases[0], user_filters)
+        quantity = quantities.check_quantity(quantities.parse_quantity(wanted, filter), cases[0], user_filters)
     filter_name = quantities.resolve_scan(quantity, quantities.plan_labels(quantity, cases[0])).filter
     assert filter_name is not None  # resolved
     searched, count = _common_keys(cases, filter_name, ranges), arguments.whole_number(realisations)
@@ -175,7 +174,7 @@ def tune(
     variants = [Variants(family_case, filter_name, searched, quantity.definition.paired) for family_case in cases]
     curves = []
     for variant in variants:
-        quantity = quantities.check_quantity(parse_target(wanted, filter), variant.base)
+        quantity = quantities.check_quantity(quantities.parse_quantity(wanted, filter), variant.base)
         curves.append(Curve(variant, "", replace(quantity, filter=filter_name), threads, progress, count))
     with rename_arguments_in_errors(option_names):
         has_exact_values = [
@@ -371,7 +370,7 @@ def judged_point(experiment: Experiment, target: str) -> tuple[str, float] | Non
     """The component, and the time in s, of a quantity such as `sigma y at 60 s`; None where it has no component.
     Raises ConfigError for an unknown one."""
     case = experiment.cases[0]
-    quantity = quantities.check_quantity(parse_target(target, case.spec.members[0].name), case)
+    quantity = quantities.check_quantity(quantities.parse_quantity(target, case.spec.members[0].name), case)
     axes = registry.study(case.study).prepare(case).axes
     if quantity.component is not None:
         quantities.check_name(quantity.component, [name for name, _ in axes.components], "component")

@@ -119,5 +119,6 @@ def cost_by_quantity(case: Case, measured: Sequence[MeasuredQuantity], count: in
     def values(result: CaseResult) -> list[float]:
         return [float(quantities.sampled_value(quantity, result)[0].value) for quantity in measured]
 
-    total_values, leave_one_out_values, _ = question.leave_one_out(case, values, count)
+    read = quantities.case_read(measured[0], case)
+    total_values, leave_one_out_values, _ = question.leave_one_out(read, values, count)
     return np.array([total_values, *leave_one_out_values])

@@ -1,14 +1,12 @@
 """The keys of a filter that are tuned, and the scales on which they are searched."""
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from radarsim.api.design import question, root_search, solve_answer
-from radarsim.api.design.quantities import QuantityName
 from radarsim.api.design.root_search import Range
 from radarsim.config import marks as config_marks
 from radarsim.config import numeric_keys
@@ -25,9 +23,6 @@ MAX_WHOLE_COMBINATIONS = 100  # combinations of whole numbers
 MIN_PROBABILITY = 1e-4  # smallest probability, and smallest complement of one
 NEAR_END = 0.01  # on the scale of the search, or of a linear one
 DIGITS = 6  # of a tuned value: further digits hardly change the quantity
-TARGET_PATTERN = re.compile(
-    r"(?P<name>[\w-]+)(?: +(?P<part>(?!at )\S.*?))??(?: +at +(?:(?P<s>[\d.eE+-]+) *s|k *=? *(?P<k>\d+)))?"
-)
 Place = tuple[float, ...]
 Path = tuple[str | int, ...]
 
@@ -82,21 +77,6 @@ def parse_path(text: str) -> Path:
 def set_at_path(keys: Any, path: Path, value: float) -> None:
     """Set the number at a path."""
     value_at_path(keys, path[:-1])[path[-1]] = int(value) if value.is_integer() else value
-
-
-def parse_target(text: str, filter_name: str | None) -> QuantityName:
-    """The quantity named by text such as `sigma r at 60 s`, `lock at k = 6`. Raises ConfigError."""
-    match = TARGET_PATTERN.fullmatch(text.strip()) if isinstance(text, str) else None
-    if match is None or " at " in f" {match['part']} ":
-        example = '"sigma r at 60 s"'
-        raise ConfigError(f"{argument('wanted', '--for')}: must be a quantity such as {example}, got {text!r}")
-    name, component, at_s, at_k = match.group("name", "part", "s", "k")
-    try:
-        return QuantityName(
-            name.replace("-", "_"), filter_name, component, float(at_s) if at_s else None, int(at_k) if at_k else None
-        )
-    except ValueError:
-        raise ConfigError(f"{argument('wanted', '--for')}: no time in s: {at_s}") from None
 
 
 @contextmanager

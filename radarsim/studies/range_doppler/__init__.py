@@ -69,6 +69,21 @@ class RangeDoppler(Study):
 
         return study.shorten_case(case, at_s, at_k)
 
+    def counted_from_s(self, case: "Case", component: str | None) -> float | None:
+        from radarsim.studies.range_doppler import long_run
+
+        return long_run.counted_from_s(case, component)
+
+    def in_the_long_run(self, case: "Case") -> "Case | None":
+        from radarsim.studies.range_doppler import long_run
+
+        return long_run.in_the_long_run(case)
+
+    def steady_sigma(self, case: "Case") -> "np.ndarray | None":
+        from radarsim.studies.range_doppler import long_run
+
+        return long_run.steady_sigma(case)
+
     def exact_but_for(self, case: "Case") -> str:
         from radarsim.studies.range_doppler import study
 

@@ -18,6 +18,7 @@ from radarsim.studies.range_doppler.missed_plot_patterns import (
 )
 
 PATTERN_SCANS = 60  # of a run with missed plots: beyond, the mean over patterns takes minutes
+ROUGH_PATTERN_SCANS = 2000  # as above, of rough means at the end of a run
 
 
 def designs(designed_case: DesignedCase) -> list[Design]:

@@ -220,7 +220,10 @@ def exact_means(designed_case: DesignedCase, baseline: int) -> ExactErrors:
     nees = np.full(shape[:2], np.nan)
     from radarsim.studies.range_doppler import missed_plot_means
 
-    if len(designed_case.t) <= missed_plot_means.PATTERN_SCANS:
+    is_rough_end = designed_case.roughly and designed_case.asked_from_k > 0
+    if len(designed_case.t) <= (
+        missed_plot_means.ROUGH_PATTERN_SCANS if is_rough_end else missed_plot_means.PATTERN_SCANS
+    ):
         filter_designs = missed_plot_means.designs(designed_case)
         baseline_means = missed_plot_means.means(filter_designs[baseline], filter_designs, designed_case)
         for f, design in enumerate(filter_designs):

@@ -1,0 +1,125 @@
+"""What is asked, in one phrase that every command reads; the long run against a recursion of its own."""
+
+import numpy as np
+import pytest
+
+import radarsim
+from radarsim.config.quantity_phrase import PhraseError, QuantityPhrase, parse_phrase
+from radarsim.errors import ConfigError
+from tests.program import command
+
+RADAR = {"name": "mine", "wavelength_m": 0.032, "sigma_range_m": 15, "sigma_velocity_mps": 0.8, "scan_period_s": 2.5}
+MINE = {
+    "study": "range_doppler",
+    "radar": RADAR,
+    "target": "polynomial",
+    "filters": [
+        {"name": "r", "observes": ["range"], "manoeuvre_variance": 1e-3},
+        {"name": "r+Vr", "observes": ["range", "velocity"], "manoeuvre_variance": 1e-3},
+    ],
+    "scans": 15,
+    "realisations": 1000,
+}
+TURN = {"kind": "turn", "range_m": 8e3, "speed_mps": 12, "aspect_deg": 180, "start_s": 60}
+BOAT = MINE | {"scans": 61, "target": TURN | {"acceleration_g": 0.2, "duration_s": 18}}
+SIGMA_V = "radar.sigma_velocity_mps"
+
+
+@pytest.mark.parametrize(
+    ("text", "meaning"),
+    [
+        ("sigma r at 60 s", QuantityPhrase("sigma", "r", at_s=60.0)),
+        ("worst sigma r", QuantityPhrase("sigma", "r", "worst")),
+        ("worst sigma r from 60 s on", QuantityPhrase("sigma", "r", "worst", from_s=60.0)),
+        ("mean sigma r from 60 s", QuantityPhrase("sigma", "r", "mean", from_s=60.0)),
+        ("sigma r in the long run", QuantityPhrase("sigma", "r", "long run")),
+        ("gain of Vr at the end", QuantityPhrase("gain", "Vr")),
+        ("probability model 2 at k 3", QuantityPhrase("probability", "model 2", at_k=3)),
+        ("false-tracks", QuantityPhrase("false_tracks")),
+    ],
+)
+def test_a_phrase_says_quantity_component_and_scans(text, meaning):
+    assert parse_phrase(text) == meaning
+
+
+@pytest.mark.parametrize("text", ["sigma r at noon", "sigma r from 60 s", "worst sigma r at 3 s", "sigma r at 60", ""])
+def test_what_is_no_phrase_is_refused(text):
+    with pytest.raises(PhraseError, match="got"):
+        parse_phrase(text)
+
+
+def steady_sigma(sigma_v, variance=1e-3, dt=2.5, sigma_r=15.0):
+    """σ of the range in the long run: Riccati's gain, then the errors of the plots alone, on a target as expected."""
+    F, G = np.array([[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]]), np.array([dt**3 / 6, dt**2 / 2, dt])
+    H, R = np.eye(3)[:2], np.diag([sigma_r**2, sigma_v**2])
+    P = S = np.diag([sigma_r**2, sigma_v**2, 1.0])
+    for _ in range(4000):
+        P = F @ P @ F.T + variance * np.outer(G, G)
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
+        P = (np.eye(3) - K @ H) @ P
+        A = (np.eye(3) - K @ H) @ F
+        S = A @ S @ A.T + K @ R @ K.T
+    return np.sqrt(S[0, 0])
+
+
+def test_the_long_run_is_a_time_like_any_other():
+    answer = radarsim.solve(
+        MINE, SIGMA_V, wanted="sigma r in the long run", filter="r+Vr", equals=2.5877, between=(0.1, 1)
+    )
+    assert answer.exact
+    assert steady_sigma(answer.value) == pytest.approx(2.5877, rel=1e-7)
+    found = radarsim.sensitivity(MINE, wanted="sigma r in the long run").table
+    row = found[(found["key"] == SIGMA_V) & (found["filter"] == "r+Vr")].iloc[0]
+    assert row["sigma"] == pytest.approx(steady_sigma(0.8), rel=1e-7)
+    assert row["sigma_change_percent"] == pytest.approx(100 * (steady_sigma(0.88) / steady_sigma(0.8) - 1), rel=1e-6)
+
+
+def test_a_refusal_names_its_time_and_what_the_long_run_allows():
+    answer = radarsim.solve(MINE, SIGMA_V, sigma="r", filter="r+Vr", equals=2.926, between=(0.01, 1))
+    assert answer.value is None
+    assert "at the last scan (35 s): 2.926 m is not attainable" in answer.unattained[0]
+    (note,) = [line for line in answer.unattained if "in the long run" in line]
+    value = float(note.partition(" = ")[2].split()[0])
+    assert steady_sigma(value) == pytest.approx(2.926, rel=1e-5)
+
+
+@pytest.mark.parametrize(("phrase", "of"), [("worst", np.max), ("mean", np.mean)])
+@pytest.mark.parametrize(("since", "k"), [("", 24), (" from 100 s", 40)])
+def test_over_scans_it_is_taken_from_the_manoeuvre_on_or_from_a_time(phrase, of, since, k):
+    from radarsim.api.case_work import CaseWork
+    from radarsim.api.configs import load
+
+    wanted = f"{phrase} sigma r{since}"
+    answer = radarsim.solve(BOAT, SIGMA_V, wanted=wanted, filter="r+Vr", equals=9, between=(0.5, 5))
+    (case,) = load(BOAT, [f"{SIGMA_V}={answer.value!r}"]).cases
+    assert of(CaseWork(case).plan.axes.exact_sigma[1, k:, 0]) == pytest.approx(9, rel=1e-8)
+
+
+def test_tune_and_sensitivity_take_the_worst_error():
+    tuned = radarsim.tune(BOAT, "worst sigma r", filter="r+Vr")
+    assert tuned.exact
+    assert tuned.keys[0].tuned == pytest.approx(0.1738, rel=0.02)  # as minimise finds it, with every plot
+    table = radarsim.sensitivity(BOAT, wanted="worst sigma r").table
+    assert table[table["filter"] == "r+Vr"]["sigma"].iloc[0] == pytest.approx(tuned.all.stated, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ["solve", "rls2", SIGMA_V, "--for", "sigma r at 60 s", "--at", "3", "--equals", "3"],
+            "stands in --for already",
+        ),
+        (["solve", "rls2", SIGMA_V, "--for", "sigma r", "--sigma", "r", "--equals", "3"], "got sigma, --for"),
+        (["sensitivity", "rls2", "--for", "sigma r", "--component", "r"], "--component: stands in --for already"),
+        (["sensitivity", "multimodel", "--for", "sigma x in the long run"], "knows none of it; give a time"),
+    ],
+)
+def test_what_goes_against_a_phrase_is_refused(words, message):
+    result = command(*words, code=2)
+    assert message in result.output
+
+
+def test_a_time_beyond_the_run_is_refused():
+    with pytest.raises(ConfigError, match="from must be from 0 to 35 s"):
+        radarsim.solve(MINE, SIGMA_V, wanted="worst sigma r from 99 s", filter="r+Vr", equals=3)
