@@ -68,6 +68,10 @@ def test_the_long_run_is_a_time_like_any_other():
     )
     assert answer.exact
     assert steady_sigma(answer.value) == pytest.approx(2.5877, rel=1e-7)
+
+
+@pytest.mark.slow
+def test_sensitivity_in_the_long_run():
     found = radarsim.sensitivity(MINE, wanted="sigma r in the long run").table
     row = found[(found["key"] == SIGMA_V) & (found["filter"] == "r+Vr")].iloc[0]
     assert row["sigma"] == pytest.approx(steady_sigma(0.8), rel=1e-7)
@@ -95,6 +99,7 @@ def test_over_scans_it_is_taken_from_the_manoeuvre_on_or_from_a_time(phrase, of,
     assert of(CaseWork(case).plan.axes.exact_sigma[1, k:, 0]) == pytest.approx(9, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_tune_and_sensitivity_take_the_worst_error():
     tuned = radarsim.tune(BOAT, "worst sigma r", filter="r+Vr")
     assert tuned.exact
@@ -123,3 +128,15 @@ def test_what_goes_against_a_phrase_is_refused(words, message):
 def test_a_time_beyond_the_run_is_refused():
     with pytest.raises(ConfigError, match="from must be from 0 to 35 s"):
         radarsim.solve(MINE, SIGMA_V, wanted="worst sigma r from 99 s", filter="r+Vr", equals=3)
+
+
+def test_a_judgement_of_the_worst_error_is_about_its_scan():
+    from radarsim.api.case_work import CaseWork
+    from radarsim.api.configs import load
+    from radarsim.api.design.tune import judged_point
+
+    axes = CaseWork(load(BOAT).cases[0]).plan.axes
+    best = axes.exact_sigma[:, :, 0].min(axis=0)
+    assert judged_point(load(BOAT), "worst sigma r") == ("r", axes.t_s[24 + best[24:].argmax()])
+    with pytest.raises(ConfigError, match="a judgement is about one scan"):
+        judged_point(load(BOAT), "mean sigma r")

@@ -374,10 +374,31 @@ def judged_point(experiment: Experiment, target: str) -> tuple[str, float] | Non
     axes = registry.study(case.study).prepare(case).axes
     if quantity.component is not None:
         quantities.check_name(quantity.component, [name for name, _ in axes.components], "component")
+    if quantity.over in ("mean", "long run"):
+        option = argument("wanted", "--for")
+        raise ConfigError(f"{option}: a judgement is about one scan: give a time, or worst, got {target!r}")
     return _point_of(quantity, axes)
 
 
 def _point_of(quantity: MeasuredQuantity, axes: Axes) -> tuple[str, float] | None:
+    """The component and the time, s, of a quantity; of a worst one that at which the best filter's exact σ is largest.
+    None without a component, and of what is not at one scan."""
+    if quantity.over != "at" and quantity.component:
+        return _worst_point(quantity, axes) if quantity.over == "worst" else None
     at_s = axes.t_s[-1] if quantity.at_s is None else quantity.at_s
     at_s = at_s if quantity.at_k is None else axes.t_s[list(axes.k).index(quantity.at_k)]
     return (quantity.component, float(at_s)) if quantity.component else None
+
+
+def _worst_point(quantity: MeasuredQuantity, axes: Axes) -> tuple[str, float]:
+    """Raises ConfigError where no exact σ says at which scan it is."""
+    component = str(quantity.component)
+    c = [name for name, _ in axes.components].index(component)
+    t_s = np.asarray(axes.t_s, dtype=float)
+    sigma = np.where(axes.available[:, :, c], np.asarray(axes.exact_sigma, dtype=float)[:, :, c], np.inf)
+    best = np.fmin.reduce(np.where(np.isnan(sigma), np.inf, sigma), axis=0)
+    counted = np.isfinite(best) & (t_s >= (quantity.from_s or 0.0) * (1 - 1e-12))
+    if not counted.any():
+        option = argument("wanted", "--for")
+        raise ConfigError(f"{option}: the worst scan is not known: no exact σ in {component}; give a time")
+    return component, float(t_s[np.where(counted, best, -np.inf).argmax()])

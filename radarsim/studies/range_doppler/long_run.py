@@ -26,7 +26,7 @@ def counted_from_s(case: Case, component: str | None) -> float:
 
 
 def steady_sigma(case: Case) -> np.ndarray | None:
-    """The exact σ (F, 3) of filters of the study in steady state; None with missed or biased plots, or another filter."""
+    """The exact σ (F, 3) of filters in steady state; None with missed or biased plots, or a filter of a package."""
     spec: Keys = case.spec
     if not spec.radar.as_the_papers or not all(isinstance(filter_, Filter) for filter_ in spec.filters):
         return None
