@@ -50,9 +50,14 @@ def comparison_text(gain: ComparedValue) -> str:
 
 
 def percent_text(gain: ComparedValue, n: float) -> str:
-    """A gain in per cent with its interval to a thousandth, its ends outward; of equal filters what was not seen."""
+    """A gain in per cent with its interval; of filters that are equal in all of n realisations what was not seen."""
+    return unseen_text(n) if is_equal(gain) and not gain.is_exact else number_text(gain)
+
+
+def number_text(gain: ComparedValue) -> str:
+    """A gain in per cent with its interval to a thousandth, its ends outward; 0 % of equal filters."""
     if is_equal(gain):
-        return tr("0 % (exact)") if gain.is_exact else unseen_text(n)
+        return tr("0 % (exact)") if gain.is_exact else "0 %"
     if gain.is_exact:
         return gain.text("%", ".3g")
     value, low, high = map(float, gain.estimate)

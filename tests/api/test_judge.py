@@ -138,6 +138,8 @@ def test_nees_is_that_of_the_run(judged):
     mine = judged.tables["nees"].merge(of(judged.tables["consistency"], filter="r+Vr"), on="k")
     assert len(mine) == 14
     np.testing.assert_allclose(mine["nees_x"], mine["nees_y"], rtol=2 * TWIN + recursion_rounding())
+    for end in ("nees_bound_lo", "nees_bound_hi"):  # for the same realisations, scan and components
+        np.testing.assert_allclose(mine[f"{end}_x"], mine[f"{end}_y"], rtol=1e-12)
     (panel,) = case_figures(judged.cases, judged.tables, judged.experiment)["consistency"].panels
     own, theirs = (
         {mark.label: mark.y for mark in panel.marks if isinstance(mark, Line)}[name] for name in ("mine", "r+Vr")

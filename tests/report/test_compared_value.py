@@ -44,6 +44,8 @@ def test_equal_filters_are_called_equal_and_what_was_not_seen_is_said():
         "identical in all 1,000 realisations: a difference in fewer than 0.3 % would not have shown"
     )
     assert gain_sentences.percent_text(gain_value(-0.707, -0.999, -0.416), 1000) == "−0.707 % [−0.999, −0.416]"
+    assert gain_sentences.number_text(equal) == "0 %"  # as one end of a range
+    assert gain_sentences.number_text(gain_value(0.0, -1e-6, 1e-6, 0.0)) == "0 % (exact)"
 
 
 CURVES = pd.DataFrame(

@@ -394,7 +394,7 @@ def _extreme_gains(gains: "pd.DataFrame", comparison: _Comparison) -> list[Sente
     smallest, largest = (
         tr(
             "{gain} ({component} at {t} s)",
-            gain=gain_sentences.percent_text(gain, comparison.sigma["n"]),
+            gain=gain_sentences.number_text(gain),
             component=row["component"],
             t=numeral(f"{row['t_s']:g}"),
         )

@@ -98,17 +98,23 @@ def failure_columns(result: CaseResult) -> common.Columns:
 
 
 def nees_columns(result: CaseResult) -> common.Columns:
-    """NEES of the components that a user filter estimates, where it gives covariances."""
+    """NEES of the components that a user filter estimates, where it gives covariances.
+
+    The bounds are those of the config's filters: of a chi-square law where the study knows the law of its own NEES,
+    else from the spread of the realisations."""
     parts: list[common.Columns] = []
     for case in user_filter_cases(result):
         sums = np.asarray(case.sums["nees"])
         f, k = np.nonzero(sums[..., 0] > 1)
         n, total, square = np.moveaxis(sums[f, k], -1, 0)
-        looks = int((sums[..., 0] > 1).sum(1).max(initial=1))
-        mean, bounds = (
-            statistics.mean_square(total, square, n),
-            consistency_tables.bounds_from_spread(total, square, n, looks),
-        )
+        if hasattr(result.axes, "exact_nees"):
+            looks = int(np.asarray(result.axes.available).any(axis=2).sum(axis=1).max())
+            size = np.asarray(case.axes.available).sum(axis=2)[f, k]
+            bounds = statistics.normalised_bounds(size * n, np.full(n.shape, looks))
+        else:
+            looks = int((sums[..., 0] > 1).sum(1).max(initial=1))
+            bounds = consistency_tables.bounds_from_spread(total, square, n, looks)
+        mean = statistics.mean_square(total, square, n)
         parts.append(
             {
                 **common.label_columns(case, f, k),
