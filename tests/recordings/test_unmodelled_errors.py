@@ -120,11 +120,13 @@ def test_a_bias_that_may_be_zero_is_not_corrected():
     assert "range_m=" in lines[-1]
 
 
-def test_an_aircraft_that_is_late_alone_is_named_without_a_verdict():
-    registration = radarsim.register(*recording(1, late_aircraft=4))
+@pytest.mark.parametrize("seed", [1, 8])
+def test_an_aircraft_that_is_late_alone_is_named_without_a_verdict(seed):
+    """Nor is the radar accused of what one aircraft shows, which in the second passes close by."""
+    registration = radarsim.register(*recording(seed, late_aircraft=4))
     assert not len(registration.findings)
     (line,) = [line for line in answer(registration) if "alone is" in line]
-    assert line.startswith("4c0004 alone is −1.9 s")
+    assert line.startswith(("4c0004 alone is −1.9 s", "4c0004 alone is −2 s"))
     assert line.endswith(" s from the others in time: its positions, or the radar in its direction, err")
 
 

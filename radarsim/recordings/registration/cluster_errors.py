@@ -13,14 +13,16 @@ import numpy as np
 from radarsim.recordings.grouping import rows_by_name
 from radarsim.recordings.registration.robust_fit import BIWEIGHT_LIMIT, RobustFit
 
+MAX_LEFT_OUT = 20  # clusters that are left out one after the other
+NO_EVIDENCE = 0.01  # of a coefficient, from which leaving out clusters cannot matter
 MIN_DEGREES = 0.5  # of freedom, below which clusters show nothing
 
 
 class Evidence(NamedTuple):
-    """How likely a coefficient as large arises by chance: from all clusters, and without the one that shows most."""
+    """How likely a coefficient as large arises by chance: from all clusters, and at most without any one of them."""
 
     probability: float
-    probability_without_largest: float
+    probability_without_one: float
 
 
 def half_widths(fit: RobustFit, clusters: np.ndarray, is_used: np.ndarray) -> np.ndarray:
@@ -57,18 +59,18 @@ def evidence(fit: RobustFit, clusters: np.ndarray, is_used: np.ndarray, index: i
     design, errors = _linear_model(fit, is_used)
     column = int(is_used[:index].sum())
     values = fit.values[is_used]
-    probability, largest = _equal_clusters_test(design, errors, values[column], clusters, column)
-    keep = clusters != largest
-    target = errors[keep] + design[keep] @ values
-    size = np.sqrt((design[keep] ** 2).sum(axis=(0, 1)))
-    if not size.all():
-        return Evidence(probability, 1.0)
-    flat = (design[keep] / size).reshape(-1, len(size))
-    values = np.linalg.lstsq(flat, target.ravel(), rcond=1e-12)[0] / size
-    probability_without_largest, _ = _equal_clusters_test(
-        design[keep], target - design[keep] @ values, values[column], clusters[keep], column
-    )
-    return Evidence(probability, probability_without_largest)
+    probability, influential = _equal_clusters_test(design, errors, values[column], clusters, column)
+    target, most = errors + design @ values, probability
+    for cluster in influential[:MAX_LEFT_OUT] if probability < NO_EVIDENCE else ():
+        is_kept = clusters != cluster
+        size = np.sqrt((design[is_kept] ** 2).sum(axis=(0, 1)))
+        if not size.all():
+            return Evidence(probability, 1.0)
+        flat = (design[is_kept] / size).reshape(-1, len(size))
+        values = np.linalg.lstsq(flat.T @ flat, flat.T @ target[is_kept].ravel(), rcond=1e-12)[0] / size
+        errors = target[is_kept] - design[is_kept] @ values
+        most = max(most, _equal_clusters_test(design[is_kept], errors, values[column], clusters[is_kept], column)[0])
+    return Evidence(probability, most)
 
 
 def _linear_model(fit: RobustFit, is_used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -83,8 +85,8 @@ def _linear_model(fit: RobustFit, is_used: np.ndarray) -> tuple[np.ndarray, np.n
 
 def _equal_clusters_test(
     design: np.ndarray, errors: np.ndarray, value: float, clusters: np.ndarray, column: int
-) -> tuple[float, int]:
-    """How likely a value as large is by chance, and the cluster that has most influence on it."""
+) -> tuple[float, np.ndarray]:
+    """How likely a value as large is by chance, and the clusters, that with most influence on it first."""
     from scipy.stats import t as student
 
     size = np.sqrt((design**2).sum(axis=(0, 1)))
@@ -99,15 +101,16 @@ def _equal_clusters_test(
         [np.bincount(cluster_index, column_sum, len(numbers)) for column_sum in np.einsum("nk,nkj->jn", influence, x)],
         axis=1,
     )
+    influential = numbers[np.argsort(-length)]
     is_informative = length > 0
     unfitted = length - np.einsum(
         "gi,ij,gj->g", moments, inverse, moments
     )  # of the variance, as the fit has taken a part
     degrees = float((unfitted[is_informative] / length[is_informative]).sum())
     if degrees < MIN_DEGREES:
-        return 1.0, int(numbers[length.argmax()])
+        return 1.0, influential
     independent = float((errors**2).sum()) / max(int(np.count_nonzero(errors)) - len(size), 1)
     common = float((score[is_informative] ** 2 / length[is_informative]).sum()) / degrees
     error = np.sqrt(max(common, independent) * inverse[column, column]) / size[column]
     probability = 2 * float(student.sf(abs(value) / error, degrees)) if error > 0 else float(value == 0)
-    return probability, int(numbers[length.argmax()])
+    return probability, influential

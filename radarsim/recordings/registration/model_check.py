@@ -23,11 +23,12 @@ from radarsim.recordings.registration.matched_plots import (
 from radarsim.recordings.registration.robust_fit import RobustFit, robust_fit
 
 FALSE_ALARMS = 1e-3  # of all tests of a recording together
-WITHOUT_LARGEST = 0.01  # of a test that leaves out the aircraft with most influence
+WITHOUT_ONE = 0.01  # of each test that leaves out an aircraft
 DISTINCT = 0.01  # of an error, given another that would explain the same
 POSSIBLE = 0.2  # of an error that may be there: the fit is better by about as much as Akaike's criterion asks
 MAX_VARIANCE_INFLATION = 100.0  # of a coefficient by the others, from which they cannot be distinguished
 MAX_RIVAL_INFLATION = 1e6  # the same, of an error beside another that would explain the same
+TRIAL_TOLERANCE = 1e-3  # of the last step of a fit, in standard errors
 MIN_MOVEMENT_M = 1.0  # of a plot by an error: positions are no better
 MAX_ERRORS = 4  # that are fitted together
 FIXED_TOLERANCE = 2.5  # half widths of its interval from the one value that a coefficient can have
@@ -53,14 +54,13 @@ class _Trial(NamedTuple):
     fit: RobustFit
     is_used: np.ndarray
     probability: float
-    probability_without_largest: float
+    probability_without_one: float
     movement_m: float
 
-    def is_certain(self, tests: int) -> bool:
-        is_large = self.movement_m > MIN_MOVEMENT_M
-        return (
-            is_large and self.probability * tests < FALSE_ALARMS and self.probability_without_largest < WITHOUT_LARGEST
-        )
+    def is_certain(self, tests: int, spread: float) -> bool:
+        """Whether the error is no chance in so many tests, nor one aircraft's, and leaves less than the spread."""
+        is_proven = self.probability * tests < FALSE_ALARMS and self.probability_without_one < WITHOUT_ONE
+        return is_proven and self.movement_m > MIN_MOVEMENT_M and self.fit.spread < spread
 
 
 class ModelChecker:
@@ -70,19 +70,24 @@ class ModelChecker:
         self.fit, self.is_used, self.clusters, self.smallest = fit, is_used, clusters, smallest
         self.target = fit.errors + fit.slopes @ fit.values
         self.metres = np.stack([np.ones(len(clusters)), fit.slopes[:, 0, RANGE_SCALE]], axis=1)  # of range and bearing
+        design = (fit.slopes / fit.sigma[:, None]).reshape(-1, len(COEFFICIENTS))
+        size = np.linalg.norm(design, axis=0)
+        design /= np.where(size > 0, size, 1.0)
+        self.gram = design.T @ design  # cosines between the movements of plots by the coefficients
         self.tests = len(COEFFICIENTS) - len(BIASES)
 
     def check(self) -> ModelCheck:
         """What the biases do not hold."""
         causes: list[SensorError] = []
-        trials = self._trials(causes, ERRORS)
+        trials, spread = self._trials(causes, ERRORS), self.fit.spread
         competitors: dict[str, list[SensorError]] = {}
-        while len(causes) < MAX_ERRORS:
-            certain = {error: trial for error, trial in trials.items() if trial.is_certain(self.tests)}
+        for _ in range(MAX_ERRORS):
+            certain = {error: trial for error, trial in trials.items() if trial.is_certain(self.tests, spread)}
             candidates = [error for error in certain if error.name and self._is_possible(error, certain[error])]
             if not candidates:
                 break
             best = min(candidates, key=lambda error: certain[error].fit.spread)
+            spread = certain[best].fit.spread
             competitors[best.name] = [error for error in candidates if error is not best]
             causes.append(best)
             causes = [error for error in causes if error is best or self._is_distinct(error, causes)]
@@ -94,7 +99,9 @@ class ModelChecker:
             for rival in rivals[cause.name]:
                 trial = self._trial([error for error in causes if error is not cause], rival)
                 allowance = _joined(allowance, self._interval(trial)) if trial else allowance
-        unexplained = tuple(error for error, trial in trials.items() if not error.name and trial.is_certain(self.tests))
+        unexplained = tuple(
+            error for error, trial in trials.items() if not error.name and trial.is_certain(self.tests, spread)
+        )
         return ModelCheck(tuple(causes), rivals, unexplained, allowance)
 
     def _trials(self, causes: Sequence[SensorError], errors: Sequence[SensorError]) -> dict[SensorError, _Trial]:
@@ -117,6 +124,7 @@ class ModelChecker:
             self.fit.values[is_used],
             np.ones(columns.shape[-1], dtype=bool),
             self.smallest,
+            TRIAL_TOLERANCE,
         )
         values = np.zeros(len(is_used))
         values[is_used] = fit.values
@@ -124,19 +132,16 @@ class ModelChecker:
         tests = [evidence(fit, self.clusters, is_used, k) for k in indices]
         best = min(tests)
         moves = np.abs(self.fit.slopes[..., indices] @ values[indices]) * self.metres
-        return _Trial(fit, is_used, best.probability, best.probability_without_largest, float(moves.max()))
+        return _Trial(fit, is_used, best.probability, best.probability_without_one, float(moves.max()))
 
     def _variance_inflation(self, is_used: np.ndarray, indices: Sequence[int], index: int) -> float:
         """The variance inflation of a coefficient by those used and the others of its error."""
         columns = [k for k in range(len(is_used)) if (is_used[k] or k in indices) and k != index]
-        design = (self.fit.slopes / self.fit.sigma[:, None]).reshape(-1, len(is_used))
-        size = np.linalg.norm(design, axis=0)
-        if size[index] == 0:
+        if self.gram[index, index] == 0:
             return np.inf
-        design = design / np.where(size > 0, size, 1.0)
-        shares = np.linalg.lstsq(design[:, columns], design[:, index], rcond=1e-12)[0]
-        unexplained = design[:, index] - design[:, columns] @ shares
-        return 1 / max(float(unexplained @ unexplained), 1e-300)
+        likeness = self.gram[columns, index]
+        shares = np.linalg.lstsq(self.gram[np.ix_(columns, columns)], likeness, rcond=1e-12)[0]
+        return 1 / max(1 - float(likeness @ shares), 1e-12)
 
     def _is_possible(self, error: SensorError, trial: _Trial) -> bool:
         """Whether a coefficient that can have one value alone has it."""

@@ -29,8 +29,14 @@ class RobustFit(NamedTuple):
         return float((counts[counts > 0] * np.log(self.sigma[counts > 0])).sum())
 
 
-def robust_fit(linearise: Linearisation, start: np.ndarray, is_used: np.ndarray, smallest: np.ndarray) -> RobustFit:
-    """Fit the coefficients that are used; smallest (2,): the least σ."""
+def robust_fit(
+    linearise: Linearisation,
+    start: np.ndarray,
+    is_used: np.ndarray,
+    smallest: np.ndarray,
+    tolerance: float = CONVERGENCE_STEP,
+) -> RobustFit:
+    """Fit the coefficients that are used; smallest (2,): the least σ; tolerance: the last step, in standard errors."""
     values = start
     for _ in range(MAX_ROUNDS):
         errors, slopes = linearise(values)
@@ -39,7 +45,7 @@ def robust_fit(linearise: Linearisation, start: np.ndarray, is_used: np.ndarray,
         weights = np.where(u > HUBER_LIMIT, HUBER_LIMIT / np.maximum(u, HUBER_LIMIT), 1.0)
         step, length = _step(errors, slopes, sigma, weights, is_used)
         values = values + step
-        if length < CONVERGENCE_STEP:
+        if length < tolerance:
             break
     errors, _ = linearise(values)
     sigma = np.maximum([_biweight_sigma(errors[:, k]) for k in range(2)], smallest)
@@ -47,7 +53,7 @@ def robust_fit(linearise: Linearisation, start: np.ndarray, is_used: np.ndarray,
         errors, slopes = linearise(values)
         step, length = _step(errors, slopes, sigma, biweight_weights(errors / sigma), is_used)
         values = values + step
-        if length < CONVERGENCE_STEP:
+        if length < tolerance:
             break
     return RobustFit(values, sigma, *linearise(values))
 
