@@ -341,7 +341,8 @@ class _Reader:
         try:
             inspect.signature(function).bind(*positional, **arguments)
         except TypeError as error:
-            self._add(path, f"{name}({', '.join(names)}): {error}", value)
+            case_count = f"; of has {len(cases)} cases" if functions is self.measures and len(cases) > 1 else ""
+            self._add(path, f"{name}({', '.join(names)}): {error}{case_count}", value)
             raise _UnknownNameError from None
         self._check_types(function, arguments, path, functions is self.ranges and _has_falling_ends(arguments))
         called = self.functions.get(name) if functions is self.measures else function

@@ -43,7 +43,7 @@ class MeasureCall:
     def _checked(self, value: Any) -> Estimate:
         """The value as an estimate. Raises MeasureError for what is none."""
         if not isinstance(value, str | bytes):
-            with suppress(TypeError, ValueError):
+            with suppress(TypeError, ValueError, OverflowError):
                 estimate = Estimate(*map(float, value)) if isinstance(value, Estimate) else exact_number(value)
                 if self._is_of_user and not math.isfinite(estimate.value):
                     return exact_number(math.nan)

@@ -73,6 +73,8 @@ class TableEvidence:
         self.column(name)
         cells = self.case(key).rows[name]
         try:
+            if cells.dtype.kind in "cmM":  # complex numbers, times
+                raise TypeError
             return np.asarray(cells, dtype=float)
         except (TypeError, ValueError):
             raise ConfigError(f"column {name!r} has cells that are no numbers") from None

@@ -66,11 +66,13 @@ def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
 
 def share(value: float, low: float, high: float) -> str:
     """A share in per cent with its 95 % interval, with digits enough to distinguish the ends from each other, 0 and 100
-    %.
+    %; without one (NaN) the share alone.
 
     >>> share(100, 99.9962, 100), share(94.123, 93.9, 94.3), share(99.99, 99.9885, 99.9915)
     ('100 % [99.996, 100]', '94.12 % [93.90, 94.30]', '99.990 % [99.989, 99.992]')
     """
+    if math.isnan(low) or math.isnan(high):
+        return f"{numeral(f'{value:.4g}')} %"
     rounded, limits = [round(number, MAX_SHARE_DIGITS) for number in (value, low, high)], (0.0, 100.0)
     for digits in range(2, MAX_SHARE_DIGITS):
         texts = [f"{number:.{digits}f}" for number in rounded]

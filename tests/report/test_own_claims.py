@@ -282,6 +282,19 @@ def test_a_table_that_is_none_is_refused(tmp_path, table, words):
     assert words in fault(claims(WELL), table)
 
 
+@pytest.mark.parametrize("cell", [1j, np.datetime64("2020-01-01"), np.timedelta64(3, "s"), "0,374", object()])
+def test_cells_that_are_no_numbers_are_said(cell):
+    (row,) = judged({"filter": ["ekf"], "mean": [cell]}, WELL)
+    assert row["verdict"] == "not judged here"
+    assert "column 'mean' has cells that are no numbers" in row["why"]
+
+
+def test_more_cases_than_a_measure_takes_are_said():
+    assert fault(claims(("[{filter: ekf}, {filter: ukf}]", *WELL[1:]))).endswith(
+        "; of has 2 cases, got " + "{value: {column: 'mean'}}"
+    )
+
+
 @pytest.mark.parametrize("count", ["many", math.nan, math.inf, -3, 1.5])
 def test_a_count_that_is_none_is_said(count):
     (row,) = judged({"filter": ["ekf"], "mean": [0.374], "n": [count]}, WELL)
@@ -297,6 +310,7 @@ def test_a_count_that_is_none_is_said(count):
         ("return Estimate(float('nan'), 1, 2)", "its measure gives no number"),
         ("return float('inf')", "its measure gives no number"),
         ("return [1, 2]", "must give an Estimate or a number"),
+        ("return 10**400", "must give an Estimate or a number"),
         ("raise RuntimeError('boom')", "RuntimeError: boom"),
         ("import sys; sys.exit(3)", "SystemExit: 3"),
     ],

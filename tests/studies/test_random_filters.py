@@ -209,6 +209,24 @@ def test_numbers_that_belong_to_the_filter_or_to_the_plots_get_no_word(target, a
     assert own_rows(result)["sigma_lo"].notna().all()
 
 
+def test_a_share_of_failures_of_realisations_that_depend_on_each_other_has_no_interval():
+    def above_the_mean(plots):
+        return np.where(plots["range_m"] > plots["range_m"].mean(), plots["range_m"], np.nan)
+
+    answer = judged(above_the_mean, realisations=300).answer
+    assert answer[0].startswith("mine fails in 100 % of the realisations (not a number after an estimate: 300)")
+    assert "nan" not in " ".join(answer)
+
+
+@pytest.mark.parametrize("variance", [1e-300, -1.0, 0.0])
+def test_covariances_that_no_number_follows_from_are_counted(variance):
+    def believed(plots):
+        return plots["range_m"][..., None], np.full((*plots["range_m"].shape, 1, 1), variance)
+
+    result = judged(believed, realisations=200)
+    assert any("In 200 of 200 realisations mine gives a covariance" in line for line in result.answer)
+
+
 def test_one_block_alone_repeats_nothing():
     result = judged(Own, realisations=400)
     assert own_rows(result)[["sigma_lo", "sigma_hi"]].notna().all(axis=None)

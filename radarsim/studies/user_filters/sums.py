@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 DIVERGENCE_RATIO = 100.0  # times the largest error of the config's filters in the same realisation
 FAILURES = ("not_a_number", "no_estimate", "diverged")
 COUNTS = (*FAILURES, "not_positive_definite")
+MAX_NEES = 1e100  # its square is added up as well
 PAIRED = 7  # sums over the realisations that both have: 1, e², e⁴, b², b⁴, e²b², (e² − b²)⁴
 
 
@@ -171,7 +172,8 @@ def filter_errors(
 
 def normalised(e: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """eᵀP⁻¹e over its degrees of freedom (m,), of errors (m, d), covariances (m, d, d); not-a-number of those that are
-    not positive definite, and which are (m,). By Cholesky's root, column by column of all of them."""
+    not positive definite, or so nearly so that it is beyond MAX_NEES, and which are (m,). By Cholesky's root, column by
+    column of all of them."""
     m, d = e.shape
     L, w = np.zeros((m, d, d)), np.zeros((m, d))
     proper = (np.abs(P - np.swapaxes(P, 1, 2)) <= 1e-6 * np.abs(P).max((1, 2), initial=0)[:, None, None]).all((1, 2))
@@ -181,7 +183,10 @@ def normalised(e: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         L[:, j, j] = np.sqrt(np.where(pivot > 0, pivot, 1))
         w[:, j] = (e[:, j] - (L[:, j, :j] * w[:, :j]).sum(1)) / L[:, j, j]
         L[:, j + 1 :, j] = (P[:, j + 1 :, j] - (L[:, j + 1 :, :j] * L[:, j : j + 1, :j]).sum(2)) / L[:, j, j, None]
-    return np.where(proper, (w**2).sum(1) / d, np.nan), proper
+    with np.errstate(over="ignore", invalid="ignore"):
+        nees = (w**2).sum(1) / d
+    proper &= nees <= MAX_NEES
+    return np.where(proper, nees, np.nan), proper
 
 
 def simulate(plan: Plan, first: int, count: int) -> np.ndarray:
