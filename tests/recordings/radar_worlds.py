@@ -38,8 +38,8 @@ def local(latitude, longitude, height):
 class Aircraft:
     """An aircraft at a constant height, with a constant speed over an almost straight line."""
 
-    def __init__(self, rng, farthest_m):
-        distance, azimuth = rng.uniform(8e3, farthest_m), rng.uniform(0, 2 * np.pi)
+    def __init__(self, rng, nearest_m, farthest_m):
+        distance, azimuth = rng.uniform(nearest_m, farthest_m), rng.uniform(0, 2 * np.pi)
         self.start = distance * np.array([np.cos(azimuth), np.sin(azimuth)])
         self.heading, self.speed, self.height = rng.uniform(0, 2 * np.pi), rng.uniform(120, 250), rng.uniform(2e3, 11e3)
 
@@ -75,16 +75,19 @@ def recording(
     lags_s=0.0,
     late_aircraft=None,
     noise=1.0,
+    nearest_m=8e3,
+    height_m=None,
 ):
     """Tables of plots and of positions.
 
     world: what is wrong with the radar or the positions; correlation_s: of errors within an aircraft; lags_s: the
     largest lag of an aircraft's positions; late_aircraft: one whose positions are 2 s late;
-    noise: the size of all errors."""
+    noise: the size of all errors; height_m: of all aircraft."""
     rng = np.random.default_rng((seed, 49))
     plot_tables, position_tables = [], []
     for number in range(count):
-        aircraft, name = Aircraft(rng, farthest_m), f"4c{number:04x}"
+        aircraft, name = Aircraft(rng, nearest_m, farthest_m), f"4c{number:04x}"
+        aircraft.height = height_m or aircraft.height
         t = ROTATION_S * np.arange(plots) + rng.uniform(0, ROTATION_S)
         lag = TIME_S + (0.01 * t if world == "drift" else 0.0)
         north, up, east = aircraft.at(t - lag)

@@ -287,6 +287,8 @@ def test_the_command_and_python_say_the_same(tmp_path):
     assert [row["value"] for row in document["biases"]] == one.biases["value"].tolist()
     assert document["sigma_range_m"] == one.sigma_range_m == pytest.approx(30, rel=sigma_error(480, z=3))
     assert [row["time_s"] for row in document["aircraft"]] == one.aircraft["time_s"].tolist()
+    assert document["findings"] == document["coefficients"] == []
+    assert document["sigma_of_steps"] == pytest.approx([30, 1e-3], rel=4 * sigma_error(480, z=1))
     said = CliRunner().invoke(main, ["register", radar, other]).stdout
     assert f"480 of 480 plots have a position of their aircraft in {other} (by address 480)" in said
     assert "8 aircraft" in said

@@ -22,7 +22,7 @@ WORLDS = {
         "errors in bearing go with elevation: a tilted antenna, allowed for",
         {"tilt_sin_rad": QUARTER, "tilt_cos_rad": -QUARTER},
     ),
-    "ground": ("errors in range go with elevation: ranges along the ground, not slant, allowed for", {}),
+    "ground": ("errors in range go with elevation: ranges along the ground instead of slant ranges, allowed for", {}),
     "heights": ("errors in range go with elevation: wrong heights of the positions, allowed for", {"height_m": 300.0}),
     "drift": ("errors in range and bearing go with time: a clock that drifts, allowed for", {"time_s_per_s": 0.01}),
 }
@@ -110,6 +110,21 @@ def test_what_is_left_of_unknown_cause_is_named_and_its_biases_are_not_corrected
     assert "bearing_deg=" in command
     assert "range" not in command
     assert "time_s" not in command
+
+
+def test_causes_that_the_plots_do_not_distinguish_are_both_named():
+    """Aircraft of one height, far away: their heights may be wrong as well as the kind of range."""
+    registration = radarsim.register(*recording(0, "ground", height_m=10e3, nearest_m=40e3, farthest_m=100e3))
+    lines = answer(registration)
+    assert lines[1] == (
+        "errors in range go with elevation: wrong heights of the positions, allowed for; "
+        "the plots do not exclude ranges along the ground instead of slant ranges"
+    )
+    rows = estimates(registration)
+    assert holds(rows.loc["range_m"], RANGE_M)
+    assert holds(rows.loc["range_scale"], 0.0)
+    (command,) = [line for line in lines if line.startswith("to correct: ")]
+    assert "range_m" not in command
 
 
 def test_a_bias_that_may_be_zero_is_not_corrected():

@@ -60,7 +60,7 @@ ERRORS = (
         coefficients=("tilt_sin_rad", "tilt_cos_rad"),
     ),
     SensorError(
-        name=term("ranges along the ground, not slant"),
+        name=term("ranges along the ground instead of slant ranges"),
         coordinate=term("range"),
         companion=term("elevation"),
         coefficients=("ground_share",),

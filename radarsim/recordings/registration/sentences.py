@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from radarsim.language.translate import join_names, plural, tr
+from radarsim.recordings.formats.records import BIASES
 from radarsim.recordings.registration.bias_fit import MIN_AIRCRAFT
 from radarsim.recordings.registration.result import Adjustment, AircraftResiduals, Bias, Finding, Registration
 from radarsim.recordings.registration.robust_fit import MAD_TO_SIGMA
@@ -12,7 +13,11 @@ from radarsim.report.wording import interval, significant_digits
 
 OUTLIER_LAG_SIGMAS = 5.0  # standard deviations from the other aircraft, from which a lag counts as different
 POSITION_KEYS = ("height_m",)  # of the error that is not the radar's
-BIASES_IN = {"range": ("range_m", "range_scale", "time_s"), "bearing": ("bearing_rad", "time_s")}
+BIASES_IN = {
+    "range": ("range_m", "range_scale", "time_s"),
+    "bearing": ("bearing_rad", "time_s"),
+    "range and bearing": BIASES,
+}
 
 
 def registration_lines(registration: Registration) -> list[str]:
@@ -96,8 +101,9 @@ def _bias_line(bias: Bias) -> str:
 
 
 def _correction_lines(adjustment: Adjustment) -> list[str]:
-    """The options that subtract the biases that differ from 0 and are of coordinates without unknown errors."""
-    doubtful = {key for finding in adjustment.findings if not finding.cause for key in BIASES_IN[finding.coordinate]}
+    """The options that subtract the biases that differ from 0, and do not depend on a cause that is unknown."""
+    undecided = [finding for finding in adjustment.findings if finding.rivals or not finding.cause]
+    doubtful = {key for finding in undecided for key in BIASES_IN[finding.coordinate]}
     nonzero = [bias for bias in adjustment.biases if bias.identifiable and not _may_be_zero(bias)]
     options = []
     for bias in nonzero:
