@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from radarsim.api import result_content
 from radarsim.language.translate import tr, translate_names
 from radarsim.report import case_selection, key_labels
 from radarsim.report.quantities import RADIAL
@@ -122,15 +123,16 @@ def _paired_stages(result) -> Table:
 
 def names_of(results: Sequence, language: str = "en") -> dict[str, dict[str, str]]:
     """What the language in use calls cases, filters, stages and components: by column of tables, the label by name."""
-    cases: dict[str, str] = {}
+    cases, of_configs = dict[str, str](), result_content.config_names(results)
     for result, name in zip(results, case_selection.distinct_case_names(results), strict=True):
         described = key_labels.without_markup(key_labels.swept_description(result))
         for text in filter(None, (name, key_labels.plain_case_label(result), described, result.name)):
-            cases.setdefault(translate_names(text), result.name)
+            translated = translate_names(text, of_configs)
+            cases[translated] = result.name if cases.get(translated, result.name) == result.name else ""
     has_stages = all(result.study == "multimodel" for result in results)
     by_column = {
-        "case": cases if len(results) > 1 else {},
-        "filter": {translate_names(name): name for result in results for name in _filters(result)},
+        "case": {text: case for text, case in cases.items() if case} if len(results) > 1 else {},
+        "filter": {translate_names(name, of_configs): name for result in results for name in _filters(result)},
         "stage": {tr(name): name for result in results for name in stage_names(result)} if has_stages else {},
         "component": {words: name for name, words in WORDS.items()} if language == "en" else {},
     }
