@@ -16,8 +16,8 @@ from radarsim.papers.claim_rows import (
     claim_ranges,
     class_count,
     classes_in_words,
+    decisive_value_words,
     expected_words,
-    four_digits,
     group_by_claim,
     is_extension,
     measured_words,
@@ -28,7 +28,6 @@ from radarsim.papers.reasons import translate_reason
 from radarsim.papers.result_claims import claims_by_class, claims_judged_only_as_shipped, unjudged_claims
 from radarsim.papers.verdict_classes import is_judged_only_as_shipped
 from radarsim.papers.verdict_rule import DEPENDS
-from radarsim.report.wording import format_if_known
 
 if TYPE_CHECKING:
     from radarsim.api.result import Result
@@ -175,14 +174,14 @@ def _print_claim(parts: Sequence[Row]) -> None:
 
 
 def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
-    """What a line says of a part: case and quantity, values, distance, and why there is no verdict."""
+    """What a line says of a part: case and quantity, the value that decides, what was measured where that is exact,
+    distance, and why there is no verdict."""
     words = [": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))]
     if cell_number(row["measured"]) is not None:
-        words.append(measured_words(row) + tr("; expected {words}", words=expected_words(row["expected"])))
-    if (exact := cell_number(row["exact"])) is not None:
-        words.append(
-            tr("{value} (exact)", value=four_digits(exact) if exact == round(exact) else format_if_known(exact))
-        )
+        words.append(decisive_value_words(row) + tr("; expected {words}", words=expected_words(row["expected"])))
+        measured = measured_words(row)
+        if cell_number(row["exact"]) is not None and "[" in measured:  # with a sampling error
+            words.append(tr("measured {value}", value=measured))
     if (miss := cell_number(row["miss"])) is not None and miss >= MIN_SHOWN_MISS:
         words.append(tr("off by {miss:.3g} margins", miss=miss))
     if row["verdict"] == NOT_JUDGED:

@@ -68,6 +68,15 @@ def test_a_part_that_is_not_counted_says_so(capsys):
     assert capsys.readouterr().out.count("extension, not counted") == 1
 
 
+def test_what_decides_a_part_stands_first(capsys):
+    """The exact value, then what is expected, then what was measured; without an exact one the measured."""
+    sampled = parts(False)[0] | {"measured": 8.8, "lo": -0.3, "hi": 17.1, "judged_lo": -0.3, "judged_hi": 17.1}
+    print_claims([sampled | {"exact": 2.213}], {"P9.1"})
+    assert "size; 2.213 m (exact); expected ≤ 5; measured 8.8 [−0.3, 17.1] m; " in capsys.readouterr().out
+    print_claims([sampled | {"exact": math.nan}], {"P9.1"})
+    assert "size; 8.8 [−0.3, 17.1] m; expected ≤ 5; " in capsys.readouterr().out
+
+
 def test_a_list_of_claims_is_a_line_each(capsys):
     long = "one two three four five six seven eight nine ten eleven twelve thirteen"
     print_claims([*parts(False, False), *[one | {"claim": "P9.2", "statement": long} for one in parts(False)]])
