@@ -1,20 +1,18 @@
 """What the report of folded Doppler asks and answers, in sentences."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from radarsim.config.experiment import Case, Experiment
+from radarsim.config.experiment import Experiment
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, plural, tr
 from radarsim.report import case_selection, compared_value, key_labels, rare_events, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import Estimate
-from radarsim.studies.ambiguous_doppler.kernels.layout import OFF_BY_HALF_SPAN_SUM
-from radarsim.studies.ambiguous_doppler.study import prepare, simulate
+from radarsim.studies.ambiguous_doppler import remedy_answer
 from radarsim.studies.ambiguous_doppler.tables import Result
 
 if TYPE_CHECKING:
@@ -23,14 +21,7 @@ if TYPE_CHECKING:
 
 TablesByName = Mapping[str, "pd.DataFrame"]
 AS_GOOD_PERCENT = 5.0  # above the oracle's σ
-LOST_SHARE = 0.5  # of realisations, from which a filter counts as lost
 LOST_PERCENT = 100.0  # above the oracle's σ, from which a σ is rather a share of lost tracks
-# What brings a filter that loses its folds back to them: remedies tried on realisations of the same case.
-TRIAL_REALISATIONS = 400  # a share of a tenth is known to 1.5 points
-MAX_LOST_SHARE = 0.1  # of realisations, up to which a remedy helps
-SMOOTH_MPS2 = 10.0  # acceleration that the model of order 1 allows for: what keeps the lock through turns of some g
-LARGER = 100.0  # times the manoeuvre variance
-STAGGER = (1.0, 7 / 6, 4 / 3)  # times the repetition rate, used in turn
 
 
 def warnings(experiment: Experiment) -> list[str]:
@@ -65,7 +56,8 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
     reported, remark = case_selection.select_reported(results, 6)
     of_all_cases = [*_least_error_of_all(results, tables_by_name), *_as_good_in_cases(results, tables_by_name)]
     of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name)]
-    remedies = _remedy_sentence(reported, tables_by_name)
+    filters = [(result, name) for result in reported for name in _reported_filters(result)]
+    remedies = remedy_answer.remedy_sentence(filters, tables_by_name)
     return [*of_all_cases[:1], *of_cases, *remedies, *map(Sentence, remark)]
 
 
@@ -289,7 +281,7 @@ def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
         k=k,
         share=wording.share(*(100 * end for end in share.estimate)) + share.choice_remark(),
     )
-    if folds["beyond"] > LOST_SHARE:
+    if folds["beyond"] > remedy_answer.LOST_SHARE:
         text = tr("lost: {off}", off=text)
     return Sentence(text, sentences.intervals("folds", "beyond", folds))
 
@@ -318,82 +310,3 @@ def _wrong_folds_sought(result: Result, name: str, tables_by_name: TablesByName)
         **rare_events.rate_fields(row),
     )
     return [Sentence(text, sentences.intervals("rare", "rate", row))]
-
-
-def _remedy_sentence(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """What helps the first filter that is lost, where something does of what is tried."""
-    for result in results:
-        for name in _reported_filters(result):
-            folds = tables.select_rows(tables_by_name["folds"], case=result.name, filter=name)
-            if not len(folds) or folds.iloc[-1]["beyond"] <= LOST_SHARE:
-                continue
-            helping = [
-                tr("{settings} ({share} % lost)", settings=settings, share=numeral(f"{100 * share:.2g}"))
-                for settings, share in cures(result.spec, name, dict(result.swept_values))
-            ]
-            if not helping:
-                return []
-            text = tr(
-                "{case}, {filter}: what helps, tried on {count} realisations: {cures}.",
-                case=key_labels.plain_case_label(result),
-                filter=name,
-                count=TRIAL_REALISATIONS,
-                cures="; ".join(helping),
-            )
-            return [Sentence(text)]
-    return []
-
-
-class _Remedy(NamedTuple):
-    """Settings of the config that may help a filter, by key; the filter and the radar that they make."""
-
-    settings: Mapping[str, str]
-    filter: Any
-    radar: Any
-
-    @property
-    def options(self) -> str:
-        return " ".join(f"--set {key}={value}" for key, value in self.settings.items())
-
-
-def cures(spec: Any, name: str, swept: Collection[str] = ()) -> Iterator[tuple[str, float]]:
-    """The remedies that help a filter, as settings of the config, and the share of realisations it then loses.
-
-    swept: keys that the config sweeps, which no setting may change beside it."""
-    for remedy in _remedies(spec, name):
-        if any(f"{setting}.".startswith(f"{key}.") for setting in remedy.settings for key in swept):
-            continue
-        changes = {"radar": remedy.radar, "filters": (remedy.filter,), "baseline": None, "rare": None}
-        share = _share_lost(spec.model_copy(update=changes))
-        if share <= MAX_LOST_SHARE:
-            yield remedy.options, share
-
-
-def _remedies(spec: Any, name: str) -> Iterable[_Remedy]:
-    """What is tried: two orders with a smoother one, a larger manoeuvre variance, staggered repetition rates."""
-    index, lost = next((i, f) for i, f in enumerate(spec.filters) if f.name == name)
-    key = f"filters.{index}"
-    (variance, *_), rates = lost.variances, spec.radar.rates_hz
-    if lost.combine is None:
-        both = {"orders": (1, 2), "combine": "likelihood", "manoeuvre_variance": (SMOOTH_MPS2**2, variance)}
-        settings = {
-            f"{key}.orders": "[1,2]",
-            f"{key}.combine": "likelihood",
-            f"{key}.manoeuvre_variance": f"[{SMOOTH_MPS2**2:g},{variance:g}]",
-        }
-        yield _Remedy(settings, lost.model_copy(update=both | {"stay_probability": 0.95}), spec.radar)
-        larger = LARGER * variance
-        settings = {f"{key}.manoeuvre_variance": f"{larger:g}"}
-        yield _Remedy(settings, lost.model_copy(update={"manoeuvre_variance": larger}), spec.radar)
-    if len(rates) == 1:
-        staggered = tuple(float(f"{factor * rates[0]:.4g}") for factor in STAGGER)
-        settings = {"radar.repetition_rate_hz": f"[{','.join(f'{rate:g}' for rate in staggered)}]"}
-        yield _Remedy(settings, lost, spec.radar.model_copy(update={"repetition_rate_hz": staggered}))
-
-
-@lru_cache(maxsize=64)  # the answer is made for the page, and again where a program asks for it
-def _share_lost(spec: Any) -> float:
-    """The share of realisations in which the only filter's velocity is off by more than half the span at the end."""
-    plan = prepare(Case("", "", "ambiguous_doppler", spec, (), TRIAL_REALISATIONS, 1))
-    arrays = plan.layout.unpack(simulate(plan, 0, TRIAL_REALISATIONS))
-    return float(arrays["folds"][0, -1, OFF_BY_HALF_SPAN_SUM] / arrays["estimates"][0, -1, 0])
