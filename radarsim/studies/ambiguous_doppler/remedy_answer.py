@@ -6,6 +6,8 @@ from functools import lru_cache
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from radarsim.config.experiment import Case
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
@@ -165,7 +167,7 @@ def _remedies(spec: Any, name: str) -> Iterable[_Remedy]:
 
 def _target_speed_mps(target: Any) -> float:
     """The speed that a target's keys say; zero where they say none."""
-    coefficients = getattr(target, "coefficients", ())
+    coefficients: tuple[float, ...] = getattr(target, "coefficients", ())
     return float(getattr(target, "speed_mps", 0.0) or (abs(coefficients[1]) if len(coefficients) > 1 else 0.0))
 
 
@@ -174,9 +176,9 @@ def _trial(spec: Any, count: int) -> Trial:
     """What the first filter loses and, beside one of the range alone, gains at the last scan."""
     plan = prepare(Case("", "", "ambiguous_doppler", spec, (), count, 1))
     arrays = plan.layout.unpack(simulate(plan, 0, count))
-    estimates = arrays["estimates"][:, -1, 0]
+    estimates = np.asarray(arrays["estimates"])[:, -1, 0]
     share = float(arrays["folds"][0, -1, OFF_BY_HALF_SPAN_SUM] / estimates[0])
     if len(spec.filters) == 1:
         return Trial(share, math.nan)
-    first, alone = (arrays["error"][f, -1, 0, 1] / estimates[f] for f in (0, 1))
-    return Trial(share, float(100 * (1 - math.sqrt(first / alone))))
+    square = np.asarray(arrays["error"])[:, -1, 0, 1] / estimates
+    return Trial(share, float(100 * (1 - np.sqrt(square[0] / square[1]))))
