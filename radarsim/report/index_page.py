@@ -1,4 +1,4 @@
-"""results/index.html: all runs of a folder by group, newest first, each with its answer in one line."""
+"""results/index.html: all runs of a folder by group, the newest of a group first, each with its answer."""
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime

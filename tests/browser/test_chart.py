@@ -104,7 +104,7 @@ def test_a_link_opens_the_setting_and_bad_ones_are_left_aside(page, live):
     expected = sigmas(2, 2, 60, 2, 12, 0.01, 20)[-1, 0]
     base = sigmas(1, 3, 60, 2, 12, 0.01, 20)[-1, 0]
     gain = round(100 * (1 - expected / base), 1)
-    assert f"{gain:g} % off the range" in page.evaluate("document.getElementById('sentence').textContent")
+    assert f"reduces the range error by {gain:g} %" in page.evaluate("document.getElementById('sentence').textContent")
     page.evaluate("location.hash = '#r=-1&v=x&dt=1e99&constructor=3&k=2'")
     page.evaluate("new Promise((done) => setTimeout(done, 100))")
     assert setting(page) == {"r": 60, "v": 2, "dt": 12, "dm": 0.01, "k": 20}

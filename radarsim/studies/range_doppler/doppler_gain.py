@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.language.translate import join_names, term, tr
+from radarsim.language.translate import term, tr
 from radarsim.report import render_page, tables
 from radarsim.report.drawing.model import Chart
 from radarsim.report.wording import list_numbers, significant_digits
@@ -62,33 +62,27 @@ def chart(cases: Sequence[Case], references: Sequence[Case]) -> Chart:
 def sentence(place: RadarOnChart) -> str:
     """The position of a radar on the chart, and its gains from Doppler in the long run."""
     r, V, a = (round(float(gain), 1) for gain in place.exact_gain)
-    c, last = significant_digits(place.groups.c, ".2g"), place.gain[-1]
-    verbs = [
-        tr("takes {size:g} % off the range", size=r) if r >= 0 else tr("adds {size:g} % to the range", size=-r),
-        tr("adds {size:g} % to the velocity", size=-V) if V < 0 else tr("{size:g} % off the velocity", size=V),
-    ]
-    if r < 0 <= V:
-        verbs[1] = tr("takes {size:g} % off the velocity", size=V)
-    gained = tr("the acceleration gains {size:g} %", size=a)
-    acceleration = gained if a >= 0 else tr("the acceleration loses {size:g} %", size=-a)
-    distance = significant_digits(float(np.abs(place.exact_gain - place.limit_gain).max()), ".2g")
-    period = place.inputs[2]
+    changes_alike = (r >= 0) == (V >= 0)
     return tr(
-        "{name}: in the long run Doppler {verbs}; {acceleration} (c = {c}, τ₁ = {tau_1:.3g} s, τ₂ = {tau_2:.3g} s). "
-        "At its last scan, {t_s:g} s: {gains} %. With Δt/τ₁ = {first:.2g} and Δt/τ₂ = {second:.2g} the curve of short "
-        "periods is up to {away} points off.",
+        "{name}: in the long run Doppler {range} and {velocity}; {acceleration}. At its last scan, {t_s:g} s: {gains} %.",
         name=place.name,
-        c=c,
-        tau_1=place.tau_1_s,
-        tau_2=place.tau_2_s,
-        verbs=join_names(verbs),
-        acceleration=acceleration,
+        range=_change(r, "reduces the range error by {size} %", "raises the range error by {size} %"),
+        velocity=tr("the velocity error by {size} %", size=_size(V))
+        if changes_alike
+        else _change(V, "reduces the velocity error by {size} %", "raises the velocity error by {size} %"),
+        acceleration=_change(a, "the acceleration error falls by {size} %", "the acceleration error rises by {size} %"),
         t_s=float(place.t_s[-1]),
-        gains=list_numbers(significant_digits(float(g), ".3g") for g in last),
-        first=period / place.tau_1_s,
-        second=period / place.tau_2_s,
-        away=distance,
+        gains=list_numbers(significant_digits(float(g), ".3g") for g in place.gain[-1]),
     )
+
+
+def _change(gain: float, lower: str, higher: str) -> str:
+    """What a gain, %, does to an error; both messages are among PAGE_TERMS."""
+    return tr(lower if gain >= 0 else higher, size=_size(gain))
+
+
+def _size(gain: float) -> str:
+    return significant_digits(abs(gain), ".4g")
 
 
 def accuracy_warning(place: RadarOnChart) -> str:
@@ -152,12 +146,12 @@ def page(user_places: Sequence[RadarOnChart], reference_places: Sequence[RadarOn
 PAGE_PARTS = ("body.html.j2", "style.css", "script.js")
 PAGE_TERMS = (  # by the page's script
     *(term("range"), term("velocity"), term("acceleration"), term("time, s"), term("Scan {k}, {t} s: {values}")),
-    *(term("takes {size} % off the range"), term("adds {size} % to the range")),
+    *(term("reduces the range error by {size} %"), term("raises the range error by {size} %")),
     *(
-        term("{size} % off the velocity"),
-        term("takes {size} % off the velocity"),
-        term("adds {size} % to the velocity"),
+        term("the velocity error by {size} %"),
+        term("reduces the velocity error by {size} %"),
+        term("raises the velocity error by {size} %"),
     ),
-    *(term("the acceleration gains {size} %"), term("the acceleration loses {size} %"), term("from {low} to {high}")),
-    term("At scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration} (c = {c}, τ₁ = {one} s, τ₂ = {two} s)."),
+    *(term("the acceleration error falls by {size} %"), term("the acceleration error rises by {size} %")),
+    *(term("from {low} to {high}"), term("At scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration}.")),
 )

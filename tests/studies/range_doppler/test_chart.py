@@ -115,13 +115,13 @@ def test_the_papers_radars_lie_where_the_paper_has_them(tmp_path):
     assert_rounded(rows.loc["rls2", "r"]["c"], rows.loc["rls3", "r"]["c"], operations=10)  # powers of the same numbers
     assert rows.loc["rls4", "r"]["steady_gain_percent"] == pytest.approx(52.4, abs=0.05)  # as printed
     assert [line.split(":")[0] for line in five.sentences] == ["rls1", "rls2", "rls3", "rls4", "rls5"]
-    assert "the acceleration loses 5.8 %" in five.sentences[0]
+    assert "the acceleration error rises by 5.8 %" in five.sentences[0]
     assert (rows["c"] == rows["c"]).all()
 
 
 def test_ones_own_radar_is_named_and_marked(made):
     (sentence,) = made.sentences
-    assert sentence.startswith("rls2, as set: in the long run Doppler takes 45.4 % off the range")
+    assert sentence.startswith("rls2, as set: in the long run Doppler reduces the range error by 45.4 %")
     figures = {"gain_against_time.svg", "map.svg", "steady_gain.svg"}
     assert {"chart.csv", "chart.html", "captions.md", *figures} == set(made.files)
     rows = pd.read_csv(made.folder / "chart.csv")
@@ -198,7 +198,7 @@ def test_the_table_on_the_wall_is_the_closed_form():
 
 def test_the_command(tmp_path):
     document = json.loads(command("chart", "rls4", "--out", tmp_path, "--no-figures", "--json").stdout)
-    assert document["sentences"][0].startswith("rls4: in the long run Doppler takes 52.4 % off")
+    assert document["sentences"][0].startswith("rls4: in the long run Doppler reduces the range error by 52.4 %")
     assert document["cases"][0]["component"] == "r"
     assert sorted(p.name for p in (tmp_path / "chart").iterdir()) == ["chart.csv", "chart.html"]
     assert "page     " in command("chart", "rls4", "--out", tmp_path, "--no-figures").stdout

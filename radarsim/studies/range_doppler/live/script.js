@@ -146,16 +146,18 @@ const radar = (() => {
   let shown = null, scan = -1;
 
   function sentence() {
-    const { c, one, two } = radar.numbers(setting), last = shown.gain[setting.k - 1];
+    const last = shown.gain[setting.k - 1];
     const [r, V, a] = last.map((g) => Math.round(10 * g) / 10 + 0);
     const part = (g, less, more) => filled(g >= 0 ? less : more, { size: short(Math.abs(g)) });
     const told = {
-      c: short(c, 2), one: short(one, 3), two: short(two, 3), k: setting.k, t: short((setting.k - 1) * setting.dt),
-      range: part(r, "takes {size} % off the range", "adds {size} % to the range"),
-      velocity: part(V, r >= 0 ? "{size} % off the velocity" : "takes {size} % off the velocity", "adds {size} % to the velocity"),
-      acceleration: part(a, "the acceleration gains {size} %", "the acceleration loses {size} %"),
+      k: setting.k, t: short((setting.k - 1) * setting.dt),
+      range: part(r, "reduces the range error by {size} %", "raises the range error by {size} %"),
+      velocity: (r >= 0) === (V >= 0)
+        ? part(V, "the velocity error by {size} %", "the velocity error by {size} %")
+        : part(V, "reduces the velocity error by {size} %", "raises the velocity error by {size} %"),
+      acceleration: part(a, "the acceleration error falls by {size} %", "the acceleration error rises by {size} %"),
     };
-    node("sentence").textContent = filled("At scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration} (c = {c}, τ₁ = {one} s, τ₂ = {two} s).", told);
+    node("sentence").textContent = filled("At scan {k}, {t} s, Doppler {range} and {velocity}; {acceleration}.", told);
   }
 
   function redraw() {
