@@ -13,7 +13,15 @@ from radarsim.config.document import Document
 from radarsim.config.drafts import Draft, Expansion, OverlaidKeys, changes_included, config_name
 from radarsim.config.error_list import ABSENT, ErrorList, Origin
 from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern
-from radarsim.config.find_files import RESERVED, available_stems, config_file, did_you_mean, is_reserved, is_stem
+from radarsim.config.find_files import (
+    RESERVED,
+    available_stems,
+    config_file,
+    did_you_mean,
+    is_reserved,
+    is_stem,
+    known_names_hint,
+)
 from radarsim.config.inline_files import (
     ConfigFiles,
     ReadDocument,
@@ -50,8 +58,8 @@ def no_such_config(name: str, studies: Studies, list_names: bool = False) -> str
     if reasons := studies.reasons_for_missing_config(name):
         return f"no such config: {'; '.join(reasons)}"
     available = available_stems("configs")
-    name_list = f"; there are: {', '.join(available)}" if list_names else ""
-    return f"no such config{did_you_mean(name, available) or name_list}"
+    hint = known_names_hint(name, available, "configs") if list_names else did_you_mean(name, available)
+    return f"no such config{hint}"
 
 
 class Expander:

@@ -12,6 +12,8 @@ STEM = re.compile(r"\w[\w+=-]*(?:\.[\w+=-]+)*")
 RESULT_FILES = ("index.html", "readme.md")  # stand beside the folders of results, which have the names of configs
 RESERVED = "a config must have another name: there is a file of that name among the results"
 
+MAX_NAMES_LISTED = 12  # in a message about one that is not known
+
 
 def no_folders() -> tuple[Path, ...]:
     """The further folders with configs/ and scenarios/: none, unless radarsim.api.configs sets `further_folders`."""
@@ -89,3 +91,14 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     beginnings = [full for full in known_names if len(name) > 2 and full.lower().startswith(name.lower())]
     matches = beginnings or difflib.get_close_matches(name, known_names, n=1, cutoff=0.6)
     return f"; did you mean {matches[0]}?" if matches else ""
+
+
+def known_names_hint(name: str, known_names: Iterable[str], kind: str) -> str:
+    """What follows a name that is not known: the name that is meant, else all names of a kind, of many the nearest."""
+    known_names = list(known_names)
+    if suggestion := did_you_mean(name, known_names):
+        return suggestion
+    if len(known_names) <= MAX_NAMES_LISTED:
+        return f"; there are: {', '.join(known_names)}"
+    nearest = difflib.get_close_matches(str(name)[:100], known_names, n=3, cutoff=0.0)
+    return f"; the nearest: {', '.join(nearest)}; `radarsim list {kind}` has all {len(known_names)}"

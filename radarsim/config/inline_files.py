@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 
 from radarsim.config.document import Document
 from radarsim.config.error_list import ErrorList
-from radarsim.config.find_files import available_stems, did_you_mean, is_stem, scenario_file
+from radarsim.config.find_files import available_stems, is_stem, known_names_hint, scenario_file
 from radarsim.config.marks import DataFile, Scenario
 from radarsim.config.model import Model
 from radarsim.config.study_keys import StudyKeys
@@ -49,7 +49,7 @@ def inline_scenarios(
             faults.mark_unusable(origin, path, "must be the stem of a scenario, without folder or suffix", stem)
         elif file is None:
             known_stems = available_stems("scenarios")
-            hint = did_you_mean(stem, known_stems) or f"; there are: {', '.join(known_stems)}"
+            hint = known_names_hint(stem, known_stems, "scenarios")
             faults.mark_unusable(origin, path, f"no such scenario{hint}", stem)
         elif scenario := files.read(file, faults):
             document = document.graft_document(path, scenario)

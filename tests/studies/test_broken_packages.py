@@ -104,4 +104,4 @@ def test_a_config_that_a_broken_package_would_have_is_not_merely_missing(radarsi
     (tmp_path / "both.yaml").write_text(f"include: [rls2, {stem}]\n")
     said = radarsim("check", "both.yaml", cwd=tmp_path, code=2).stderr
     assert said == f"both.yaml:1:17: include.1: no such config: {fault} ({place}), got '{stem}'\n"
-    assert "no such config; there are: " in radarsim("run", "wholly_unknown", cwd=tmp_path, code=2).stderr
+    assert "no such config; the nearest: " in radarsim("run", "wholly_unknown", cwd=tmp_path, code=2).stderr
