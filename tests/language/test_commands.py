@@ -57,7 +57,7 @@ def test_the_live_page_is_russian_in_its_body_and_in_what_its_script_says(drawn)
     script = page[page.rindex("<script>") :]
     asked = {
         *re.findall(r'\b(?:translated|filled|part\(\w+,)\(?"([^"]+)"', script),
-        *re.findall(r'"((?:takes|adds|the acc|{size})[^"]+)"', script),
+        *re.findall(r'"((?:reduces|raises|the acc|the vel)[^"]+)"', script),
     }
     assert asked | {"range", "velocity", "acceleration"} == set(PAGE_TERMS)
     assert all(said[text] != text for text in PAGE_TERMS)

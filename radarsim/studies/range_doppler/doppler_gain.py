@@ -64,7 +64,8 @@ def sentence(place: RadarOnChart) -> str:
     r, V, a = (round(float(gain), 1) for gain in place.exact_gain)
     changes_alike = (r >= 0) == (V >= 0)
     return tr(
-        "{name}: in the long run Doppler {range} and {velocity}; {acceleration}. At its last scan, {t_s:g} s: {gains} %.",
+        "{name}: in the long run Doppler {range} and {velocity}; {acceleration}. "
+        "At its last scan, {t_s:g} s: {gains} %.",
         name=place.name,
         range=_change(r, "reduces the range error by {size} %", "raises the range error by {size} %"),
         velocity=tr("the velocity error by {size} %", size=_size(V))
