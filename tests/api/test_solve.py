@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import shlex
 from itertools import pairwise
 
@@ -172,6 +173,12 @@ def test_sampled_it_has_limits_and_keys_without_effect():
     beyond = solve("rls2", "radar.sigma_velocity_mps", GAIN, 65, sampled=True, realisations=2000)
     assert beyond.value is None
     assert beyond.limit == pytest.approx(56.7, abs=mean_error(2000, 100 - 56.7))
+    (interval,) = (line for line in beyond.unattained if "for all 13 values tried" in line)  # chosen among them
+    low, high = map(float, re.findall(r"[\d.]+(?= to | %)", interval))
+    single = radarsim.run("rls2", overrides=["radar.sigma_velocity_mps=0.015"], realisations=2000).gains
+    row = single.query("component == 'r' and k == 7").iloc[0]
+    assert low < beyond.limit < high
+    assert high - low > 1.3 * (row["gain_hi"] - row["gain_lo"])
     with pytest.raises(ConfigError, match="has no effect"):
         solve("rls2", "radar.wavelength_m", GAIN, 30, sampled=True, realisations=500)
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 from radarsim.api.design import root_search
 from radarsim.api.design.quantities import UNPAIRED_FACTOR
@@ -29,6 +30,7 @@ from radarsim.api.design.question import (
 from radarsim.api.design.solve_answer import Answer
 from radarsim.errors import argument
 from radarsim.language.translate import tr
+from radarsim.report.compared_value import ComparedValue
 from radarsim.report.statistics import Estimate
 
 PILOT_SHARE, MIN_PILOT_REALISATIONS = 16, 200  # realisations of the scan: a share of all, but not fewer
@@ -75,16 +77,19 @@ def solve_by_sampling(question: Question, curve: Curve, notify: Callable[[str], 
         )[0]
     solutions = [_close_interval(question, curve, *pair) for pair in dict.fromkeys(brackets)]
     if not solutions:
-        limit = curve.simulate(best, count)
-        is_near = limit.lo <= question.equals <= limit.hi
-        doubt = tr(
-            "its 95 % interval, {lo:.4g} to {hi:.4g} {unit}, holds the target: more realisations, {option}, decide",
-            lo=limit.lo,
-            hi=limit.hi,
-            unit=tr(question.unit),
-            option=argument("realisations=…", "-n"),
-        )
-        notes = (doubt,) if is_near else boundary_note(question, curve, best)
+        limit = _chosen_among(question, curve.simulate(best, count), len(grid))
+        fields = {"count": len(grid), "lo": limit.lo, "hi": limit.hi, "unit": tr(question.unit)}
+        if limit.lo <= question.equals <= limit.hi:
+            doubt = tr(
+                "the interval for all {count} values tried, {lo:.4g} to {hi:.4g} {unit}, holds the target: more "
+                "realisations, {option}, decide",
+                **fields,
+                option=argument("realisations=…", "-n"),
+            )
+            notes: tuple[str, ...] = (doubt,)
+        else:
+            known = tr("simulated; the interval for all {count} values tried is {lo:.4g} to {hi:.4g} {unit}", **fields)
+            notes = (known, *boundary_note(question, curve, best))
         return answer(limit=limit.value, limit_at=best, notes=notes + scan_notes)
     value = nearest_value([root.value for root in solutions], question)
     solution, estimate = next(root for root in solutions if root.value == value), curve.simulate(value, count)
@@ -99,6 +104,14 @@ def solve_by_sampling(question: Question, curve: Curve, notify: Callable[[str], 
         + scan_notes
         + curve.interval_notes(value),
     )
+
+
+def _chosen_among(question: Question, estimate: Estimate, looks: int) -> Estimate:
+    """The nearest value that was simulated, with an interval that holds for all values tried."""
+    quantity = question.quantity.definition
+    kind: Any = "gain" if quantity.paired else quantity.kind
+    value = ComparedValue(Estimate(*(float(end) / quantity.scale for end in estimate)), is_exact=False, kind=kind)
+    return Estimate(*(end * quantity.scale for end in value.chosen_among(looks).estimate))
 
 
 def unpaired_note(question: Question, curve: Curve) -> tuple[str, ...]:
