@@ -79,7 +79,7 @@ ROOMS = {
     "studies.linear_problem": ("config.experiment", "kernels", "studies.linear_design", "studies.noise"),
     "studies.linear_recordings": (
         *("kernels", "studies.error_law", "studies.gross_errors", "studies.linear", "studies.linear_design"),
-        "studies.recording_interface",
+        *("studies.missed_scans", "studies.recording_interface"),
     ),
     "studies.stepwise": (
         *("config.experiment", "config.study_keys", *SUMS, "kernels", "report", "report.drawing"),
@@ -125,7 +125,10 @@ ROOMS = {
         *("studies.error_law", "studies.plot_arrays", "studies.recording_interface", "studies.registry"),
         "studies.user_filters",
     ),
-    "recordings.formats": ("recordings", "recordings.fit.folded_doppler", "language", "physics", "report"),
+    "recordings.formats": (
+        *("recordings", "recordings.fit.folded_doppler", "recordings.fit.velocity_faults", "language", "physics"),
+        "report",
+    ),
     "recordings.fit": (
         *("recordings", "config", "language", "report", "studies.error_law", "studies.missed_scans"),
         "studies.recording_interface",

@@ -75,7 +75,8 @@ def check_user_filter(case: Case, member: UserFilter) -> list[str]:
     lines = _rounding_warnings(member, estimates.plain(estimates.parts(output)[0]), x, rms)
     measured = [column for column in plot_arrays.columns.values() if column.shape == x.shape[:2]]
     if measured:
-        lines += time_warnings(member.name, x, truth[..., component_indices], np.stack(measured, axis=-1))
+        plot_columns = np.stack(measured, axis=-1)
+        lines += time_warnings(member.name, x, truth[..., component_indices], plot_columns, truth)
     if sees_plots:
         columns = plot_arrays.columns
         if any(not np.array_equal(plots[name], columns[name], equal_nan=True) for name in columns):

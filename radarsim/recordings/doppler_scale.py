@@ -4,21 +4,19 @@ Along a track the range is the integral of the velocity, however the target flie
 change of the range, the slope of the range on the integral is 1 / k: it is fitted by least absolute deviations, with a
 constant for each stretch. A wrong unit of the velocities, of the ranges or of the times, and a wrong sign, each leave a
 multiple of their own. Velocities that are folded may look like a multiple below 1/3: a speed V by a span D becomes
-V - D = k V, with a size of at most D / 2. There the multiple must hold without what grows with time alone, as the spans
-do."""
+V - D = k V, with a size of at most D / 2. There the multiple is certain only if it holds without what grows with time
+alone, as the spans do."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from radarsim.config.experiment import Case
 from radarsim.language.translate import term, tr
-from radarsim.recordings.study_part import recording_interface
 from radarsim.report.wording import significant_digits
 
 COLUMNS = ("t_s", "range_m", "velocity_mps")
-MAX_GAP_S = 60.0  # of a stretch over which velocities are integrated
+MAX_GAP_S, MAX_GAP_STEPS = 60.0, 5.0  # of a stretch over which velocities are integrated; in its median steps
 MIN_STRETCH_ROWS, MIN_ROWS, MAX_ROWS = 5, 20, 10_000  # of a stretch, and of all
 MIN_COURSE = 5.0  # median deviations of the ranges that the fitted course must span, by its median
 ROUNDS = 40  # of reweighting, for least absolute deviations
@@ -37,6 +35,10 @@ CAUSES = {  # multiples, and what leaves them
     KNOT_MPS: term("they are in m/s, not in knots"),
     KMH_MPS: term("they are in m/s, not in km/h"),
     FOOT_M: term("the ranges are in feet, not in m"),
+    1.852: term("the ranges are in nautical miles, not in km"),
+    1852.0: term("the ranges are in nautical miles, not in m"),
+    10.0: term("they are in dm/s, or the times in tenths of a second"),
+    100.0: term("they are in cm/s, or the times in hundredths of a second"),
     1e3: term("the times are in a unit a thousand times smaller, or the ranges in km"),
     1e6: term("the times are in µs"),
     1e9: term("the times are in ns"),
@@ -50,16 +52,22 @@ CAUSES = {  # multiples, and what leaves them
 @dataclass(frozen=True)
 class DopplerScale:
     """Velocities as a multiple of the change of the range; is_sign: whether only the sign is wrong; causes: those of
-    CAUSES that leave such a multiple."""
+    CAUSES that leave such a multiple; is_certain: whether folds cannot leave it."""
 
     multiple: float
     is_sign: bool
     causes: tuple[str, ...]
+    is_certain: bool = True
+
+    @property
+    def is_foldable(self) -> bool:
+        """Whether folds of a constant speed may leave such a multiple."""
+        return MIN_FOLDABLE < self.multiple < MAX_FOLDABLE
 
 
 def detect_doppler_scale(tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerScale | None:
     """The multiple of the change of the range that the velocities of tracks, COLUMNS (n,), are; None where they agree
-    with it, or do not show one."""
+    with it, or do not show one. One that is not certain may come from folds."""
     arrays = [np.stack([columns[name] for name in COLUMNS]) for columns in tracks]
     arrays = [array[:, np.isfinite(array).all(axis=0)] for array in arrays]
     if sum(array.shape[1] for array in arrays) < MIN_ROWS:
@@ -79,9 +87,9 @@ def detect_doppler_scale(tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerS
     if error > MAX_ERROR:
         return None
     scale = _scale(1 / slope, max(error, UNIT_TOLERANCE))
-    if scale is None or scale.is_sign or not MIN_FOLDABLE < scale.multiple < MAX_FOLDABLE:
+    if scale is None or scale.is_sign or not scale.is_foldable:
         return scale
-    return scale if _holds_with_drift(slope, t, r, integral, number) else None
+    return replace(scale, is_certain=_holds_with_drift(slope, t, r, integral, number))
 
 
 def _wandering_m(stretch: np.ndarray) -> float:
@@ -109,8 +117,11 @@ def _stretches(track: np.ndarray) -> list[np.ndarray]:
     """Stretches (4, m) of a track (3, n) without long gaps: with the integral of the velocity, m."""
     t, _, v = track
     steps = np.diff(t)
-    integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])[: len(t)]
-    parts = np.split(np.vstack([track, integral]), np.flatnonzero((steps <= 0) | (steps > MAX_GAP_S)) + 1, axis=1)
+    if not steps.size:
+        return []
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])
+    longest = max(MAX_GAP_S, MAX_GAP_STEPS * float(np.median(steps)))  # times may be in a smaller unit than s
+    parts = np.split(np.vstack([track, integral]), np.flatnonzero((steps <= 0) | (steps > longest)) + 1, axis=1)
     return [part for part in parts if part.shape[1] >= MIN_STRETCH_ROWS]
 
 
@@ -148,13 +159,6 @@ def _scale(multiple: float, error: float) -> DopplerScale | None:
     causes = tuple(cause for factor, cause in CAUSES.items() if abs(np.log(size / factor)) <= error)
     is_likely = bool(causes) or size >= MAX_PLAUSIBLE_MULTIPLE  # any other multiple below 1 may be folded in part
     return DopplerScale(multiple, is_sign, causes) if is_sign or is_likely else None
-
-
-def detect_case_doppler_scale(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerScale | None:
-    """The same for tracks that a case's study takes as measured, unless it unfolds the velocities."""
-    if not tracks or not set(COLUMNS) <= set(tracks[0]) or recording_interface(case).unfolds():
-        return None
-    return detect_doppler_scale(tracks)
 
 
 def doppler_scale_message(scale: DopplerScale) -> str:

@@ -18,6 +18,16 @@ MAX_PROBABILITY_CHANGE = 1e-3
 LOSS_GAP_INTERVALS, LOSS_GAP_PERIODS = 30.0, 1000.0  # a gap in median intervals so far, or in the config's scan periods
 ROWS_AFTER_GAP = 100  # rows compared after a gap
 LENGTH_UNITS = ("m", "rad")  # units of measured numbers, which are never known exactly
+DAY_S = 86400.0
+
+
+def gap_message(gap_s: float) -> str:
+    """The fault that estimates after a gap are only rounding errors, and why."""
+    days = f" ({gap_s / DAY_S:.3g} days)" if gap_s >= DAY_S else ""
+    return (
+        f"after a gap of {gap_s:g} s{days} the target may be so far away that a filter's numbers are lost in rounding: "
+        "split the file here"
+    )
 
 
 class RoundingGuard:

@@ -7,7 +7,8 @@ MIN_DATED_S = 1e8  # since 1970; smaller times count from anywhere
 DAY_S = 86400.0
 HOUR_S = 3600.0
 MAX_ZONE_HOURS = 14
-ROLLOVER_S = 1024 * 7 * DAY_S  # of the weeks of GPS, which are counted by ten bits
+WEEK_S = 7 * DAY_S
+ROLLOVER_S = 1024 * WEEK_S  # of the weeks of GPS, which are counted by ten bits
 
 
 class TimeSpan(NamedTuple):

@@ -11,7 +11,7 @@ from numpy.linalg import LinAlgError
 from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError, PlotFault
 from radarsim.recordings import read_plots
-from radarsim.recordings.rounding_guard import RoundingGuard
+from radarsim.recordings.rounding_guard import RoundingGuard, gap_message
 from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.tracking_result import ErrorSums, InnovationTally, TrackingResult
@@ -46,8 +46,7 @@ class TrackFollower:
         except PlotFault as fault:
             raise ConfigError(f"{self._row_location(self.rounding_guard.rows + fault.row)}: {fault}") from fault
         if is_lost:
-            gap = f"{self.rounding_guard.gap_s:g} s"
-            message = f"after a gap of {gap} a filter's numbers are lost in rounding: split the file here"
+            message = gap_message(self.rounding_guard.gap_s)
             raise ConfigError(f"{self._row_location(self.rounding_guard.gap_row)}: t_s: {message}")
         self.followed.add(columns, track)
         self.followed.add_errors(track, columns["t_s"], rows.truth)

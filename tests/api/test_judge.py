@@ -15,6 +15,7 @@ import radarsim
 from radarsim.api import case_results, judge
 from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import load
+from radarsim.api.estimate_time import time_warnings
 from radarsim.api.result_content import case_figures
 from radarsim.cli.command_group import main
 from radarsim.engine.collect import collect
@@ -217,6 +218,38 @@ def test_estimates_from_before_the_plot_owe_nothing_to_it(estimates, components)
     (line,) = tried(predicted[..., :components])
     assert "owe nothing to the plot of their scan" in line
     assert tried(estimates[..., :components]) == []
+
+
+@pytest.mark.parametrize("components", [(0,), (1,), (0, 1)])
+@pytest.mark.parametrize(("alpha", "beta"), [(0.2, 0.02), (0.5, 0.17), (0.7, 0.4), (1.0, 0.5)])
+def test_a_filter_that_lags_behind_is_not_called_late(components, alpha, beta):
+    """Alpha-beta filters over a target that accelerates: their speed is nearly that of one or two scans before."""
+    plots = radarsim.plots("rls2", n=300, overrides=["scans=60"])
+    z, dt = plots["range_m"], 10.0
+    x, v = z[:, 1], (z[:, 1] - z[:, 0]) / dt
+    rows = [np.full((300, 2), np.nan), np.stack([x, v], axis=-1)]
+    for k in range(2, 60):
+        residual = z[:, k] - (x + v * dt)
+        x, v = x + v * dt + alpha * residual, v + beta / dt * residual
+        rows.append(np.stack([x, v], axis=-1))
+    estimates, truth = np.stack(rows, axis=1)[..., components], plots.truth[..., components]
+    measured = np.stack([plots["range_m"], plots["velocity_mps"]], axis=-1)
+    assert time_warnings("mine", estimates, truth, measured) == []
+    late = np.concatenate([np.full_like(estimates[:, :1], np.nan), estimates[:, :-1]], axis=1)
+    assert len(time_warnings("mine", late, truth, measured)) == 1
+
+
+def test_predictions_of_random_targets_are_recognised():
+    """What realisations differ in by their truth is no error of a plot."""
+    rng = np.random.default_rng(8)
+    speed, noise = rng.normal(0, 300, (400, 1)), rng.normal(0, 50, (400, 12))
+    truth = (1e5 + 10 * speed * np.arange(12))[..., None]
+    plots = truth + noise[..., None]
+    estimates = truth + 0.4 * noise[..., None]
+    assert time_warnings("mine", estimates, truth, plots) == []
+    predictions = np.concatenate([estimates[:, :1], estimates[:, :-1] + 10 * speed[..., None]], axis=1)
+    (line,) = time_warnings("mine", predictions, truth, plots)
+    assert "owe nothing to the plot of their scan" in line
 
 
 def test_names_are_those_of_no_other_filter(estimates):

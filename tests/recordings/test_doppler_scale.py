@@ -6,6 +6,8 @@ import pytest
 import radarsim
 from radarsim.errors import ConfigError
 from radarsim.recordings.doppler_scale import detect_doppler_scale, doppler_scale_message
+from radarsim.recordings.fit.folded_doppler import folding_message
+from radarsim.recordings.fit.velocity_faults import detect_velocity_fault
 from radarsim.recordings.formats.import_options import Options
 from radarsim.recordings.time_spans import TimeSpan, meeting_text
 from tests.recordings.formats.example_files import imported
@@ -58,7 +60,36 @@ def test_sound_and_folded_velocities_are_left_alone():
         for seed in range(8):
             plots = recording("away", -speed, 1.0, seed, sigma_m=15.0, sigma_mps=0.8)
             plots["velocity_mps"] = (plots["velocity_mps"] + 9.6) % 19.2 - 9.6
-            assert detect_doppler_scale([plots]) is None
+            assert detect_velocity_fault([plots], 19.2).folding is not None
+
+
+def test_a_constant_speed_by_which_two_causes_fit_is_told_with_both():
+    """Ranges in feet: 120 m/s is 394 ft/s less a span of 274."""
+    plots = recording("away", 120.0, 1.0, 4) | {}
+    plots["range_m"] = plots["range_m"] / 0.3048
+    fault = detect_velocity_fault([plots])
+    assert fault.scale is None
+    assert "; or the ranges are in feet, not in m" in folding_message(fault.folding)
+    # A turn tells them apart, whatever span a config states.
+    plots = recording("turn", 120.0, 1.0, 4)
+    plots["range_m"] = plots["range_m"] / 0.3048
+    assert detect_velocity_fault([plots], 1e3).scale.causes == ("the ranges are in feet, not in m",)
+
+
+def test_folds_by_the_stated_span_are_no_other_unit():
+    """A turning boat, whose course makes V - D a third of V for a while."""
+    for seed in range(12):
+        plots = recording("turn", 14.4, 1.0, seed, sigma_m=15.0, sigma_mps=0.8)
+        plots["velocity_mps"] = (plots["velocity_mps"] + 9.6) % 19.2 - 9.6
+        assert detect_velocity_fault([plots], 19.2).folding is not None
+
+
+@pytest.mark.parametrize("per_second", [10.0, 100.0, 128.0, 1e3])
+def test_times_in_a_smaller_unit_are_told_though_they_make_long_gaps(per_second):
+    plots = recording("past", 230.0, 1.0, 5)
+    scale = detect_doppler_scale([plots | {"t_s": per_second * plots["t_s"]}])
+    assert scale is not None
+    assert scale.multiple == pytest.approx(per_second, rel=0.02)
 
 
 def test_wild_plots_do_not_hide_the_unit():

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+import radarsim
 from radarsim.api.configs import load
 from radarsim.errors import ConfigError
 from radarsim.recordings import csv_output, rounding_guard, rows_by_track, simulate_plots, study_part
@@ -99,6 +100,15 @@ def test_after_a_huge_gap_sigma_is_right_or_the_track_ends_with_its_place(tmp_pa
     for f, options in enumerate(one.cases[0].spec.filters):
         expected = exact(len(options.observes), options.initial_scans, steps)
         np.testing.assert_allclose(track.sigma[f, -len(steps) :], expected, rtol=rounding_guard.MAX_SIGMA_CHANGE)
+
+
+def test_fit_refuses_a_gap_that_leaves_no_digit(tmp_path):
+    rng, t = np.random.default_rng(1), np.concatenate([10.0 * np.arange(30), 1e10 + 10.0 * np.arange(30)])
+    rows = [f"{time},{90_000 + rng.normal(0, 60):.2f},{rng.normal(0, 2):.3f}" for time in t]
+    path = tmp_path / "plots.csv"
+    path.write_text("\n".join(["t_s,range_m,velocity_mps", *rows]))
+    with pytest.raises(ConfigError, match=r"after a gap of 1e\+10 s \(1\.16e\+05 days\) the target may be so far away"):
+        radarsim.fit("rls2", path)
 
 
 def test_the_gap_of_one_number_among_rows_of_the_other(tmp_path):

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.recordings.doppler_scale import DopplerScale, detect_case_doppler_scale
+from radarsim.recordings.doppler_scale import DopplerScale
 from radarsim.recordings.fit.fit import OutlierRow, find_outlier_rows
-from radarsim.recordings.fit.folded_doppler import Folding, detect_case_folding
+from radarsim.recordings.fit.folded_doppler import Folding
 from radarsim.recordings.fit.likelihood_slice import (
     CountedLikelihood,
     LikelihoodSlice,
@@ -32,6 +32,7 @@ from radarsim.recordings.fit.likelihood_slice import (
 from radarsim.recordings.fit.newton_steps import polish_maximum
 from radarsim.recordings.fit.profile_search import HALF_CHI2_95
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
+from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
 from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
 from radarsim.recordings.target_speed import impossible_column_speed
 from radarsim.recordings.tracking_result import TrackingResult
@@ -113,10 +114,9 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
     used_rows = UsedRows(sum(len(stretch["t_s"]) for stretch in sample), len(sample))
     if speed := impossible_column_speed(stretches):
         return Advice(comparison, [], used_rows, impossible_speed=speed)
-    scale = detect_case_doppler_scale(case, stretches)
-    folding = detect_case_folding(case, stretches) if scale is None or scale.is_sign else None
-    if folding is not None or scale is not None:
-        return Advice(comparison, [], used_rows, folding, None if folding else scale)
+    fault = detect_case_velocity_fault(case, stretches)
+    if fault.folding is not None or fault.scale is not None:
+        return Advice(comparison, [], used_rows, fault.folding, fault.scale)
     likelihood = likelihoods[comparison.most_columns]
     findings = [_with_turn_error(case, likelihood, finding) for finding in find_errors(likelihood, progress)]
     start_errors = find_outlier_rows(likelihood, np.asarray(likelihood.stated))

@@ -16,8 +16,8 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
 from radarsim.recordings import read_plots
-from radarsim.recordings.doppler_scale import detect_case_doppler_scale, doppler_scale_message
-from radarsim.recordings.fit.folded_doppler import VELOCITY_COLUMN, detect_case_folding, folding_message
+from radarsim.recordings.doppler_scale import doppler_scale_message
+from radarsim.recordings.fit.folded_doppler import VELOCITY_COLUMN, folding_message
 from radarsim.recordings.fit.likelihood_slice import (
     IMPOSSIBLE_LOG_LIKELIHOOD,
     CountedLikelihood,
@@ -32,6 +32,8 @@ from radarsim.recordings.fit.likelihood_slice import (
 )
 from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, FittedKey, LikelihoodSearch
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
+from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
+from radarsim.recordings.rounding_guard import LOSS_GAP_PERIODS, gap_message
 from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
@@ -200,6 +202,7 @@ def file_likelihoods(
                 case, filter_name, [name for name in filter_names if interface.likelihood(case, name, long_tracks)]
             )
         )
+    _refuse_lost_digits(source, case, likelihood, long_tracks)
     rough = interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked)))
     return FileLikelihoods(likelihood, rough, names, doubles)
 
@@ -214,13 +217,22 @@ def _refuse_impossible_motion(
             raise ConfigError(f"{source}: {speed_message(speed)}")
     if likelihood is None or VELOCITY_COLUMN not in likelihood.by_number(np.asarray(likelihood.stated)):
         return
-    scale = detect_case_doppler_scale(case, tracks)
-    folding = detect_case_folding(case, tracks) if scale is None or scale.is_sign else None
+    fault = detect_case_velocity_fault(case, tracks)
     with use_language("en"):  # as all faults
-        if folding is not None:
-            raise ConfigError(f"{source}: {folding_message(folding, case)}")
-        if scale is not None:
-            raise ConfigError(f"{source}: {doppler_scale_message(scale)}")
+        if fault.folding is not None:
+            raise ConfigError(f"{source}: {folding_message(fault.folding, case)}")
+        if fault.scale is not None:
+            raise ConfigError(f"{source}: {doppler_scale_message(fault.scale)}")
+
+
+def _refuse_lost_digits(
+    source: str | os.PathLike, case: Case, likelihood: Likelihood, tracks: Sequence[Mapping[str, np.ndarray]]
+) -> None:
+    """Raise ConfigError if a gap leaves no digit of the likelihood."""
+    gap_s = max(float(np.diff(track["t_s"]).max(initial=0.0)) for track in tracks)
+    is_long = gap_s > LOSS_GAP_PERIODS * recording_interface(case).scan_period_s(case.spec)
+    if is_long and not np.isfinite(sum(likelihood.by_number(np.asarray(likelihood.stated)).values())):
+        raise ConfigError(f"{source}: t_s: {gap_message(gap_s)}")
 
 
 def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters: Sequence[str]) -> str:

@@ -36,13 +36,18 @@ SPAN_SEARCH_STEPS = 200  # of a search for the span, in which the phase of the l
 
 @dataclass(frozen=True)
 class Folding:
-    """Folded velocities: the largest of them and the fastest rate of the ranges, m/s; the span, m/s, known or fitted to
-    the plots, None where they do not determine it."""
+    """Folded velocities: the largest of them and the fastest rate of the ranges, m/s; the span, m/s, stated or fitted,
+    None where the plots do not determine it.
+
+    is_configured: whether the span is the stated one; is_clear: whether the plots agree with it beyond chance;
+    other_causes: units that would explain a constant speed as well."""
 
     velocity_mps: float
     rate_mps: float
     span_mps: float | None
     is_configured: bool
+    is_clear: bool = False
+    other_causes: tuple[str, ...] = ()
 
 
 def detect_folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float | None = None) -> Folding | None:
@@ -63,19 +68,10 @@ def detect_folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float |
     if _is_sign_turned(arrays, rates, velocities, span_mps if is_known else None):
         return None
     span = _fit_span(differences, 2 * fastest)
-    is_configured = is_known and (
-        span is None or bool(_whole_span_score(differences, np.array([span_mps]))[0] > KNOWN_SPAN_SCORE)
-    )
+    score = float(_whole_span_score(differences, np.array([span_mps]))[0]) if is_known else 0.0
+    is_configured = is_known and (span is None or score > KNOWN_SPAN_SCORE)
     rate = float(np.abs(rates[is_beyond]).max())
-    return Folding(fastest, rate, span_mps if is_configured else span, is_configured)
-
-
-def detect_case_folding(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> Folding | None:
-    """Detect folded velocities of tracks, columns (n,) each, that a case's study takes as measured."""
-    interface = recording_interface(case)
-    if VELOCITY_COLUMN not in tracks[0] or interface.unfolds():
-        return None
-    return detect_folding(tracks, interface.span_mps(case.spec))
+    return Folding(fastest, rate, span_mps if is_configured else span, is_configured, score > ANY_SPAN_SCORE)
 
 
 def folding_message(folding: Folding, case: Case | None = None) -> str:
@@ -97,6 +93,8 @@ def folding_message(folding: Folding, case: Case | None = None) -> str:
     else:
         span_clause = tr("the plots suggest a span of about {span} m/s", span=span)
     clauses = [clause, span_clause]
+    if folding.other_causes:
+        clauses.append(tr("or {cause}", cause=tr(" or ").join(map(tr, folding.other_causes))))
     if case is None:
         clauses.append(tr("with a config of the radar, `radarsim track` names the settings that unfold them"))
     elif settings := recording_interface(case).unfolding(

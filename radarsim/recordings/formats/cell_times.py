@@ -2,6 +2,8 @@
 
 import re
 
+import numpy as np
+
 from radarsim.recordings.formats.records import DAY_S, utc_s
 
 TIME_FORMATS = "a time of day, ISO 8601 or DD.MM.YYYY and a time"  # among others, as 9 Dec 2024
@@ -28,12 +30,15 @@ MONTHS = (  # of each month the names that a cell may have, or the beginning of
 )
 LEAP_SECOND_PATTERN = re.compile(r"(?<!\d)\d\d:\d\d:60(?!\d)")
 FIRST_DATED_S, LAST_DATED_S = 6.3e8, 4.2e9  # since 1970: recordings of 1990 to 2100
-DAY_NUMBERS = (  # the first and last number of days of these years, and that of 1970
-    ("a spreadsheet", 25569.0, 76000.0, 25569.0),
+DAY_NUMBERS = (  # the first and last number of days of recordings, and that of 1970; of a spreadsheet to 2041
+    ("a spreadsheet", 25569.0, 51544.0, 25569.0),
+    ("modified Julian days", 51544.0, 88069.0, 40587.0),
     ("Matlab", 719529.0, 770000.0, 719529.0),
     ("Julian days", 2440587.5, 2491000.0, 2440587.5),
 )
 FRACTIONS_OF_DAY = "fractions of a day"
+DATE_DIGITS_PATTERN = re.compile(r"(?:19|20)\d{2}[01]\d[0-3]\d[0-2]\d[0-5]\d[0-5]\d(?:\.\d*)?")  # 20261128120006.25
+MIN_CLOCK_ROWS, MIN_CLOCK_SECONDS = 20, 5  # different times, and seconds in them, that show what clock digits are
 MAX_DAY_STEP = 1.2e-3  # of day numbers from row to row: 100 s; of seconds it would be a kilohertz
 
 
@@ -80,6 +85,34 @@ def named_date_s(text: str) -> float | None:
     if month is None:
         return None
     return date_s(year if len(year) == 4 else f"20{year}", str(month), day, clock)
+
+
+def digits_date_s(text: str) -> float | None:
+    """Seconds from 1970 of a date and time without separators, 20261128120006.25; None of another text."""
+    if not DATE_DIGITS_PATTERN.fullmatch(text):
+        return None
+    return utc_s(f"{text[:8]}T{text[8:14]}") + float(f"0{text[14:]}")
+
+
+def clock_digits_s(number: float) -> float:
+    """Seconds after midnight of a time of day as a number, 120006.25; raises ValueError for an impossible one."""
+    hours, minutes, seconds = number // 10_000, number // 100 % 100, number % 100
+    if not (0 <= hours <= 23 and minutes <= 59 and seconds < 60):
+        raise ValueError(str(number))
+    return 3600 * hours + 60 * minutes + seconds
+
+
+def are_clock_digits(t: np.ndarray) -> bool:
+    """Whether numbers (n,) are times of day as 120006.25: of many seconds and some minutes, none is above 59."""
+    numbers = np.unique(t)
+    hours, minutes, seconds = numbers // 10_000, numbers // 100 % 100, numbers % 100
+    is_clock = bool((numbers >= 0).all() and (hours <= 23).all() and (minutes <= 59).all() and (seconds < 60).all())
+    return (
+        is_clock
+        and len(numbers) >= MIN_CLOCK_ROWS
+        and len(np.unique(seconds // 1)) >= MIN_CLOCK_SECONDS
+        and len(np.unique(numbers // 100)) > 1
+    )
 
 
 def day_numbers_of(days: float) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 MIN_LIKENESS = 0.72  # of two names, by difflib
 MIN_PART_LETTERS = 3  # of a name that begins or ends another
 MIN_METRES = 500.0  # of the largest range: smaller numbers are kilometres
+TURNS = {"acp": 4096, "acp8192": 8192, "acp16384": 16384, "acp65536": 65536}  # an encoder's counts in a turn, by unit
 TIME_CELL = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}.*|\d{1,2}:\d\d.*")
 
 
@@ -90,5 +91,6 @@ def _name_by_cells(ours: str, cells: Sequence[str]) -> str:
     if ours == "range_m":
         return "range_m" if largest >= MIN_METRES else "range_km"
     if ours == "bearing_rad":
-        return "bearing_rad" if largest <= 6.3 else "bearing_deg" if largest <= 360 else "bearing_acp"
+        turns = {"rad": 6.3, "deg": 360, **TURNS}
+        return f"bearing_{next((unit for unit, turn in turns.items() if largest <= turn), 'deg')}"
     return ours

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
-from radarsim.recordings.formats.column_suggestions import suggest_options
+from radarsim.recordings.formats.column_suggestions import TURNS, suggest_options
 
 KNOT_MPS = 1852 / 3600
 
@@ -26,10 +26,13 @@ SPEEDS = {
     **dict.fromkeys(("kmh", "km/h"), 1 / 3.6), **dict.fromkeys(("fpm", "ft/min"), 0.3048 / 60),
 }  # fmt: skip
 DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 / math.pi}
-AZIMUTH_COUNTS = 4096  # of a turn: the pulses of an antenna's encoder (ACP)
-RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()} | {"acp": 2 * math.pi / AZIMUTH_COUNTS}
+RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()}
+RADIANS |= {unit: 2 * math.pi / turn for unit, turn in ({"acp": TURNS["acp"], "gon": 400, "mil": 6400} | TURNS).items()}
+MAX_NAMED_UNITS = 4  # in a fault, beside the first
 DAYS = "days"  # of a spreadsheet, of Matlab, Julian ones: numbers that `cell_times` tells apart
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0, DAYS: 1.0}  # dmy: day before month
+CLOCK_DIGITS = "hhmmss"  # a time of day as a number, 120006.25
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0}  # dmy: day before month
+TIME_UNITS |= {DAYS: 1.0, CLOCK_DIGITS: 1.0}
 UNIT_SYNONYMS = {  # German and Russian
     **{"м": "m", "км": "km", "м/с": "m/s", "км/ч": "km/h", "уз": "kn", "узлы": "kn", "knoten": "kn", "sm": "nm"},
     **{"град": "deg", "град.": "deg", "grad": "deg", "рад": "rad", "с": "s", "сек": "s", "sek": "s", "мс": "ms"},
@@ -279,7 +282,7 @@ class Header:
             cures = []
             for ours, name in columns_without_unit.items():
                 first, *alternatives = _names_with_units(ours)
-                cures.append(f"--column {first}={shlex.quote(name)} (or {', '.join(alternatives)})")
+                cures.append(f"--column {first}={shlex.quote(name)} (or {', '.join(alternatives[:MAX_NAMED_UNITS])})")
             names = ", ".join(columns_without_unit.values())
             faults.append(f"{self.path}:1: {names}: must have a unit in the name; where it has none, "
                           f"{', '.join(cures)} states it")  # fmt: skip

@@ -3,9 +3,10 @@
 import numpy as np
 
 from radarsim.language.translate import tr
-from radarsim.recordings import doppler_scale
 from radarsim.recordings.aircraft_match import MAX_GAP_S
-from radarsim.recordings.fit import folded_doppler
+from radarsim.recordings.doppler_scale import doppler_scale_message
+from radarsim.recordings.fit.folded_doppler import folding_message
+from radarsim.recordings.fit.velocity_faults import detect_velocity_fault
 from radarsim.recordings.formats.records import Batch
 from radarsim.recordings.grouping import rows_by_name
 
@@ -37,9 +38,9 @@ class DopplerCheck:
         spanless_tracks = [
             dict(zip(DOPPLER_COLUMNS, track[np.isnan(track[:, 3]), :3].T, strict=True)) for track in tracks
         ]
-        scale = doppler_scale.detect_doppler_scale(spanless_tracks)
-        if scale is not None and not scale.is_sign:
-            return [doppler_scale.doppler_scale_message(scale)]
+        fault = detect_velocity_fault(spanless_tracks)
+        if fault.scale is not None and not fault.scale.is_sign:
+            return [doppler_scale_message(fault.scale)]
         offsets = np.abs(np.concatenate([np.empty((2, 0)), *map(_doppler_offsets, tracks)], axis=1))
         if offsets.shape[1] >= MIN_DOPPLER_ROWS:
             offset, opposite_offset = np.median(offsets, axis=1).tolist()
@@ -48,8 +49,7 @@ class DopplerCheck:
                 fields = {"as_is": offset, "turned": opposite_offset, "cure": cure}
                 notes = [tr("the Doppler speeds miss the change of the range by {as_is:.1f} m/s (median), with the "
                             "other sign by {turned:.1f} m/s: {cure}", **fields)]  # fmt: skip
-        folding = folded_doppler.detect_folding(spanless_tracks)
-        return notes if folding is None else [folded_doppler.folding_message(folding)]
+        return notes if fault.folding is None else [folding_message(fault.folding)]
 
 
 def _doppler_offsets(track: np.ndarray) -> np.ndarray:

@@ -13,17 +13,27 @@ import numpy as np
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats.records import DAY_S, Batch
 from radarsim.recordings.grouping import rows_by_name
-from radarsim.recordings.time_spans import HOUR_S, ROLLOVER_S
+from radarsim.recordings.time_spans import HOUR_S, ROLLOVER_S, WEEK_S
 
 MAX_AGE_S = 2 * DAY_S  # of a file, from the last time in it to when it was written
 MAX_STEP_INTERVALS, MAX_STEP_S = 3.0, 300.0  # from the row before a clock is set back to that after it
 SENT_AGAIN_REASON = term("rows sent again, with the same time and values")
 SAME_TIME_REASON = term("rows of the same time as one before of their track")
 SORTED_NOTE = term("rows that were earlier than one before of their track: {count} of {all}; they are sorted by time")
-HOUR_NOTE = term(
-    "times fall by an hour, as local times do at the end of summer time: the {count} rows from there on are taken as "
-    "an hour later"
-)
+FALL_NOTES = {  # by how much a clock is set back, s
+    HOUR_S: term(
+        "times fall by an hour, as local times do at the end of summer time: the {count} rows from there on are taken "
+        "as an hour later"
+    ),
+    DAY_S / 2: term(
+        "times fall by 12 hours, as those of a clock without AM and PM do: the {count} rows from there on are taken as "
+        "12 hours later"
+    ),
+    WEEK_S: term(
+        "times fall by a week, as seconds of the week do when it ends: the {count} rows from there on are taken as a "
+        "week later"
+    ),
+}
 ROLLOVER_NOTE = term(
     "dates step by 1024 weeks, as those of a satellite receiver do that missed a rollover: the {count} rows before are "
     "taken as 1024 weeks later"
@@ -110,12 +120,14 @@ def sort_rows(batch: Batch) -> tuple[Batch, list[str], int]:
 
 
 def _undo_clock_steps(batch: Batch) -> list[str]:
-    """Continue times that are set back by an hour, or by 1024 weeks, once in a recording; in place, with a note."""
+    """Continue times that are set back by one of FALL_NOTES, or by 1024 weeks, once in a recording; in place, with a
+    note."""
     t = batch.columns["t_s"]
     tracks = [rows for name, rows in rows_by_name(batch.track).items() if name]
-    if shifted := _rows_after_fall(t, tracks, HOUR_S):
-        t[shifted] += HOUR_S
-        return [tr(HOUR_NOTE, count=len(shifted))]
+    for size_s, note in FALL_NOTES.items():
+        if shifted := _rows_after_fall(t, tracks, size_s):
+            t[shifted] += size_s
+            return [tr(note, count=len(shifted))]
     rollover_rows = [rows[: int(i) + 1] for rows in tracks for i in np.flatnonzero(_is_rollover(t[rows]))]
     if rollover_rows:
         before = np.concatenate(rollover_rows)

@@ -42,7 +42,8 @@ class SiteDistance:
         self.near_rows += int((distance < MAX_RADAR_DISTANCE_M).sum())
 
     def fault(self) -> str | None:
-        """That no position is near the radar, if coordinates that are swapped or turned in sign explain it."""
+        """That no position is near the radar, and what would explain it: coordinates that are swapped, turned in sign,
+        or in radians."""
         if not self.rows or self.near_rows:
             return None
         lat, lon = np.concatenate(self.sample, axis=1)
@@ -51,13 +52,18 @@ class SiteDistance:
             "the longitude has the other sign, in the recording or in --at": (lat, -lon),
             "the latitude has the other sign, in the recording or in --at": (-lat, lon),
             "both have the other sign, in the recording or in --at": (-lat, -lon),
+            "they are in radians (--column latitude_rad=NAME --column longitude_rad=NAME)": (
+                np.degrees(lat),
+                np.degrees(lon),
+            ),
         }
         distances = {cause: self._median_m(*place) for cause, place in changes.items()}
         cause = min(distances, key=distances.__getitem__)
+        far = (f"at: the positions lie {self._median_m(lat, lon) / 1e3:.0f} km from it (median), none within "
+               f"{MAX_RADAR_DISTANCE_M / 1e3:.0f} km")  # fmt: skip
         if distances[cause] > MAX_RADAR_DISTANCE_M:
-            return None
-        return (f"at: the positions lie {self._median_m(lat, lon) / 1e3:.0f} km from it (median), none within "
-                f"{MAX_RADAR_DISTANCE_M / 1e3:.0f} km; {distances[cause] / 1e3:.0f} km if {cause}")  # fmt: skip
+            return f"{far}, as far as a radar sees"
+        return f"{far}; {distances[cause] / 1e3:.0f} km if {cause}"
 
     def _median_m(self, lat: np.ndarray, lon: np.ndarray) -> float:
         return float(np.median(_distance_m(self.latitude_deg, self.longitude_deg, lat, lon)))

@@ -14,6 +14,7 @@ from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats import cell_times, columns, records, table_checks
 from radarsim.recordings.formats.cell_times import TIME_FORMATS
+from radarsim.recordings.formats.column_suggestions import TURNS
 from radarsim.recordings.formats.columns import EARTH_COLUMNS, Header
 from radarsim.recordings.formats.sheet import Sheet
 from radarsim.recordings.row_faults import Faults
@@ -21,6 +22,7 @@ from radarsim.recordings.row_faults import Faults
 LARGEST_NUMBER = 1e15
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
 MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * columns.KNOT_MPS, 360.0  # of AIS: what is not below them means missing
+UNKNOWN_POSITION, UNKNOWN_DEGREES = (91.0, 181.0), (999.0, 9999.0, 99999.0)  # of AIS, and of other exports
 MISSING_TEXTS = ("nan", "null", "none", "na", "n/a", "#n/a")
 THOUSANDS_PATTERN = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand or a decimal
 GROUP_SPACES = " \u00a0\u2009\u202f'"
@@ -56,7 +58,7 @@ class Table:
         self.is_leap_second = False  # of the row
         self.has_clock_times = False  # times of day or dates were read
         self.is_checked = False  # whether the first batch has been looked at
-        self.long_step_s: float | None = None  # from row to row of a track, if it is longer than a scan
+        self.long_step: tuple[float, str] | None = None  # from row to row, if longer than a scan, and the likely unit
         self.flight_level_column = ""  # whose numbers were taken as hundreds of feet
         self.slashed_dates: dict[str, str] = {}  # the first date of 1/2/2024 by what it shows: the order, or nothing
         self.last_positions: dict[str, tuple[float, ...]] = {}  # the last position of each track
@@ -91,10 +93,11 @@ class Table:
         if self.silent_count and "course_deg" in self.columns:
             message = term("reports without speed or course: {count} of {all}")
             lines.append(tr(message, count=self.silent_count, all=self.records))
-        if self.long_step_s is not None:
-            option = f"--column t_ms={shlex.quote(self.columns['t_s'].name)}"
-            message = term("the times are read as s, {step:g} s from row to row; if they are ms: {cure}")
-            lines.append(tr(message, step=self.long_step_s, cure=option))
+        if self.long_step is not None:
+            step, unit = self.long_step
+            option = f"--column t_{unit}={shlex.quote(self.columns['t_s'].name)}"
+            message = term("the times are read as s, {step:g} s from row to row; if they are {unit}: {cure}")
+            lines.append(tr(message, step=step, unit="µs" if unit == "us" else unit, cure=option))
         if self.flight_level_column:
             name = self.flight_level_column
             cure = f"--column altitude_ft={shlex.quote(name)}"
@@ -154,10 +157,11 @@ class Table:
         if not self.is_checked:
             self.is_checked = True
             time = self.columns["t_s"]
-            if time.unit != columns.DAYS and not self.has_clock_times:
+            if time.unit not in (columns.DAYS, columns.CLOCK_DIGITS) and not self.has_clock_times:
                 first_cell = next((row[time.position] for row in self.sheet.sample), f"{batch.columns['t_s'][0]:.15g}")
+                table_checks.refuse_clock_digits(batch, self.path, time.name, first_cell)
                 table_checks.refuse_day_numbers(batch, self.path, time.name, "date" in self.columns, first_cell)
-                self.long_step_s = table_checks.long_step_s(batch)
+                self.long_step = table_checks.long_step(batch)
             if factor := table_checks.flight_level_factor(batch, self.columns):
                 (self.flight_level_column,) = table_checks.assumed_altitude(self.columns)
                 ours = "altitude_m" if "altitude_m" in self.columns else "barometric_m"
@@ -204,6 +208,8 @@ class Table:
         course = math.radians(course)
         t, up = self._time(cells), self._parse_number(cells, "up_mps")
         lat, lon = self._parse_number(cells, "latitude_deg"), self._parse_number(cells, "longitude_deg")
+        if (lat, lon) == UNKNOWN_POSITION or abs(lat) in UNKNOWN_DEGREES or abs(lon) in UNKNOWN_DEGREES:
+            lat = lon = math.nan
         for name, value, limit in (("latitude_deg", lat, 90), ("longitude_deg", lon, 360)):
             if abs(value) > limit:
                 self._add_fault(name, f"must be from -{limit} to {limit} degrees", f"{value:g}")
@@ -217,12 +223,16 @@ class Table:
 
     def _bearing(self, cells: list[str]) -> float:
         """The bearing, rad; beyond a full turn by noise it is turned back."""
-        bearing = self._parse_number(cells, "bearing_rad")
-        if abs(bearing) > 2 * math.pi:
-            if not -2 * math.pi <= bearing <= 4 * math.pi:
-                column = self.columns["bearing_rad"]
+        bearing, column = self._parse_number(cells, "bearing_rad"), self.columns.get("bearing_rad")
+        turn = 4 * math.pi if column is None or column.unit not in TURNS else 2 * math.pi  # counts have no noise
+        if abs(bearing) > 2 * math.pi or bearing > turn:
+            if column is not None and not -2 * math.pi <= bearing <= turn:
                 must = f"must be within a turn, in {column.unit}"
-                cure = f"counts of {columns.AZIMUTH_COUNTS} a turn: --column bearing_acp={shlex.quote(column.name)}"
+                number = bearing / column.factor
+                name = shlex.quote(column.name)
+                likely = [f"{count} a turn: --column bearing_{unit}={name}" for unit, count in TURNS.items()
+                          if number <= count and column.unit != unit]  # fmt: skip
+                cure = f"if it counts {', '.join(likely[:2])}" if likely and number > 0 else ""
                 self._add_fault("bearing_rad", must, repr(cells[column.position].strip()[:60]), cure)
             return bearing % (2 * math.pi)
         return bearing
@@ -249,6 +259,10 @@ class Table:
                 t = float(self._with_decimal_point(text)) * column.factor
             except ValueError:
                 return self._parse_time(text, cells)
+            if column.unit == columns.CLOCK_DIGITS:
+                return self._at_date(cell_times.clock_digits_s(t), cells)
+            if (date := cell_times.digits_date_s(text)) is not None:
+                return date
             if column.unit == columns.DAYS:
                 is_time_of_day = 0 <= t < 1
                 return self._at_date(t * records.DAY_S, cells) if is_time_of_day else cell_times.day_number_s(t)

@@ -15,9 +15,18 @@ MAX_PLAUSIBLE_MPS = 3000.0  # of a target: numbers that say more are of another 
 DEGREE_M = 111_000.0  # of latitude
 DATE_STEMS = ("date", "day", "datum", "дата")
 MIN_LONG_STEP_S = 300.0  # from row to row, as no sensor scans
+SMALL_UNITS_S = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 MAX_FLIGHT_LEVEL = 600.0  # hundreds of feet
 HORIZON_M = 4120.0  # per root of a height in m: the radio horizon, with 4/3 of the earth's radius
 RADAR_HEIGHT_M = 100.0  # of a radar of which nothing is known
+MIN_HIDDEN_SHARE = 0.1  # of the plots that would lie below the horizon: more than errors and bent rays explain
+
+
+def refuse_clock_digits(batch: Batch, path: str, name: str, first_cell: str) -> None:
+    """Raise ConfigError if the times of a batch are times of day as 120006.25, rather than seconds."""
+    if cell_times.are_clock_digits(batch.columns["t_s"]):
+        raise ConfigError(f"{path}: {name}: must be in s; {first_cell!r} and the others are times of day, HHMMSS: "
+                          f"--column t_hhmmss={shlex.quote(name)}")  # fmt: skip
 
 
 def refuse_day_numbers(batch: Batch, path: str, name: str, has_date: bool, first_cell: str) -> None:
@@ -44,16 +53,18 @@ def refuse_day_numbers(batch: Batch, path: str, name: str, has_date: bool, first
                           f"--column t_days={shlex.quote(name)}")  # fmt: skip
 
 
-def long_step_s(batch: Batch) -> float | None:
-    """The median step of times from row to row of a track, if it is longer than any scan, and the times count neither
-    from midnight nor from 1970, so that they may be ms; else None."""
+def long_step(batch: Batch) -> tuple[float, str] | None:
+    """The median step of times from row to row of a track, s, if it is longer than any scan, and the times count
+    neither from midnight nor from 1970; with the unit in which it would be none. Else None."""
     t = batch.columns["t_s"]
-    if not records.DAY_S <= float(t.min()) < cell_times.FIRST_DATED_S:
+    first = float(t.max() if batch.kind == records.PLOTS else t.min())
+    if not records.DAY_S <= first < cell_times.FIRST_DATED_S:
         return None
     steps = np.concatenate([np.empty(0), *(np.diff(t[rows]) for rows in rows_by_name(batch.track).values())])
     steps = np.abs(steps[steps != 0])
     step = float(np.median(steps)) if steps.size else 0.0
-    return step if step >= MIN_LONG_STEP_S else None
+    unit = next((unit for unit, size_s in SMALL_UNITS_S.items() if step * size_s < MIN_LONG_STEP_S), "ns")
+    return (step, unit) if step >= MIN_LONG_STEP_S else None
 
 
 def _change_m(batch: Batch, rows: np.ndarray, half: int) -> np.ndarray:
@@ -73,7 +84,8 @@ def assumed_altitude(columns: Mapping[str, Column]) -> list[str]:
 def flight_level_factor(batch: Batch, columns: Mapping[str, Column]) -> float:
     """By what altitudes must be multiplied if they are hundreds of feet, though no unit says so; 0 where they are not.
 
-    Then none exceeds MAX_FLIGHT_LEVEL, and most targets would lie below the horizon, but do not as flight levels."""
+    Then none exceeds MAX_FLIGHT_LEVEL, and a tenth of the targets would lie below the horizon, but do not as flight
+    levels."""
     if batch.kind != records.PLOTS or not (names := assumed_altitude(columns)):
         return 0.0
     (column,) = (column for column in columns.values() if column.name == names[0])
@@ -83,7 +95,7 @@ def flight_level_factor(batch: Batch, columns: Mapping[str, Column]) -> float:
     if not height.size or height.max() > MAX_FLIGHT_LEVEL * column.factor:
         return 0.0
     is_hidden, is_hidden_as_level = (r > _horizon_m(h) for h in (height, factor * height))
-    return factor if is_hidden.mean() > 0.5 > is_hidden_as_level.mean() else 0.0
+    return factor if is_hidden.mean() > MIN_HIDDEN_SHARE > is_hidden_as_level.mean() else 0.0
 
 
 def _horizon_m(height: np.ndarray) -> np.ndarray:

@@ -30,6 +30,7 @@ def path(k):
         ("Datum", 46_354.5, 2 / 86_400, "day numbers, as of a spreadsheet"),
         ("timestamp", 739_595.25, 4 / 86_400, "day numbers, as of Matlab"),
         ("t", 2_461_373.0, 4 / 86_400, "day numbers, as of Julian days"),
+        ("date", 61_372.5, 4 / 86_400, "day numbers, as of modified Julian days"),
         ("Time", 0.25, 4 / 86_400, "fractions of a day"),
     ],
 )
@@ -44,6 +45,45 @@ def test_day_numbers_are_never_seconds(tmp_path, header, first, step, whose):
     _, columns, _ = imported(tmp_path, text.encode(), Options(columns={"t_days": header}))
     digit = 86_400 * (1e-9 + np.spacing(first))
     np.testing.assert_allclose(columns["t_s"], 86_400 * step * np.arange(N), rtol=0, atol=digit)
+
+
+def clock_digits(t):
+    """12:00:06 as 120006, of seconds of the day."""
+    return 10_000 * (t // 3600) + 100 * (t // 60 % 60) + t % 60
+
+
+def test_a_time_of_day_as_a_number_is_never_seconds(tmp_path):
+    t = 43_140 + 4 * np.arange(N)  # over noon
+    text = "Time,track,range_m\n" + "".join(f"{clock_digits(t[k])},7,{20_000 + 900 * k}\n" for k in range(N))
+    (line,) = refused(tmp_path, text.encode())
+    assert line.endswith("'115900' and the others are times of day, HHMMSS: --column t_hhmmss=Time")
+    done, columns, _ = imported(tmp_path, text.encode(), Options(columns={"t_hhmmss": "Time"}))
+    np.testing.assert_array_equal(columns["t_s"], 4 * np.arange(N))
+    assert done.notes == []
+
+
+@pytest.mark.parametrize("step", [1, 2.5, 4, 10, 12, 20, 50, 60, 100])
+@pytest.mark.parametrize("first", [0, 100, 36_000])
+def test_seconds_are_not_taken_for_a_time_of_day(tmp_path, step, first):
+    t = first + step * np.arange(80)
+    text = "Time,track,range_m\n" + "".join(f"{t[k]},7,{20_000 + 9 * step * k}\n" for k in range(80))
+    _, columns, _ = imported(tmp_path, text.encode())
+    np.testing.assert_array_equal(columns["t_s"], t - t[0])
+
+
+def test_a_date_and_time_without_separators(tmp_path):
+    text = "Time,range_m\n20261128235958.5,5\n20261129000002.75,6\n"
+    _, columns, _ = imported(tmp_path, text.encode(), Options(zero=1_795_824_000.0))
+    np.testing.assert_array_equal(columns["t_s"], [86_398.5, 86_402.75])
+
+
+@pytest.mark.parametrize(("per_second", "unit", "name"), [(1e3, "ms", "ms"), (1e6, "µs", "us")])
+def test_plots_that_no_radar_sees_so_seldom_may_have_a_smaller_unit(tmp_path, per_second, unit, name):
+    """From zero on; in seconds they would be a minute's or a day's plots apart."""
+    text = "Time,track,range_m\n" + "".join(f"{4 * per_second * k:.0f},7,{20_000 + 480 * k}\n" for k in range(N))
+    done, *_ = imported(tmp_path, text.encode())
+    expected = f"{4 * per_second:g} s from row to row; if they are {unit}: --column t_{name}=Time"
+    assert any(note.replace("·10⁶", "e+06").endswith(expected) for note in done.notes)
 
 
 def test_a_date_in_days_stands_beside_a_time_of_day(tmp_path):
@@ -159,9 +199,44 @@ def test_azimuths_just_beyond_a_turn_are_turned_back_and_counts_are_told(tmp_pat
     np.testing.assert_allclose(columns["bearing_rad"], np.pi / 2 + 2 * np.pi / 4096 * np.arange(5), rtol=4e-16)
 
 
-@pytest.mark.parametrize(("km", "level"), [(120, True), (20, False)])
+@pytest.mark.parametrize(
+    ("largest", "unit", "turn"), [(9000, "acp16384", 16_384), (40_000, "acp65536", 65_536), (7000, "acp8192", 8192)]
+)
+def test_counts_of_finer_encoders_are_told_by_their_size(tmp_path, largest, unit, turn):
+    counts = largest - np.arange(5)
+    text = "time,track,range_m,Azimuth\n" + "".join(f"{4 * k},7,5000,{counts[k]}\n" for k in range(5))
+    for given in ("bearing_deg", "bearing_acp"):
+        (line,) = refused(tmp_path, text.encode(), Options(columns={given: "Azimuth"}))
+        assert f"if it counts {turn} a turn: --column bearing_{unit}=Azimuth" in line
+    _, columns, _ = imported(tmp_path, text.encode(), Options(columns={f"bearing_{unit}": "Azimuth"}))
+    np.testing.assert_allclose(columns["bearing_rad"], 2 * np.pi * counts / turn, rtol=4e-16)
+
+
+@pytest.mark.parametrize(("unit", "number"), [("gon", 100.0), ("mil", 1600.0), ("deg", 90.0)])
+def test_angles_of_surveyors_and_gunners(tmp_path, unit, number):
+    _, columns, _ = imported(tmp_path, f"time,track,range_m,bearing_{unit}\n0,7,5,{number}\n".encode())
+    assert columns["bearing_rad"][0] == pytest.approx(np.pi / 2, rel=4e-16)
+
+
+@pytest.mark.parametrize("unknown", ["91,181", "-999,-999", "999,999", "9999,0"])
+def test_positions_that_stand_for_none_are_counted(tmp_path, unknown):
+    rows = [f"{5 * k},7," + (unknown if k % 9 == 4 else "{},{}".format(*path(k))) for k in range(N)]
+    done, columns, _ = imported(tmp_path, positions(rows), AT)
+    assert done.skipped == ["records without time or position (4)"]
+    assert columns["range_m"].max() < 1e5
+
+
+def test_positions_in_radians_and_elsewhere_are_refused(tmp_path):
+    for change, cause in ((np.radians, "if they are in radians"), (lambda place: (place[0] - 40, 4.9), "as far as a")):
+        rows = [f"{5 * k},7,{lat},{lon}" for k in range(N) for lat, lon in [change(path(k))]]
+        (line,) = refused(tmp_path, positions(rows), AT)
+        assert line.startswith("at: the positions lie ")
+        assert cause in line
+
+
+@pytest.mark.parametrize(("km", "level"), [(120, True), (85, True), (20, False)])
 def test_mode_c_in_hundreds_of_feet_is_known_by_the_horizon(tmp_path, km, level):
-    """290 ft are below it at 120 km, and may be flown at 20 km."""
+    """290 ft are below it at 120 km and at 85 km, and may be flown at 20 km."""
     text = "Time,Range [km],Mode C,track\n" + "".join(f"{4 * k},{km + k},290,a\n" for k in range(5))
     done, columns, _ = imported(tmp_path, text.encode())
     np.testing.assert_allclose(columns["altitude_m"], 290 * FEET_M * (100 if level else 1), rtol=1e-15)

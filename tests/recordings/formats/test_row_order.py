@@ -96,6 +96,19 @@ def test_the_end_of_summer_time_is_named_and_undone(tmp_path):
     assert note.startswith("times fall by an hour, as local times do at the end of summer time: the 120 rows")
 
 
+@pytest.mark.parametrize(
+    ("fall_s", "first", "expected"),
+    [(43_200, 46_700, "by 12 hours, as those of a clock without AM and PM do"),
+     (604_800, 604_700, "by a week, as seconds of the week do when it ends")],
+)  # fmt: skip
+def test_clocks_that_begin_again_are_named_and_run_on(tmp_path, fall_s, first, expected):
+    times = [t - fall_s * (t >= 100 + first) for t in range(first, first + 200, 5)]
+    text = "time,track,range_m\n" + "".join(f"{t},7,{30_000 + 950 * k}\n" for k, t in enumerate(times))
+    done, columns, _ = imported(tmp_path, text.encode())
+    np.testing.assert_array_equal(columns["t_s"], 5.0 * np.arange(40))
+    assert done.notes[0].startswith(f"times fall {expected}: the 20 rows")
+
+
 AT = Options(site=SITE)
 
 
