@@ -9,6 +9,7 @@ import numpy as np
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column
 from radarsim.studies.linear_design import period
+from radarsim.studies.missed_scans import WHOLE_PERIODS, missed_scan_times
 from radarsim.studies.recording_interface import Track, usual_interval_s
 
 if TYPE_CHECKING:
@@ -19,13 +20,18 @@ ZERO_SHARE = 1e-6  # of a fitted key's stated value: what counts as zero
 
 
 class RowModel:
-    """A filter's model over rows of recorded plots, whatever the times between them."""
+    """A filter's model over rows of recorded plots, whatever the times between them: a missed row is an empty one."""
 
     def __init__(self, study: "LinearStudy", spec: Any, filter_keys: Any):
         self.study, self.spec, self.filter_keys = study, spec, filter_keys
         self.columns = study.columns(spec, filter_keys)
         self.matrices = study.matrices(spec, filter_keys)
         self.period = period(self.matrices.H, self.matrices.R)
+        self.scan_period_s = study.scan_period_s(spec)
+
+    def scan_numbers(self, last: int, dt: np.ndarray) -> np.ndarray:
+        """The numbers of the scans of rows (n,) by the times since the row before each, after the scan `last`."""
+        return last + np.cumsum(np.maximum(np.rint(dt / self.scan_period_s), 1.0)).astype(int)
 
     def numbers(self, columns: Mapping[str, np.ndarray], n: int) -> np.ndarray:
         """The numbers z (n, D), NaN where a column is absent."""
@@ -33,31 +39,45 @@ class RowModel:
         return np.stack([columns.get(name, none) for name in self.columns], axis=1)
 
     def moves(self, dt: np.ndarray, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
-        """F and Q (n, n, n) over times; over a time of zero the state stays."""
+        """F and Q (n, n, n) over times: over missed scans scan by scan; over a time of zero the state stays."""
         motion, n = self.study.assumed_motion(spec or self.spec, self.filter_keys), self.matrices.x.size
         times, places = np.unique(dt, return_inverse=True)
         F, Q = np.tile(np.eye(n), (times.size, 1, 1)), np.zeros((times.size, n, n))
-        for name, function, matrices in (("F", motion.F, F), ("Q", motion.Q, Q)):
-            values = [self.study.call(function, t) for t in times[times != 0].tolist()]
-            matrices[times != 0] = self.study._array(
-                f"assumed_motion: {name}(dt)", values or matrices[:0], len(values), n, n
-            )
-        for i in np.flatnonzero(np.linalg.eigvalsh(Q)[:, 0] < 0):
-            self.study._covariance(f"assumed_motion: Q({times[i]:g} s)", Q[i], n)
+        steps = [np.diff([0.0, *missed_scan_times(0.0, t, self.scan_period_s), t]) for t in times.tolist()]
+        for place in np.flatnonzero(times != 0):
+            first = steps[place][0]
+            F_scan, Q_scan = self._move(motion, first)
+            F[place], Q[place] = F_scan, Q_scan
+            for step in steps[place][1:]:
+                if abs(step - first) > WHOLE_PERIODS * self.scan_period_s:
+                    F_scan, Q_scan = self._move(motion, step)
+                F[place], Q[place] = F_scan @ F[place], F_scan @ Q[place] @ F_scan.T + Q_scan
         return F[places], Q[places]
 
-    def rows(self, first: int, n: int, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
-        """H (n, D, d) and R (n, D) of rows from number `first` on."""
+    def _move(self, motion: Any, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """F and Q (n, n) over a time, in one step."""
+        n = self.matrices.x.size
+        F, Q = (
+            self.study._array(f"assumed_motion: {name}(dt)", self.study.call(function, float(t)), n, n)
+            for name, function in (("F", motion.F), ("Q", motion.Q))
+        )
+        if np.linalg.eigvalsh(Q)[0] < 0:
+            self.study._covariance(f"assumed_motion: Q({t:g} s)", Q, n)
+        return F, Q
+
+    def rows(self, scans: np.ndarray, spec: Any = None) -> tuple[np.ndarray, np.ndarray]:
+        """H (n, D, d) and R (n, D) of rows by the numbers of their scans (n,)."""
         if spec is None and self.period < len(self.matrices.H):
-            phases = (first + np.arange(n)) % self.period
+            phases = scans % self.period
             return self.matrices.H[phases], self.matrices.R[phases]
-        plots = [self.study.assumed_plot(spec or self.spec, self.filter_keys, first + k) for k in range(n)]
+        plots = [self.study.assumed_plot(spec or self.spec, self.filter_keys, k) for k in scans.tolist()]
         H = np.stack([np.atleast_2d(row) for row, _ in plots]).astype(float)
         return H, np.stack([np.atleast_1d(sigma) for _, sigma in plots]).astype(float) ** 2
 
-    def gains(self, first: int, n: int) -> np.ndarray:
-        """A filter's own gains at rows; after its last scan those of the last period repeat."""
-        k, scans = first + np.arange(n), len(self.matrices.gains)
+    def gains(self, k: np.ndarray) -> np.ndarray:
+        """A filter's own gains at rows by the numbers of their scans (n,); after its last scan those of the last period
+        repeat."""
+        scans = len(self.matrices.gains)
         last = scans - min(self.period, scans)
         return self.matrices.gains[np.where(k < scans, k, last + (k - last) % (scans - last))]
 
@@ -75,16 +95,18 @@ class LinearTracker:
         self.study, self.names = study, tuple(keys.name for keys in spec.filters)
         self.filters = [RowModel(study, spec, keys) for keys in spec.filters]
         self.states = [(rows.matrices.x.copy(), rows.matrices.P.copy()) for rows in self.filters]
-        self.count, self.last = 0, np.nan
+        self.last_scan, self.last = -1, np.nan
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
         """The estimates over the next rows: columns (n,), NaN where a value is missing."""
         t = columns["t_s"]
-        dt = np.diff(t, prepend=self.last if self.count else t[0])
+        dt = np.diff(t, prepend=t[0] if np.isnan(self.last) else self.last)
+        scans = self.filters[0].scan_numbers(self.last_scan, dt)
         results = [
-            self._follow(rows, *state, dt, columns) for rows, state in zip(self.filters, self.states, strict=True)
+            self._follow(rows, *state, dt, scans, columns)
+            for rows, state in zip(self.filters, self.states, strict=True)
         ]
-        self.count, self.last = self.count + len(t), t[-1]
+        self.last_scan, self.last = int(scans[-1]), t[-1]
         out, residual = (np.stack([result[i] for result in results]) for i in range(2))
         states, components = self.filters[0].matrices.x.size, len(self.study.components)
         measured = self.study.measured
@@ -101,15 +123,21 @@ class LinearTracker:
         )
 
     def _follow(
-        self, model: RowModel, x: np.ndarray, P: np.ndarray, dt: np.ndarray, columns: Mapping[str, np.ndarray]
+        self,
+        model: RowModel,
+        x: np.ndarray,
+        P: np.ndarray,
+        dt: np.ndarray,
+        scans: np.ndarray,
+        columns: Mapping[str, np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
         """The result of `linear_recorded.filter_recorded` for a filter, and its residuals (n, D)."""
         from radarsim.kernels import linear_recorded
 
         rows, z = len(dt), model.numbers(columns, len(dt))
-        (F, Q), (H, R) = model.moves(dt), model.rows(self.count, rows)
+        (F, Q), (H, R) = model.moves(dt), model.rows(scans)
         out, has_number = np.full((rows, 2 * x.size + z.shape[1]), np.nan), np.isfinite(z)
-        gains = model.gains(self.count, rows) if model.matrices.has_own_gains else np.zeros_like(H)
+        gains = model.gains(scans) if model.matrices.has_own_gains else np.zeros_like(H)
         linear_recorded.filter_recorded(
             x, P, F, Q, H, R, gains, not model.matrices.has_own_gains, np.where(has_number, z, 0.0), has_number, out
         )
@@ -155,7 +183,7 @@ class PlotLikelihood:
         start = self.model.study.assumed_motion(spec, self.model.filter_keys)
         result = []
         for dt, z in self.plots:
-            (F, Q), (H, R) = self.model.moves(dt, spec), self.model.rows(0, len(dt), spec)
+            (F, Q), (H, R) = self.model.moves(dt, spec), self.model.rows(self.model.scan_numbers(-1, dt), spec)
             x, P = np.array(start.mean, dtype=float), np.array(start.covariance, dtype=float)
             model, white, has_number = (x, P, F, Q, H), 1.0, np.isfinite(z)
             if correlation:

@@ -1,11 +1,15 @@
 """An empty row and no row are the same, for every filter of every study that takes recorded plots."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 from radarsim.api.load_experiments import load_all
 from radarsim.recordings import simulate_plots
 from radarsim.recordings.study_part import recording_interface
+from radarsim.studies import authoring
+from radarsim.studies.linear_recordings import LinearTracker
 from radarsim.studies.missed_scans import with_missed_scans
 
 CONFIGS = {
@@ -61,6 +65,52 @@ def test_empty_rows_change_no_estimate(config):
         one, other = (interface.likelihood(case, member.name, [track]) for track in (empty, without))
         if one is not None:
             assert one(one.stated) == pytest.approx(other(other.stated), rel=1e-9)
+
+
+class Column(authoring.Model):
+    sigma_m: authoring.Positive = authoring.key("σ", "σ of a position, m")
+    scan_period_s: authoring.Positive = authoring.key("period", "time between two plots, s")
+
+
+class Kind(authoring.Member):
+    kind: str = authoring.key("kind", "kalman or steady")
+
+
+class Pushed(authoring.LinearStudy):
+    """Pushed at random once a scan, seen by two sensors in turn; a steady filter has its gains by the scan."""
+
+    name, about, asks = "pushed_for_tests", "Pushed at random.", "How far does it go?"
+    filters: ClassVar = {"kind": "kalman or steady"}
+    components = (authoring.Component("x", "m", "$x$", "x"), authoring.Component("v", "m/s", "$v$", "v"))
+    parts, Filter, scan_period = {"sensor": Column}, Kind, "sensor.scan_period_s"
+    measured = (authoring.MeasuredColumn("x_m", "m", ("sensor.sigma_m",)),)
+
+    def motion(self, spec):
+        return authoring.Motion(
+            F=lambda dt: [[1, dt], [0, 1]], Q=lambda dt: np.outer(*2 * [[dt * dt / 2, dt]]), mean=[0, 0],
+            covariance=np.diag([1e4, 1e4]),
+        )  # fmt: skip
+
+    def plot(self, spec, filter_keys, k):
+        return [1, 0], spec.sensor.sigma_m * (1 + k % 2)
+
+    def own_gains(self, spec, filter_keys):
+        return [[[0.5 + 0.1 * (k % 2), 0.1]] for k in range(spec.scans)] if filter_keys.kind == "steady" else None
+
+
+def test_empty_rows_change_no_estimate_of_a_linear_study():
+    study = Pushed()
+    document = {"sensor": {"sigma_m": 5.0, "scan_period_s": 4.0}, "scans": 12,
+                "filters": [{"name": kind, "kind": kind} for kind in ("kalman", "steady")]}  # fmt: skip
+    spec = study.key_class.model_validate(document)
+    columns = {"t_s": 4.0 * np.arange(40), "x_m": np.random.default_rng(2).normal(0, 5, 40)}
+    empty, without, kept = with_and_without(columns, [6, 9, 10, 11, 14])
+    tracks = [LinearTracker(study, spec).feed(track) for track in (empty, without)]
+    assert_same(*tracks, kept)
+    pieces = LinearTracker(study, spec)
+    halves = [pieces.feed({name: column[rows] for name, column in without.items()}).estimate
+              for rows in (slice(0, 7), slice(7, None))]  # fmt: skip
+    np.testing.assert_array_equal(np.concatenate(halves, axis=1), tracks[1].estimate)
 
 
 def test_a_scan_without_plots_ends_tracks_among_false_plots_as_one_without_rows():

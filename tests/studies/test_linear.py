@@ -369,15 +369,15 @@ def test_at_the_first_plot_and_over_no_time_the_state_stays_whatever_the_motion_
 @pytest.mark.parametrize(
     ("F", "Q", "said"),
     [
-        (np.eye(2), lambda t: np.diag([1, 0.75 - t]), r"assumed_motion: Q\(1 s\): must be symmetric and not negative"),
-        ([[1]], lambda t: np.eye(2), r"assumed_motion: F\(dt\): must be 1 × 2 × 2, got 1 × 1 × 1"),
+        (np.eye(2), lambda t: np.diag([1, 0.6 - t]), r"assumed_motion: Q\(0.75 s\): must be symmetric and not neg"),
+        ([[1]], lambda t: np.eye(2), r"assumed_motion: F\(dt\): must be 2 × 2, got 1 × 1"),
     ],
 )
 def test_a_motion_that_is_wrong_over_the_times_of_recorded_plots_is_one_line(F, Q, said):
     study = study_of(2, 1)
     study.motion = lambda spec: Motion(lambda t: np.eye(2) if t == 0.5 else F, Q, [0, 0], np.eye(2))
     with pytest.raises(ConfigError, match=said):
-        study.tracker(case_of(study, [{}])).feed({"t_s": np.array([0.0, 1.0]), "z0_m": np.zeros(2)})
+        study.tracker(case_of(study, [{}])).feed({"t_s": np.array([0.0, 0.75]), "z0_m": np.zeros(2)})
 
 
 RNG = np.random.default_rng(1)
