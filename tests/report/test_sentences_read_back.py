@@ -20,6 +20,13 @@ ODD = {
     "baseline last": ("rls2", {"baseline": "r+Vr"}),
     "missed": ("rls2", {"radar.detection_probability": 0.3}),
     "few scans": ("rls2", {"scans": 4}),
+    "equal, measured": (
+        "sonar_smoothing",
+        {
+            "sensor.detection_probability": 0.5,
+            "filters": [{"name": name, "kind": "growing_memory", "degree": 1} for name in "AB"],
+        },
+    ),
     "two values": ("rls2", {"sweep": {"radar.sigma_velocity_mps": [2, 20]}}),
 }
 

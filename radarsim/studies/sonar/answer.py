@@ -88,7 +88,7 @@ def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd
     order = final["exact_sigma"] if final["exact_sigma"].notna().all() else final["sigma"]
     order = order.round(SIGMA_DECIMALS)
     lowest, highest = (final.loc[order == extreme] for extreme in (order.min(), order.max()))
-    looks = int(final["exact_sigma"].isna().sum())
+    looks = int(order[final["exact_sigma"].isna()].nunique())  # of equal filters none was chosen
     values = [
         compared_value.sigma_value(rows.iloc[0], tables_by_name).chosen_among(looks) for rows in (lowest, highest)
     ]
@@ -101,7 +101,7 @@ def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd
     }
     if order.nunique() == 1:
         text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)
-    elif _is_surely_less(lowest.iloc[0], highest.iloc[0], tables_by_name, looks=len(final)):
+    elif _is_surely_less(lowest.iloc[0], highest.iloc[0], tables_by_name, looks=order.nunique()):
         text = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **fields)
     else:
         text = tr("σ of the {quantity} after {t_s:g} s: {least}, and {most}, not distinguished.", **fields)
