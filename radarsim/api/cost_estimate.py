@@ -15,7 +15,13 @@ from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import Config, Overrides
 from radarsim.api.display import Displayable
 from radarsim.api.load_experiments import combine_overrides
-from radarsim.api.precision_target import check_precision, heavy_tailed_table, quantity_table, unknown_quantity
+from radarsim.api.precision_target import (
+    asked_phrase,
+    asked_table,
+    check_precision,
+    heavy_tailed_table,
+    unknown_quantity,
+)
 from radarsim.api.progress import seconds_each
 from radarsim.engine.collect import collect
 from radarsim.engine.machine import available_cores
@@ -238,8 +244,8 @@ def required_realisations(
     Raises ConfigError where the case has no such quantity."""
     from radarsim.report import precision
 
-    quantity = registry.quantity(quantity_name, work.case)
-    exact, table = work.plan.gaussian and quantity == SIGMA, quantity_table(work.case, quantity)
+    quantity = registry.quantity(asked_phrase(quantity_name).name, work.case)
+    exact, table = work.plan.gaussian and quantity == SIGMA, asked_table(work.case, quantity_name)
     count = (
         MIN_PILOT_REALISATIONS
         if exact

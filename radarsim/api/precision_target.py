@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.api.case_work import CaseWork
 from radarsim.config.experiment import Case, Experiment
+from radarsim.config.quantity_phrase import PhraseError, QuantityPhrase, parse_phrase
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report.quantities import GAIN, Quantity
@@ -57,6 +58,45 @@ def quantity_table(case: Case, quantity: Quantity) -> "Table":
     return _with_user_filters(case, quantity.table, table)
 
 
+def asked_phrase(text: str) -> QuantityPhrase:
+    """What a precision is asked for: a quantity's name, of all its rows, or a phrase. Raises ConfigError."""
+    try:
+        phrase = parse_phrase(text)
+    except PhraseError as error:
+        raise ConfigError(f"of: {error}") from None
+    if phrase.over == "long run":
+        raise ConfigError(f"of: a run has no long run: give a time, got {text!r}")
+    return phrase
+
+
+def asked_table(case: Case, text: str) -> "Table":
+    """The table of a case's study that holds what is asked for, with the rows that it is asked of."""
+    phrase = asked_phrase(text)
+    quantity = registry.quantity(phrase.name, case)
+    table = quantity_table(case, quantity)
+    if phrase == QuantityPhrase(phrase.name):
+        return table
+    from_s = phrase.from_s
+    if phrase.over in ("worst", "mean") and from_s is None:
+        from_s = study(case.study).counted_from_s(case, phrase.component)
+
+    def rows(results: Sequence[CaseResult]) -> Any:
+        found = table(results)
+        if phrase.component is not None:
+            column = quantity.per or "filter"
+            found = found[found[column].astype(str) == phrase.component]
+        if "k" not in found or not len(found):
+            return found
+        if phrase.over in ("worst", "mean"):
+            return found[found["t_s"] >= (from_s or 0.0) * (1 - 1e-12)]
+        if phrase.at_s is not None:
+            distance = (found["t_s"] - phrase.at_s).abs()
+            return found[distance == distance.min()]
+        return found[found["k"] == (phrase.at_k or found["k"].max())]
+
+    return rows
+
+
 def unknown_quantity(case: Case, quantity: Quantity) -> str:
     """The line for a case that has no row of a quantity."""
     return f"{case.name}: of: must be what the case has, got {quantity.name}: no {quantity.words}"
@@ -67,7 +107,7 @@ def check_precision(experiments: Sequence[Experiment], percent: float, quantity_
     from radarsim.report.precision import FIRST_LOOK
 
     for case in (case for experiment in experiments for case in experiment.cases):
-        registry.quantity(quantity_name, case)
+        registry.quantity(asked_phrase(quantity_name).name, case)
     if not 0 < percent <= 100:
         raise ConfigError(f"precision: must be > 0 and ≤ 100 %, got {percent:g}")
     faults = [

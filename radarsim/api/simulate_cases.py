@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.api.case_results import case_result
 from radarsim.api.case_work import CaseWork
-from radarsim.api.precision_target import PrecisionTarget, heavy_tailed_table, quantity_table
+from radarsim.api.precision_target import PrecisionTarget, asked_phrase, asked_table, heavy_tailed_table
 from radarsim.api.progress import Progress, WeightedProgress
 from radarsim.api.run_to_precision import collect_to_precision
 from radarsim.config.experiment import Case, Experiment
@@ -123,9 +123,9 @@ def simulate(
                 collector = _collector(work, options, weighted_progress.case_callback(key), collect)
                 target = None
                 if precision is not None:
-                    quantity = registry.quantity(quantity_name, case)
+                    quantity = registry.quantity(asked_phrase(quantity_name).name, case)
                     target = PrecisionTarget(
-                        precision, quantity, quantity_table(case, quantity), heavy_tailed_table(work, quantity)
+                        precision, quantity, asked_table(case, quantity_name), heavy_tailed_table(work, quantity)
                     )
                 collected_by_key[key] = _collect_case(case, work, target, collector, _stored_count(work, case, options))
             collected, cell = collected_by_key[key]

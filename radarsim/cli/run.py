@@ -28,6 +28,7 @@ STOP_RULE = stop_rule()
 @options.set_option
 @options.precision_option
 @options.quantity_option
+@options.phrase_of_precision_option
 @click.option("--decide", is_flag=True, help=STOP_RULE.help if STOP_RULE else None, hidden=STOP_RULE is None)
 @options.time_limit_option
 @click.option("--shard", type=options.Share(), metavar="i/n", help="Compute only this share of the blocks; no tables.")
@@ -48,6 +49,7 @@ def run(
     overrides: tuple[str, ...],
     precision: float | None,
     of: str,
+    phrase: str | None,
     decide: bool,
     time_limit: float | None,
     shard: tuple[int, int] | None,
@@ -88,6 +90,7 @@ def run(
       radarsim run rls2 --json | jq '.[0].last_scan[0].sigma'
     """
     _refuse_incompatible(shard, precision, workers or scheduler, threads)
+    of = phrase or of
     refuse_quantity_without_precision(of, precision)
     if decide and (shard or precision):
         raise click.UsageError("--decide goes with neither --shard nor --precision: claims are judged on all blocks")
@@ -155,7 +158,7 @@ def check_replacements(loaded: "list[Experiment]", out: str, quiet: bool, ends_e
 def refuse_quantity_without_precision(quantity: str, precision: float | None) -> None:
     """Raises UsageError for a quantity of a precision without a precision."""
     if quantity != "sigma" and precision is None:
-        raise click.UsageError("--of applies to --precision: give --precision too")
+        raise click.UsageError("--of and --for apply to --precision: give --precision too")
 
 
 def _refuse_incompatible(shard: object, precision: object, cluster: object, threads: object) -> None:
@@ -257,6 +260,7 @@ def compute_each(
 @options.set_option
 @options.precision_option
 @options.quantity_option
+@options.phrase_of_precision_option
 @click.option("--shard", "share", type=options.Share(), metavar="i/n", help="Forecast only this share of the blocks.")
 @click.option(
     "--out", type=options.Directory(), metavar="DIR", help="Also report what is stored there and what is missing."
@@ -303,6 +307,7 @@ def check(
     if pieces is not None or trust_code:
         raise click.UsageError("--recompute and --trust-code apply to a study.zip")
     _refuse_incompatible(arguments["share"], arguments["precision"], None, None)
+    arguments["of"] = arguments.pop("phrase") or arguments["of"]
     refuse_quantity_without_precision(arguments["of"], arguments["precision"])
     from radarsim.api import cost_estimate, json_output, load_experiments
     from radarsim.cli import print_cost, progress

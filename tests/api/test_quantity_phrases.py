@@ -140,3 +140,23 @@ def test_a_judgement_of_the_worst_error_is_about_its_scan():
     assert judged_point(load(BOAT), "worst sigma r") == ("r", axes.t_s[24 + best[24:].argmax()])
     with pytest.raises(ConfigError, match="a judgement is about one scan"):
         judged_point(load(BOAT), "mean sigma r")
+
+
+def test_a_precision_is_asked_of_a_phrase():
+    """σ of the range at 60 s is known as every σ is; the gain of a component at the end by a wider interval."""
+    from radarsim.api.configs import load
+    from radarsim.api.precision_target import asked_table
+
+    (case,) = load("rls2").cases
+    result = radarsim.run("rls2", realisations=2000)
+    every, at_60_s, late, last = (
+        asked_table(case, text)(result.cases)
+        for text in ("sigma", "sigma r at 60 s", "worst sigma r from 100 s", "gain of Vr at the end")
+    )
+    assert len(every) == len(result.curves)
+    assert set(at_60_s["t_s"]) == {60.0}
+    assert set(late["t_s"]) == {100.0, 110.0, 120.0, 130.0, 140.0}
+    assert set(at_60_s["component"]) == set(late["component"]) == {"r"}
+    assert (last["k"].tolist(), last["component"].tolist()) == ([15], ["Vr"])
+    with pytest.raises(ConfigError, match="a run has no long run"):
+        asked_table(case, "sigma r in the long run")
