@@ -88,8 +88,8 @@ ROOMS = {
     ),
     "studies.step_checks": ("kernels", "user_code.errors"),
     "studies.step_tracker": (
-        *("kernels.tracing", "studies.recording_interface", "studies.step_checks", "studies.stepwise"),
-        "user_code.errors",
+        *("kernels.tracing", "studies.missed_scans", "studies.recording_interface", "studies.step_checks"),
+        *("studies.stepwise", "user_code.errors"),
     ),
     "studies.user_filters": (
         *("config", *SUMS, "language", "studies.interface", "studies.noise", "studies.plot_arrays"),

@@ -8,6 +8,7 @@ import numpy as np
 
 from radarsim.errors import PlotFault
 from radarsim.kernels import tracing
+from radarsim.studies.missed_scans import missed_scan_times
 from radarsim.studies.recording_interface import Track
 from radarsim.studies.step_checks import check_length, check_same_shape, record, step_numbers, variances
 from radarsim.user_code.errors import study_context, user_code_error
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
 
 
 class Tracker:
-    """The filters of a case over recorded plots, in plain Python, chunk by chunk: each begins with the first plot."""
+    """The filters of a case over recorded plots, in plain Python, chunk by chunk: each begins with the first plot.
+
+    Over missed scans they predict scan by scan, as they do over empty rows; where rows hold known quantities, which a
+    missed one lacks, in one step."""
 
     most_rows: int | None = None
     several = False
@@ -30,7 +34,7 @@ class Tracker:
             for steps, filter_keys in zip(filter_steps, spec.filters, strict=True)
         ]
         self.states: list[Any] = [None] * len(self.filters)
-        self.last = math.nan
+        self.last, self.scan_period_s = math.nan, study.scan_period_s(spec)
 
     def feed(self, columns: "Mapping[str, np.ndarray]") -> Track:
         with study_context(self.study.name):
@@ -46,7 +50,11 @@ class Tracker:
             for f, (steps, c) in enumerate(self.filters):
                 s = previous = self.states[f]
                 if s is not None:
-                    s = self._next(n, steps.predict, previous, s, float(t[n] - self.last), u, c)
+                    time = self.last
+                    missed = () if u else missed_scan_times(self.last, float(t[n]), self.scan_period_s)
+                    for scan_time in (*missed, float(t[n])):
+                        s = self._next(n, steps.predict, previous, s, scan_time - time, u, c)
+                        time = scan_time
                 if not any(map(math.isnan, z)):
                     step, step_arguments = (steps.start, (z, u, c)) if s is None else (steps.update, (s, z, u, c))
                     s = self._next(n, step, previous, *step_arguments)

@@ -1,5 +1,6 @@
 """An empty row and no row are the same, for every filter of every study that takes recorded plots."""
 
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from radarsim.api.load_experiments import load_all
 from radarsim.recordings import simulate_plots
 from radarsim.recordings.study_part import recording_interface
-from radarsim.studies import authoring
+from radarsim.studies import authoring, step_tracker
 from radarsim.studies.linear_recordings import LinearTracker
 from radarsim.studies.missed_scans import with_missed_scans
 
@@ -111,6 +112,26 @@ def test_empty_rows_change_no_estimate_of_a_linear_study():
     halves = [pieces.feed({name: column[rows] for name, column in without.items()}).estimate
               for rows in (slice(0, 7), slice(7, None))]  # fmt: skip
     np.testing.assert_array_equal(np.concatenate(halves, axis=1), tracks[1].estimate)
+
+
+def test_empty_rows_change_no_estimate_of_a_step_study():
+    """A state that grows at random once a scan, by the square of the time."""
+    steps = SimpleNamespace(
+        design=lambda spec, filter_keys: (),
+        start=lambda z, u, c: (z[0], 1.0),
+        predict=lambda s, dt, u, c: (s[0], s[1] + dt * dt),
+        update=lambda s, z, u, c: (s[0] + s[1] / (s[1] + 25) * (z[0] - s[0]), s[1] * 25 / (s[1] + 25)),
+        estimate=lambda s, u, c: (s[0],),
+        covariance=lambda s, u, c: (s[1],),
+    )
+    study = SimpleNamespace(
+        name="steps", kinds={"kalman": steps}, measured=(authoring.MeasuredColumn("x_m", "m", ()),), known_columns=(),
+        components=(authoring.Component("x", "m", "$x$", "x"),), scan_period_s=lambda spec: 4.0,
+    )  # fmt: skip
+    spec = SimpleNamespace(filters=[SimpleNamespace(name="kalman", kind="kalman")])
+    columns = {"t_s": 4.0 * np.arange(40), "x_m": np.random.default_rng(2).normal(0, 5, 40)}
+    empty, without, kept = with_and_without(columns, [6, 9, 10, 11, 14])
+    assert_same(*(step_tracker.Tracker(study, spec).feed(track) for track in (empty, without)), kept)
 
 
 def test_a_scan_without_plots_ends_tracks_among_false_plots_as_one_without_rows():
