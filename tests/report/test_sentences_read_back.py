@@ -107,7 +107,7 @@ ODD_OF_STUDIES = {  # of the first config of each part; keys of odd values, and 
     "ambiguous_rls2": {"scans": 2, "radar.detection_probability": 0.3},
     "orders": {"scans": 4},
     "pulses_rls2": {"scans": 4, "sweep": {"radar.sigma_range_m": [100, 400]}},
-    "discriminator_rival": {"sweep": {"truth.amplitude": [1, 2]}},
+    "discriminator_rival": {"sweep": {"burst.noise_variance": [2.25, 18]}},
 }
 
 
