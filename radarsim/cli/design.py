@@ -167,9 +167,10 @@ def tune(config: str, filter_name: str | None, wanted: str, write: str | None, a
     """Find the best values of a filter's keys, and the gain.
 
     The quantity is one of `radarsim solve`. Over several cases the root of the mean of σ², or the mean of a rate, is
-    brought to its best. If σ is known exactly, so is the answer. Otherwise values are compared on the same noise, and
-    the gain is measured on other realisations than those used for tuning, with the stated and the tuned filter on the
-    same plots. Whole numbers are tried one by one; elements of a transition matrix keep columns that sum to one.
+    brought to its best. Several searches start over the whole range. If σ is known exactly, so is the answer. Otherwise
+    values are compared on the same noise, the best search is chosen on other noise, and the gain is measured on
+    realisations that neither has used, with the stated and the tuned filter on the same plots. Whole numbers are tried
+    one by one; elements of a transition matrix keep columns that sum to one.
 
     \b
     Examples

@@ -556,7 +556,9 @@ def test_a_sampled_answer_names_a_run_of_as_many_realisations():
 def test_sampled_it_is_said_where_the_quantity_jumps_over_the_target(monkeypatch):
     """As a rate of few events does, of the same noise at neighbouring values."""
     monkeypatch.setattr(
-        Curve, "_sampled", lambda self, case, n: (Estimate(*(case.spec.radar.sigma_velocity_mps > 15) * np.ones(3)), 0)
+        Curve,
+        "_sampled_estimate",
+        lambda self, case, n: Estimate(*(case.spec.radar.sigma_velocity_mps > 15) * np.ones(3)),
     )
     monkeypatch.setattr(Curve, "interval_notes", lambda self, value: ())
     found = solve("rls2", "radar.sigma_velocity_mps", GAIN, 0.4, sampled=True, realisations=100, between=(4, 40))

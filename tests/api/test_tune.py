@@ -12,6 +12,7 @@ from radarsim.api.design.quantities import QuantityName, check_quantity, exact_v
 from radarsim.api.design.solve import solve
 from radarsim.api.design.tune import tune
 from radarsim.errors import ConfigError
+from radarsim.language.current import use_language
 from radarsim.studies import registry
 from tests.api import matched_world, test_judge
 from tests.program import command
@@ -55,7 +56,7 @@ def test_it_finds_the_variance_of_the_matched_world(matched):
 def test_a_filter_at_its_best_gains_nothing(matched):
     found = tune(matched_world.config(1e-3), "sigma r")
     assert 0 <= found.all.gain < 100 * recursion_rounding()
-    assert found.answer == "Tuning gains nothing: σ of 0.001 in r is at its best as stated (exact)."
+    assert found.answer == "Tuning gains nothing: σ of 0.001 in r as stated is within 0.1 % of its best (exact)."
 
 
 @pytest.mark.slow
@@ -210,6 +211,47 @@ def test_columns_of_a_matrix_sum_to_one_and_zeros_stay():
     assert "filters.0.transition.0.1" not in values
     assert any(one.tuned != one.stated for one in found.keys if "transition" in one.key)
     assert "filters.0.transition=[[" in found.command
+
+
+TWO_MODELS = {"filter": "MMA2-11", "free": ["models"], "overrides": ["scans=60"], "realisations": 200}
+
+
+@pytest.mark.slow
+def test_another_seed_does_not_find_another_best():
+    """With two models σ has several minima; one search from the stated values ends in any of them."""
+    results = [tune("multimodel_1hz", "sigma y", seed=seed, **TWO_MODELS) for seed in (1, 2, 3)]
+    assert max(result.all.lo for result in results) < min(result.all.hi for result in results)
+    assert all(len(result.search_ends) > 1 for result in results)
+
+
+@pytest.mark.slow
+def test_where_the_searches_ended_is_told():
+    found = tune("multimodel_1hz", "sigma y", seed=1, **TWO_MODELS)
+    ends = found.search_ends
+    assert list(ends) == sorted(ends)
+    assert f"Best of {len(ends)} starts, which ended at {ends[0]:.4g} to {ends[-1]:.4g} m on the real" in found.answer
+    with use_language("ru"):
+        assert f"Лучший из {len(ends)} запусков; на реализациях, по которым он выбран" in found.answer
+
+
+@pytest.mark.slow
+def test_exact_searches_say_where_they_ended():
+    free = {"initial_scans": (2, 4), "manoeuvre_variance": (1e-4, 10)}
+    found = tune("rls2", **R, over=["turn"], free=free)
+    assert len(found.search_ends) == 3  # one for each number of scans
+    assert found.search_ends[0] == pytest.approx(found.all.tuned)
+    assert "(exact). Best of 3 starts, which ended at " in found.answer
+    assert "Best of" not in tune("rls2", **R, over=["turn"]).answer  # a single minimum
+
+
+@pytest.mark.slow
+def test_a_sampled_rival_is_the_one_that_tune_finds():
+    """`judge --against tuned` takes the same search."""
+    short = {"overrides": ["scans=20", "filters=[MMA2-11]"], "realisations": 40}
+    found = tune("multimodel_1hz", "sigma y", filter="MMA2-11", **short)
+    judged = radarsim.judge("multimodel_1hz", lambda plots: plots["y_m"], against="tuned", wanted="sigma y", **short)
+    row = judged.curves.query("filter == 'MMA2-11, tuned' and component == 'y' and k == 20").iloc[0]
+    assert_rounded(found.all.tuned, row["sigma"], operations=40)
 
 
 @pytest.mark.slow

@@ -244,18 +244,24 @@ def sampled_value(quantity: MeasuredQuantity, result: CaseResult) -> tuple[Estim
     """The value with its 95 % interval from a case's tables; and the exact value if the table has one, else NaN."""
     table = quantity_table(quantity.definition, result)
     table = table[table["filter"] == quantity.filter]
+    return _table_value(quantity, table), float(_table_value(quantity, table, exact_only=True).value)
+
+
+def sampled_estimate(quantity: MeasuredQuantity, result: CaseResult) -> Estimate:
+    """The value with its 95 % interval from a case's tables."""
+    table = quantity_table(quantity.definition, result)
+    return _table_value(quantity, table[table["filter"] == quantity.filter])
+
+
+def _table_value(quantity: MeasuredQuantity, table: "pd.DataFrame", exact_only: bool = False) -> Estimate:
+    """The value of a quantity in the rows of its filter."""
     if not len(table):
-        return UNKNOWN_ESTIMATE, np.nan
-    measured = _series_by_component(quantity.definition, table)
-    exact_series = _series_by_component(quantity.definition, table, exact_only=True)
+        return UNKNOWN_ESTIMATE
+    series = series_by_filter(quantity.definition, table, exact_only)
+    by_component = {component: values for (_, component), values in series.items()}
     name = quantity.component or ""
-    check_name(name, list(measured), quantity.definition.per)
-    return estimate_at(quantity, measured[name]), float(estimate_at(quantity, exact_series[name]).value)
-
-
-def _series_by_component(definition: Quantity, table: "pd.DataFrame", exact_only: bool = False) -> dict[str, Series]:
-    """The series of one filter, by component."""
-    return {component: series for (_, component), series in series_by_filter(definition, table, exact_only).items()}
+    check_name(name, list(by_component), quantity.definition.per)
+    return estimate_at(quantity, by_component[name])
 
 
 def quantity_table(definition: Quantity, result: CaseResult) -> "pd.DataFrame":

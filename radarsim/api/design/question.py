@@ -247,7 +247,7 @@ class Curve:
 
     def simulate(self, value: Any, realisations: int) -> Estimate:
         """The quantity with its interval, from this number of realisations."""
-        return self._cached(value, realisations, lambda case: self._sampled(case, realisations)[0])
+        return self._cached(value, realisations, lambda case: self._sampled_estimate(case, realisations))
 
     def interval_notes(self, value: Any) -> tuple[str, ...]:
         """The note of the tables on the interval at a value, in words."""
@@ -280,15 +280,19 @@ class Curve:
 
     def _exact_estimate(self, case: Case) -> Estimate:
         if self.from_tables:
-            value = self._sampled(case, 1)[1]
+            value = quantities.sampled_value(self.quantity, self._read_result(case, 1))[1]
         else:
             value = quantities.exact_value(self.quantity, case, quantities.plan_labels(self.quantity, case))
         return Estimate(value, value, value)
 
-    def _sampled(self, case: Case, realisations: int) -> tuple[Estimate, float]:
+    def _sampled_estimate(self, case: Case, realisations: int) -> Estimate:
+        return quantities.sampled_estimate(self.quantity, self._read_result(case, realisations))
+
+    def _read_result(self, case: Case, realisations: int) -> CaseResult:
+        """The result of a case, whose scan is noted as read."""
         result = self._result(case, realisations)
         self.scans.add(quantities.scan_number(self.quantity, result.axes))
-        return quantities.sampled_value(self.quantity, result)
+        return result
 
     def _result(self, case: Case, realisations: int) -> CaseResult:
         # A question is of gains against the first baseline.

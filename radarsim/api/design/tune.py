@@ -1,11 +1,10 @@
 """`radarsim tune`: the values of a filter's keys with which a quantity is best over a family of cases.
 
 Where the quantity is exact, exact values are searched and compared. Elsewhere every value is simulated with the same
-noise, from a seed that only the search uses. The gain is measured on the realisations of the config's seed, which the
-search has not used, so that no number contains the optimism of a minimum. There both filters see the same plots: the
-gain is paired."""
+noise, from a seed that only the search uses; which of the searches ended best is decided with noise of another. The
+gain is measured on the realisations of the config's seed, which neither has used, so that no number contains the
+optimism of a minimum. There both filters see the same plots: the gain is paired."""
 
-import itertools
 import math
 import os
 import re
@@ -27,7 +26,7 @@ from radarsim.api.design.tuned_content import tuned_content
 from radarsim.api.design.tuning_intervals import flat_interval, has_no_effect, spread_of_tuning
 from radarsim.api.design.tuning_objective import Objective, Variants, case_with_filters, cost_by_quantity
 from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, objective_words
-from radarsim.api.design.tuning_search import PILOT_POINTS, find_minimum
+from radarsim.api.design.tuning_search import FoundMinimum, expected_places, find_minimum
 from radarsim.api.design.tuning_space import (
     Path,
     Place,
@@ -55,27 +54,19 @@ from radarsim.report.wording import format_number
 from radarsim.studies import registry
 
 TUNED_OUT = f"{RESULTS}/tuned"  # where the run with tuned values writes
-TRAINING_SEED_OFFSET = 2**32  # more than the seed of the config: the seed of the noise that is searched with
-EXPECTED_VALUES_PER_KEY = {True: 100, False: 40}  # of a simplex, by whether the quantity is exact
+# More than the seed of the config: the seeds of the noise that is searched with, and that the best is chosen with.
+SEED_OFFSETS = 2**32, 2**33
 
 
 def _predict(notify: Callable[[str], None], objective: Objective, place_s: float) -> None:
     """Tell the user what the search will do and how long it takes, if that is long; place_s: seconds of one place."""
-    grids = [
-        len(key.search_range.grid(None if objective.exact or key.search_range.whole_numbers else PILOT_POINTS))
-        for key in objective.searched
-    ]
-    is_whole = [key.search_range.whole_numbers for key in objective.searched]
-    scans = math.prod(itertools.compress(grids, is_whole)) * max(
-        1, sum(grids) - sum(itertools.compress(grids, is_whole))
-    )
-    full_places = EXPECTED_VALUES_PER_KEY[objective.exact] * is_whole.count(False)
+    first_places, full_places = expected_places(objective)
     pilot, count = (1, 1) if objective.exact else (objective.pilot_realisations, objective.count)
     for curve in objective.curves:
-        curve.expected = scans * pilot + full_places * count
-    keys = plural("{count} key", "{count} keys", len(grids))
-    work = tr("searches {keys}, about {count} places", keys=keys, count=scans + full_places)
-    question.predict_duration(notify, work, place_s * (scans * pilot / count + full_places))
+        curve.expected = first_places * pilot + full_places * count
+    keys = plural("{count} key", "{count} keys", len(objective.searched))
+    work = tr("searches {keys}, about {count} places", keys=keys, count=first_places + full_places)
+    question.predict_duration(notify, work, place_s * (first_places * pilot / count + full_places))
 
 
 def tuning_gains(objective: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[TunedQuantity]:
@@ -142,9 +133,12 @@ def tune(
     case: some of the config's cases; default: all. Over a family the root of the mean of σ² is least, or the mean rate
     is best.
 
+    Several searches start at places over the whole range; `search_ends` are the values at which they ended.
+
     If σ is not known exactly, or is to be `sampled`, the search uses `realisations` with noise of its own seed, by
-    default as many as the config's, and the gain is measured on as many of the config's seed, stated and tuned filter
-    on the same plots. notify is called with a line on what a search of some seconds will do.
+    default as many as the config's. The best of its ends is chosen on as many of another seed, and the gain is measured
+    on as many of the config's, stated and tuned filter on the same plots. notify is called with a line on what a search
+    of some seconds will do.
 
     `keys` have the stated and the tuned value, `all` and `cases` the gain with its 95 % interval, in per cent of σ, of
     rates in points. Raises ConfigError for a wrong config, key, filter or quantity.
@@ -181,16 +175,16 @@ def tune(
             curve.is_exact(quantities.plan_labels(curve.quantity, curve.cases.base)) for curve in curves
         ]
     exact = all(has_exact_values) and not sampled
-    for variant, curve in zip(variants, curves, strict=True):
-        variant.seed = variant.seed if exact else (variant.seed + TRAINING_SEED_OFFSET) % 2**64
-        curve.cases.base = variant.base = replace(variant.base, seed=variant.seed)
+    for curve in curves:
         curve.has_rough_values = exact and registry.study(curve.cases.base.study).costly(curve.cases.base)
     objective = Objective(variants, curves, exact, count)
+    objective, chooser = (objective, objective) if exact else map(objective.with_noise, SEED_OFFSETS)
     _predict(notify or (lambda line: None), objective, _seconds_of_start(objective))
-    best = find_minimum(objective)
-    pairs, ranges_by_path = _judge_exactly(objective, best) if exact else _judge_by_sampling(objective, best)
+    found = find_minimum(objective, chooser)
+    judge = _judge_exactly if exact else _judge_by_sampling
+    pairs, ranges_by_path = judge(objective, found.place)
     given_settings = [setting for setting in (*settings, members[0]) if setting]
-    return _tuning_result(config, cases, objective, best, ranges_by_path, pairs, given_settings)
+    return _tuning_result(config, cases, objective, found, ranges_by_path, pairs, given_settings)
 
 
 def _common_keys(
@@ -246,13 +240,14 @@ def _tuning_result(
     config: Config,
     cases: Sequence[Case],
     objective: Objective,
-    best: Place,
+    found: FoundMinimum,
     ranges: Mapping[Path, tuple[float, float]],
     pairs: Sequence[np.ndarray],
     settings: Sequence[str],
 ) -> TuningResult:
     """The result: tuned keys, gains and notes, with the command of the run that shows the gain."""
     case, quantity, stated_keys = cases[0], objective.curves[0].quantity, objective.filter_keys
+    best = found.place
     filter_name = str(quantity.filter)
     (i,) = [i for i, member in enumerate(case.spec.members) if member.name == filter_name]
     prefix, tuned_keys = f"{type(case.spec).bare_keys}.{i}.", deepcopy(dict(stated_keys))
@@ -288,6 +283,7 @@ def _tuning_result(
         all=gains[-1],
         training=0 if objective.exact else objective.count,
         judged=0 if objective.exact else objective.count,
+        search_ends=objective.from_costs(found.end_costs),
         settings={tuned_key.key: tuned_key.tuned for tuned_key in keys},
         command=_run_command(config, settings, prefix, tuned_values, tuned_keys),
         notes=tuple(_tuning_notes(objective, best, inert[: len(keys) - 1], tuned_values, ranges)),

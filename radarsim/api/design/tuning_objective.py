@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
+from copy import copy, deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -48,6 +48,12 @@ class Variants:
         case = case_with_filters(self.case, [*members, *tuned], self.baseline)
         return replace(case, seed=self.seed, noise_keys=self.case.noise_keys or self.case.spec)
 
+    def with_seed(self, seed: int) -> "Variants":
+        """The same with noise of another seed."""
+        variants = copy(self)
+        variants.seed, variants.base = seed, replace(self.base, seed=seed)
+        return variants
+
     def case_with_value(self, key: str, place: Place) -> Case:
         """The case with other values. Raises ConfigError where the config refuses them."""
         return self.case_with_filter(self.filter(place))
@@ -85,6 +91,15 @@ class Objective:
         self.definition = curves[0].quantity.definition
         self.rough = exact and any(curve.has_rough_values for curve in curves)
 
+    def with_noise(self, seed_offset: int) -> "Objective":
+        """The same with noise of another seed, so much more than that of the config."""
+        variants = [variant.with_seed((variant.case.seed + seed_offset) % 2**64) for variant in self.variants]
+        curves = [
+            Curve(variant, "", curve.quantity, curve.threads, curve.progress, curve.realisations)
+            for variant, curve in zip(variants, self.curves, strict=True)
+        ]
+        return Objective(variants, curves, self.exact, self.count)
+
     @property
     def pilot_realisations(self) -> int:
         """Realisations of a value of a scan."""
@@ -100,6 +115,10 @@ class Objective:
         """What is minimised, from the values of the cases."""
         combined = self.combined(values)
         return 100.0 - combined if self.definition.more_is_better else combined
+
+    def from_costs(self, costs: Sequence[float]) -> tuple[float, ...]:
+        """The quantity at costs."""
+        return tuple(100.0 - cost if self.definition.more_is_better else cost for cost in costs)
 
     def __call__(self, place: Place, count: int | None = None) -> float:
         """The cost at a place, with all training realisations or fewer; infinite if there is no estimate."""
@@ -117,7 +136,7 @@ def cost_by_quantity(case: Case, measured: Sequence[MeasuredQuantity], count: in
     """Q quantities of a case (1 + n, Q): from all realisations, then without each of n batches."""
 
     def values(result: CaseResult) -> list[float]:
-        return [float(quantities.sampled_value(quantity, result)[0].value) for quantity in measured]
+        return [float(quantities.sampled_estimate(quantity, result).value) for quantity in measured]
 
     read = quantities.case_read(measured[0], case)
     total_values, leave_one_out_values, _ = question.leave_one_out(read, values, count)

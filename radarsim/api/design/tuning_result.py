@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from radarsim.api.design.tuning_objective import Objective
 
 
-NO_GAIN = 1e-3  # per cent or points of an exact gain that are called nothing
+NO_GAIN = 0.1  # per cent or points of an exact gain that are called nothing
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class TuningResult(Displayable):
     """What was found: keys, the gain of each case and that of all.
 
     training and judged are numbers of realisations a case, none where exact; minimised says what is least, or largest.
+    search_ends: the quantity where each of the searches ended, the best first, on the realisations that chose the best.
     settings are the tuned values by key; command is a run with them, of the noise with which the gain is measured.
     inert: the keys without effect on the quantity."""
 
@@ -70,6 +71,7 @@ class TuningResult(Displayable):
     judged: int
     settings: Mapping[str, float]
     command: str
+    search_ends: tuple[float, ...] = ()
     notes: tuple[str, ...] = ()
     inert: tuple[str, ...] = ()
 
@@ -91,19 +93,28 @@ class TuningResult(Displayable):
 
     @property
     def answer(self) -> str:
-        """What tuning gains, in a sentence."""
+        """What tuning gains, and how far the search looked."""
+        return " ".join(sentence for sentence in (self._gain_sentence, self._search_sentence) if sentence)
+
+    @property
+    def _search_sentence(self) -> str:
+        """How many searches started, and where they ended; empty for one, and where no key has an effect."""
+        if len(self.search_ends) < 2 or len(self.inert) == len(self.keys):
+            return ""
+        ends = [format_number(end, ".4g") for end in (min(self.search_ends), max(self.search_ends))]
+        where = f"{tr('{low} to {high}', low=ends[0], high=ends[1]) if len({*ends}) > 1 else ends[0]} {tr(self.unit)}"
+        fields = {"count": str(len(self.search_ends)), "where": where.rstrip()}
+        if self.exact:
+            return tr("Best of {count} starts, which ended at {where}.", **fields)
+        return tr("Best of {count} starts, which ended at {where} on the realisations that chose among them.", **fields)
+
+    @property
+    def _gain_sentence(self) -> str:
+        """What tuning gains."""
         total, quantity_field = self.all, {"quantity": self.quantity.translated_words}
         if self.exact:
-            if len(self.inert) == len(self.keys):
-                return plural(
-                    "There is nothing to tune: {keys} has no effect on {quantity}.",
-                    "There is nothing to tune: {keys} have no effect on {quantity}.",
-                    len(self.inert),
-                    keys=join_names(self.inert),
-                    **quantity_field,
-                )
-            if abs(total.gain) < NO_GAIN:
-                return tr("Tuning gains nothing: {quantity} is at its best as stated (exact).", **quantity_field)
+            if nothing := self._nothing_sentence:
+                return nothing
             how = tr("exact")
         else:
             other_realisations = plural("{count} other realisation", "{count} other realisations", self.judged)
@@ -119,6 +130,25 @@ class TuningResult(Displayable):
         if not total.lo > 0:
             return tr("Tuning gains nothing that shows in the {quantity}: {gain} ({how}).", **fields)
         return tr("Tuning gains {gain} in the {quantity}: {stated} → {tuned} ({how}).", **fields)
+
+    @property
+    def _nothing_sentence(self) -> str:
+        """That there is nothing to gain, of an exact quantity; empty where there is."""
+        fields = {"quantity": self.quantity.translated_words}
+        if len(self.inert) == len(self.keys):
+            return plural(
+                "There is nothing to tune: {keys} has no effect on {quantity}.",
+                "There is nothing to tune: {keys} have no effect on {quantity}.",
+                len(self.inert),
+                keys=join_names(self.inert),
+                **fields,
+            )
+        if abs(self.all.gain) >= NO_GAIN:
+            return ""
+        limit = f"{format_number(NO_GAIN)} {self.gain_unit}"
+        return tr(
+            "Tuning gains nothing: {quantity} as stated is within {limit} of its best (exact).", limit=limit, **fields
+        )
 
     def member(self, case: Case) -> dict[str, Any]:
         """The tuned filter as the keys of a further one of a case."""
