@@ -23,7 +23,13 @@ from radarsim.api.design.jackknife import jackknife_interval
 from radarsim.api.design.quantities import MeasuredQuantity
 from radarsim.api.design.question import Curve, measure_seconds
 from radarsim.api.design.tuned_content import tuned_content
-from radarsim.api.design.tuning_intervals import flat_interval, has_no_effect, spread_of_tuning
+from radarsim.api.design.tuning_intervals import (
+    FLAT_CHANGE,
+    equally_good,
+    flat_interval,
+    has_no_effect,
+    spread_of_tuning,
+)
 from radarsim.api.design.tuning_objective import Objective, Variants, case_with_filters, cost_by_quantity
 from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, objective_words
 from radarsim.api.design.tuning_search import FoundMinimum, expected_places, find_minimum
@@ -183,6 +189,7 @@ def tune(
     found = find_minimum(objective, chooser)
     judge = _judge_exactly if exact else _judge_by_sampling
     pairs, ranges_by_path = judge(objective, found.place)
+    found = found._replace(other_hollows=equally_good(chooser, found.place, found.other_hollows))
     given_settings = [setting for setting in (*settings, members[0]) if setting]
     return _tuning_result(config, cases, objective, found, ranges_by_path, pairs, given_settings)
 
@@ -286,7 +293,10 @@ def _tuning_result(
         search_ends=objective.from_costs(found.end_costs),
         settings={tuned_key.key: tuned_key.tuned for tuned_key in keys},
         command=_run_command(config, settings, prefix, tuned_values, tuned_keys),
-        notes=tuple(_tuning_notes(objective, best, inert[: len(keys) - 1], tuned_values, ranges)),
+        notes=(
+            *_tuning_notes(objective, best, inert[: len(keys) - 1], tuned_values, ranges),
+            *_equality_notes(objective, found.other_hollows, ranges),
+        ),
         inert=inert,
     )
 
@@ -329,6 +339,32 @@ def _tuning_notes(
     if not objective.exact and any(path not in ranges and path not in fixed_paths for path in tuned_paths):
         notes.append(tr("no intervals of the values: the quantity is flat there, or too noisy to tell its curvature"))
     return notes
+
+
+def _equality_notes(
+    objective: Objective, ends: Sequence[Place], ranges: Mapping[Path, tuple[float, float]]
+) -> list[str]:
+    """A note on ends of other searches that are as good, where they lie beyond the ranges of the keys."""
+    places = [from_scale(objective.searched, end, objective.filter_keys) for end in ends]
+    beyond = [
+        values
+        for values in places
+        if any(path not in ranges or not ranges[path][0] <= x <= ranges[path][1] for path, x in values.items())
+    ]
+    if not beyond:
+        return []
+    values_text = ", ".join(f"{_dotted(path)} = {format_number(x, '.3g')}" for path, x in beyond[0].items())
+    percent = format_number(100 * FLAT_CHANGE)
+    how = tr("to {percent} %", percent=percent) if objective.exact else tr("within the interval")
+    return [
+        plural(
+            "{count} other start is as good {how}: {values}",
+            "{count} other starts are as good {how}, the best of them at {values}",
+            len(beyond),
+            how=how,
+            values=values_text,
+        )
+    ]
 
 
 def _dotted(path: Path) -> str:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +41,27 @@ def has_no_effect(objective: Objective, best: Place, i: int) -> bool:
     return all(math.isclose(value, objective(best), rel_tol=NO_CHANGE) for value in ends)
 
 
+def equally_good(chooser: Objective, best: Place, ends: Sequence[Place]) -> tuple[Place, ...]:
+    """The ends of other searches that are as good as the best: to 0.1 % where exact; elsewhere those whose paired
+    difference on the sample that chose the best may be none."""
+    if chooser.exact:
+        return tuple(end for end in ends if chooser(end) <= (1 + FLAT_CHANGE) * chooser(best))
+    best_costs, equal = _batch_costs(chooser, best), []
+    for end in ends:
+        differences = _batch_costs(chooser, end) - best_costs
+        _, lo, hi = jackknife_interval(differences[1:], float(differences[0]))
+        equal += [end] if lo <= 0 <= hi else []
+    return tuple(equal)
+
+
+def _batch_costs(objective: Objective, place: Place) -> np.ndarray:
+    """The costs at a place with all realisations, then without each of the batches (1 + batches,)."""
+    cases = [variant.case_with_value("", place) for variant in objective.variants]
+    pairs = zip(cases, objective.curves, strict=True)
+    values = [cost_by_quantity(case, (curve.quantity,), objective.count)[:, 0] for case, curve in pairs]
+    return np.asarray(objective.cost(values))
+
+
 def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[float, float]]:
     """The 95 % intervals of the best values of real numbers, from how far they move without each of the batches.
 
@@ -59,12 +80,7 @@ def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[floa
     )
 
     def costs(u: np.ndarray) -> np.ndarray:
-        """With all realisations, then without each of the batches."""
-        cases = [variant.case_with_value("", move_keys(searched, best, u)) for variant in objective.variants]
-        pairs = zip(cases, objective.curves, strict=True)
-        return np.asarray(
-            objective.cost([cost_by_quantity(case, (curve.quantity,), objective.count)[:, 0] for case, curve in pairs])
-        )
+        return _batch_costs(objective, move_keys(searched, best, u))
 
     if not len(scale_place):
         return {}

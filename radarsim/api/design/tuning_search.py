@@ -53,10 +53,12 @@ class CostFunction(Protocol):
 
 
 class FoundMinimum(NamedTuple):
-    """The best place, and the costs at which the local searches ended, ascending, on the sample that chose the best."""
+    """The best place; the costs at which the local searches ended, ascending, on the sample that chose the best; and
+    those ends, in the same order, that lie in other hollows than the best."""
 
     place: Place
     end_costs: tuple[float, ...]
+    other_hollows: tuple[Place, ...]
 
 
 def find_minimum(objective: CostFunction, chooser: CostFunction) -> FoundMinimum:
@@ -71,8 +73,10 @@ def find_minimum(objective: CostFunction, chooser: CostFunction) -> FoundMinimum
     for search in FINAL_SEARCHES[objective.exact]:
         finalists = [search_locally(objective, end, search, None) for end in finalists]
     ends = [tuple(float(f"{x:.{DIGITS}g}") for x in end) for end in (*finalists, *others)]
-    costs = sorted(chooser(end) for end in ends)
-    return FoundMinimum(min((stated, *ends), key=chooser), tuple(costs) if _real_indices(searched) else ())
+    ends, best = sorted(ends, key=chooser), min((stated, *ends), key=chooser)
+    other_hollows = tuple(end for end in ends if _distance(searched, end, best) > SAME_END)
+    costs = tuple(chooser(end) for end in ends) if _real_indices(searched) else ()
+    return FoundMinimum(best, costs, other_hollows)
 
 
 def _split_finalists(
