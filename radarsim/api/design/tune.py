@@ -61,7 +61,7 @@ from radarsim.studies import registry
 
 TUNED_OUT = f"{RESULTS}/tuned"  # where the run with tuned values writes
 # More than the seed of the config: the seeds of the noise that is searched with, and that the best is chosen with.
-SEED_OFFSETS = 2**32, 2**33
+SEARCH_SEED_OFFSET, CHOICE_SEED_OFFSET = 2**32, 2**33
 
 
 def _predict(notify: Callable[[str], None], objective: Objective, place_s: float) -> None:
@@ -183,8 +183,9 @@ def tune(
     exact = all(has_exact_values) and not sampled
     for curve in curves:
         curve.has_rough_values = exact and registry.study(curve.cases.base.study).costly(curve.cases.base)
-    objective = Objective(variants, curves, exact, count)
-    objective, chooser = (objective, objective) if exact else map(objective.with_noise, SEED_OFFSETS)
+    objective = chooser = Objective(variants, curves, exact, count)
+    if not exact:
+        objective, chooser = objective.with_noise(SEARCH_SEED_OFFSET), objective.with_noise(CHOICE_SEED_OFFSET)
     _predict(notify or (lambda line: None), objective, _seconds_of_start(objective))
     found = find_minimum(objective, chooser)
     judge = _judge_exactly if exact else _judge_by_sampling

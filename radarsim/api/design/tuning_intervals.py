@@ -46,7 +46,7 @@ def equally_good(chooser: Objective, best: Place, ends: Sequence[Place]) -> tupl
     difference on the sample that chose the best may be none."""
     if chooser.exact:
         return tuple(end for end in ends if chooser(end) <= (1 + FLAT_CHANGE) * chooser(best))
-    best_costs, equal = _batch_costs(chooser, best), []
+    best_costs, equal = _batch_costs(chooser, best), list[Place]()
     for end in ends:
         differences = _batch_costs(chooser, end) - best_costs
         _, lo, hi = jackknife_interval(differences[1:], float(differences[0]))
