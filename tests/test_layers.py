@@ -53,7 +53,7 @@ ROOMS = {
     "studies.random_numbers": ("kernels.random",),
     "studies.error_law": (),
     "studies.missed_scans": (),
-    "studies.gross_errors": ("kernels.likelihood",),
+    "studies.gross_errors": (),
     "studies.plot_arrays": ("studies.random_numbers",),
     "studies.recording_interface": ("config.experiment", "studies.error_law", "studies.plot_arrays"),
     "studies.floors": ("engine.results", "report", "studies.interface"),

@@ -4,10 +4,12 @@ Letters as in the book: x state, P its covariance, F transition, Q process noise
 that was measured, S variance of its innovation e, K = p / S gain with p = P h. A plot is taken in one number after the
 other, each with an error of its own.
 
-An outlier is a number whose error follows another law: it is near, of a width of some times the stated σ, or far, of
-any size: the logarithm of its σ is uniform between FAR_WIDTH times the stated one and the span of the data, taken at
-FAR_COUNT values. One law of one width would lift σ with the size of the farthest. A hard manoeuvre is an interval in
-which the process noise is HARD_FACTOR times as large. The explanations of x and P are merged by moments (GPB1).
+An outlier is a number whose error follows another law. It is near: off by some σ to either side, and spread about that.
+A law without the offset has most of its mass among the sound numbers: it takes these for outliers, and σ is too small.
+Or it is far, of any size: the logarithm of its σ is uniform between FAR_WIDTH times the stated one and the span of the
+data, taken at FAR_COUNT values. One law of one width would lift σ with the size of the farthest. A hard manoeuvre is an
+interval in which the process noise is HARD_FACTOR times as large. The explanations of x and P are merged by moments
+(GPB1).
 
 Errors that last from plot to plot are states of their own (`with_lasting_errors`), each of the first order: its
 correlation falls with time as a power."""
@@ -18,26 +20,31 @@ from radarsim.kernels.compiler import kernel
 
 FAR_WIDTH = 10.0  # the least of far outliers, in σ of a number
 FAR_COUNT = 6  # widths of far outliers
-LAW_COUNT = 2 + FAR_COUNT  # of errors: the stated one, that of near outliers, those of far ones
+LAW_COUNT = 3 + FAR_COUNT  # of errors: the stated one, those of near outliers to either side, those of far ones
+LOG_DENSITY, VARIANCE, MEAN = range(3)  # rows of the laws at an innovation: with the probability of each law
 HARD_FACTOR = 100.0  # on the process noise in a hard manoeuvre
-NEAR, FAR, HARD, WIDTH = range(4)  # of the shares, and the width of near outliers
+NEAR, FAR, OFFSET, SPREAD = range(4)  # of an outlier law: the shares, and offset and spread of near outliers in σ
 
 
 @kernel
-def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, shares, span, white, log_densities, soundness):
+def log_likelihood(
+    x, P, F, Q, H, z, variance, present, manoeuvre, outliers, first, hard_share, span, white, log_densities, soundness
+):
     """The log-likelihood of n rows of m numbers, for a state of d components.
 
     x (d,) and P (d, d) are what is known at the first row, and are overwritten; F, Q (n, d, d): transition to each row
     and what the manoeuvre of unit variance adds; H (n, m, d), z, variance (n, m): the numbers, where `present`;
-    manoeuvre: its variance; shares (4,): of near and far outliers among the numbers, of hard manoeuvres among the
-    intervals, and the width of near outliers in σ; span (m,): of the data; white: 1, or 0 where the errors are states.
+    manoeuvre: its variance; outliers (m, 4): the law of outliers of each number, from row `first` on. Earlier rows find
+    the state: gross errors are left out of them, and the rest are taken with the mean square of all errors, since
+    before the state is known an outlier is as likely as anything. hard_share: of hard manoeuvres among the intervals;
+    span (m,): of the data; white: 1, or 0 where the errors are states.
     Out: log_densities (n, m), the logarithm of each number's density given those before it, zero where it is missing;
     soundness (n, m): the probability that it is no outlier."""
-    product, p, laws = np.zeros_like(P), np.zeros_like(x), np.empty((2, LAW_COUNT))
+    product, p, laws = np.zeros_like(P), np.zeros_like(x), np.empty((3, LAW_COUNT))
     hard_x, hard_P, hard_score, hard_soundness = x.copy(), P.copy(), log_densities[0].copy(), soundness[0].copy()
     for k in range(z.shape[0]):
-        row = H[k], z[k], variance[k], present[k], shares, span, white, p, laws
-        may_be_hard = k > 0 and shares[HARD] > 0.0
+        row = H[k], z[k], variance[k], present[k], outliers, k < first, span, white, p, laws
+        may_be_hard = k > 0 and hard_share > 0.0
         if may_be_hard:
             hard_x[:], hard_P[:] = x, P
             extrapolate(hard_x, hard_P, product, p, F[k], Q[k], HARD_FACTOR * manoeuvre)
@@ -46,8 +53,8 @@ def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, shares, span,
             extrapolate(x, P, product, p, F[k], Q[k], manoeuvre)
         take_row(x, P, row, log_densities[k], soundness[k])
         if may_be_hard:
-            calm = np.log(1.0 - shares[HARD]) + log_densities[k].sum()
-            hard = np.log(shares[HARD]) + hard_score.sum()
+            calm = np.log(1.0 - hard_share) + log_densities[k].sum()
+            hard = np.log(hard_share) + hard_score.sum()
             total = max(calm, hard) + np.log1p(np.exp(-abs(calm - hard)))
             log_densities[k, 0] += total - log_densities[k].sum()
             merge_states(x, P, hard_x, hard_P, np.exp(hard - total))
@@ -57,18 +64,28 @@ def log_likelihood(x, P, F, Q, H, z, variance, present, manoeuvre, shares, span,
 def take_row(x, P, row, log_densities, soundness):
     """Update x and P in place by the numbers of a row; fills the logarithms of their densities and their soundness.
 
-    row: what `log_likelihood` has of it, and work arrays p (d,) and laws (2, LAW_COUNT)."""
-    H, z, variance, present, shares, span, white, p, laws = row
+    row: what `log_likelihood` has of it, and work arrays p (d,) and laws (3, LAW_COUNT)."""
+    H, z, variance, present, outliers, is_start, span, white, p, laws = row
     for j in range(z.size):
         log_densities[j], soundness[j] = 0.0, 1.0
         if present[j]:
             e, spread = innovation(x, P, H[j], z[j], p)
             S = spread + white * variance[j]
-            if shares[NEAR] + shares[FAR] > 0.0:
-                fill_laws(laws, e, S, variance[j], shares, span[j])
+            if is_start:
+                S += (start_factor(outliers[j]) - 1.0) * variance[j]
+            if outliers[j, NEAR] + outliers[j, FAR] > 0.0 and not is_start:
+                fill_laws(laws, e, S, variance[j], outliers[j], span[j])
                 log_densities[j], soundness[j] = take_number_of_laws(x, P, p, e, laws)
             else:
                 log_densities[j] = take_number(x, P, p, e, S)
+
+
+@kernel
+def start_factor(outliers):
+    """The factor on the variance of a number that starts a track, where it may be an outlier that is no gross error;
+    outliers (4,): the law of these."""
+    sizes = outliers[OFFSET] * outliers[OFFSET] + outliers[SPREAD] * outliers[SPREAD]
+    return 1.0 + outliers[NEAR] * sizes + outliers[FAR] * (FAR_WIDTH * FAR_WIDTH - 1.0)
 
 
 @kernel
@@ -121,42 +138,53 @@ def take_number(x, P, p, e, S):
 
 
 @kernel
-def fill_laws(laws, e, S, variance, shares, span):
+def fill_laws(laws, e, S, variance, outliers, span):
     """Fill, for each law of a number's error, the logarithm of its probability and density at an innovation e, and its
-    variance of the innovation: S for the stated law, whose error has the given variance. laws (2, LAW_COUNT)."""
-    ratio = max(span * span / (FAR_WIDTH * FAR_WIDTH * variance), 1.0) ** (1.0 / (FAR_COUNT - 1))
+    variance and mean of the innovation: S and 0 for the stated law, whose error has the given variance.
+
+    laws (3, LAW_COUNT); outliers (4,): the law of outliers of the number."""
+    near, far, offset = outliers[NEAR], outliers[FAR], outliers[OFFSET] * np.sqrt(variance)
+    sides = 2.0 if offset > 0.0 else 1.0
     width = FAR_WIDTH * FAR_WIDTH
+    ratio = max(span * span / (width * variance), 1.0) ** (1.0 / (FAR_COUNT - 1)) if far > 0.0 else 1.0
     for i in range(LAW_COUNT):
+        laws[MEAN, i] = 0.0
         if i == 0:
-            share, laws[1, i] = 1.0 - shares[NEAR] - shares[FAR], S
-        elif i == 1:
-            share, laws[1, i] = shares[NEAR], S + (shares[WIDTH] * shares[WIDTH] - 1.0) * variance
+            share, T = 1.0 - near - far, S
+        elif i < 3:
+            share, T = near / sides, S + outliers[SPREAD] * outliers[SPREAD] * variance
+            laws[MEAN, i] = offset
+            if i == 2:
+                share, laws[MEAN, i] = share * (sides - 1.0), -offset
         else:
-            share, laws[1, i] = shares[FAR] / FAR_COUNT, S + (width - 1.0) * variance
+            share, T = far / FAR_COUNT, S + (width - 1.0) * variance
             width *= ratio
-        T = laws[1, i]
-        laws[0, i] = np.log(share) - 0.5 * (np.log(2.0 * np.pi * T) + e * e / T) if share > 0.0 else -np.inf
+        laws[VARIANCE, i], laws[LOG_DENSITY, i], deviation = T, -np.inf, e - laws[MEAN, i]
+        if share > 0.0:
+            laws[LOG_DENSITY, i] = np.log(share) - 0.5 * (np.log(2.0 * np.pi * T) + deviation * deviation / T)
 
 
 @kernel
 def take_number_of_laws(x, P, p, e, laws):
     """As `take_number`, of an error that follows one of several laws; returns the logarithm of the number's density and
     the probability of the stated law."""
-    larger, total, gain, square = laws[0].max(), 0.0, 0.0, 0.0
+    larger, total, gain, pull, square = laws[LOG_DENSITY].max(), 0.0, 0.0, 0.0, 0.0
     for i in range(LAW_COUNT):
-        total += np.exp(laws[0, i] - larger)
-    density = larger + np.log(total)
-    for i in range(LAW_COUNT):
-        w = np.exp(laws[0, i] - density)
-        gain += w / laws[1, i]
-        square += w / (laws[1, i] * laws[1, i])
-    shrink = gain - e * e * max(square - gain * gain, 0.0)
+        if laws[LOG_DENSITY, i] > -np.inf:
+            w = np.exp(laws[LOG_DENSITY, i] - larger)
+            step = (e - laws[MEAN, i]) / laws[VARIANCE, i]
+            total += w
+            gain += w / laws[VARIANCE, i]
+            pull += w * step
+            square += w * step * step
+    gain, pull, square = gain / total, pull / total, square / total
+    shrink = gain - max(square - pull * pull, 0.0)
     for a in range(x.size):
-        x[a] += gain * e * p[a]
+        x[a] += pull * p[a]
         for b in range(a + 1):
             P[a, b] -= shrink * p[a] * p[b]
             P[b, a] = P[a, b]
-    return density, np.exp(laws[0, 0] - density)
+    return larger + np.log(total), np.exp(laws[LOG_DENSITY, 0] - larger) / total
 
 
 @kernel

@@ -88,12 +88,17 @@ def print_fit(fitted: "Fit") -> None:
                 else tr("; the plots cannot distinguish it from larger values")
             )
         lines.append(line)
-    if fitted.outliers is not None:
-        lines.append(tr("outliers: {share} % of the plots", share=significant_digits(100 * fitted.outliers, "#.2g")))
-    if fitted.near_outliers is not None and fitted.has_overlap:
-        width = significant_digits(fitted.near_outliers.width, "#.2g")
-        words = tr("some of them, {width} σ wide, look like sound plots: the intervals cover less often than stated",
-                   width=width)  # fmt: skip
+    for column, law in fitted.outliers.items():
+        share = significant_digits(100 * law.share, "#.2g")
+        if column:
+            lines.append(tr("outliers: {share} % of {column}", share=share, column=column))
+        else:
+            lines.append(tr("outliers: {share} % of the plots", share=share))
+    if fitted.has_overlap:
+        width = significant_digits(max(fitted.outliers.values(), key=fit.share_within_sound).near_width, "#.2g")
+        words = tr(
+            "some, {width} σ wide, look like sound plots: the intervals allow for more and for fewer", width=width
+        )
         lines.append(labelled_line("", words))
     if fitted.outlier_rows:
         rows = sentences.outlier_rows_text(fitted.outlier_rows)

@@ -1,38 +1,59 @@
 """The law of the errors of recorded plots, where it is not only the σ of a config: what a likelihood of plots takes
 besides the keys."""
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
 
 OUTLIERS, BIAS, CORRELATION, MANOEUVRES = EXPLANATIONS = ("outliers", "bias", "correlation", "manoeuvres")
-NEAR, NEAR_WIDTH = "near", "near_width"  # the further fields of an ErrorLaw
+
+
+class OutlierLaw(NamedTuple):
+    """The outliers among numbers of one kind: the shares of near and of far ones.
+
+    A near outlier is off by `offset` to either side, with a normal error of `spread` added to the stated one, both in
+    the stated σ; a far one by any size (`radarsim.kernels.likelihood`)."""
+
+    near: float
+    far: float
+    offset: float
+    spread: float
+
+    @property
+    def share(self) -> float:
+        """The share of outliers."""
+        return self.near + self.far
+
+    @property
+    def near_width(self) -> float:
+        """The root mean square of near outliers, in the stated σ."""
+        return math.sqrt(1 + self.offset**2 + self.spread**2)
 
 
 @dataclass(frozen=True)
 class ErrorLaw:
     """How errors deviate from those of the stated σ; by default they do not.
 
-    outliers: their share among the numbers, of which the part `near` has `near_width` times its σ and the rest any size
-    (`radarsim.kernels.likelihood`); bias: a constant error of a number that can show one, in its σ; correlation: of the
-    errors of neighbouring plots, at the recording's usual interval; manoeuvres: the share of intervals in which the
-    target manoeuvres far harder than in the others."""
+    outliers: their share among the numbers, of which half are normal of three times their σ and half far. outlier_laws:
+    in place of these, those of each kind of numbers, or one law of all. bias: a constant error of a number that can
+    show one, in its σ; correlation: of the errors of neighbouring plots, at the recording's usual interval; manoeuvres:
+    the share of intervals in which the target manoeuvres far harder than in the others."""
 
     outliers: float = 0.0
-    near: float = 0.5
-    near_width: float = 3.0
     bias: float = 0.0
     correlation: float = 0.0
     manoeuvres: float = 0.0
+    outlier_laws: tuple[OutlierLaw, ...] = ()
 
-    def shares(self) -> "np.ndarray":
-        """The shares of near and far outliers and of hard manoeuvres, and the width of near outliers (4,), as
-        `radarsim.kernels.likelihood` takes them."""
+    def outlier_rows(self, count: int) -> "np.ndarray":
+        """The law of outliers of each number of a plot (count, 4), as `radarsim.kernels.likelihood` takes them."""
         import numpy as np
 
-        return np.array([self.outliers * self.near, self.outliers * (1 - self.near), self.manoeuvres, self.near_width])
+        laws = self.outlier_laws or (OutlierLaw(self.outliers / 2, self.outliers / 2, 0.0, math.sqrt(8.0)),)
+        return np.array(laws * (count if len(laws) == 1 else 1))
 
 
 STATED_ERRORS = ErrorLaw()

@@ -9,8 +9,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from radarsim.kernels.likelihood import FAR, FAR_WIDTH, NEAR, WIDTH
-
 START_PLOTS = 15  # from which the parabola is found
 MIN_START_PLOTS = 8
 TRIPLE_STRIDE = 4  # of all triples of them every so manieth: enough to have some without an error
@@ -70,11 +68,6 @@ def data_span(tracks: Sequence[Mapping[str, np.ndarray]], measured: Sequence[str
     columns = [np.concatenate([track[name] for track in tracks]) for name in measured]
     finite = [column[np.isfinite(column)] for column in columns]
     return np.array([float(np.ptp(column)) if column.size else 0.0 for column in finite])
-
-
-def start_factor(shares: np.ndarray) -> float:
-    """The factor on the variance of a plot that starts a track, where it may be an outlier that is no gross error."""
-    return 1.0 + (float(shares[WIDTH]) ** 2 - 1.0) * float(shares[NEAR]) + (FAR_WIDTH**2 - 1.0) * float(shares[FAR])
 
 
 def soundness_by_column(

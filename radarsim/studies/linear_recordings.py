@@ -154,6 +154,7 @@ class PlotLikelihood:
 
     def __init__(self, study: "LinearStudy", spec: Any, track: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec, self.filter, self.model = spec, track.name, RowModel(study, spec, track)
+        self.outlier_kinds = tuple(self.model.columns)
         self.tracks, self.rows = len(tracks), sum(len(track["t_s"]) for track in tracks)
         self.keys = study.fitted
         stated = [attrgetter(key)(spec) for key in self.keys]
@@ -177,7 +178,8 @@ class PlotLikelihood:
         """The log-densities (n, D) of the numbers of each track, and their probabilities to be no outliers."""
         from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
 
-        spec, shares, correlation = self.spec, law.shares(), law.correlation
+        spec, correlation = self.spec, law.correlation
+        outliers = law.outlier_rows(len(self.model.columns))
         for key, value in zip(self.keys, values, strict=True):
             spec = _changed(spec, key.split("."), float(value))
         start = self.model.study.assumed_motion(spec, self.model.filter_keys)
@@ -191,7 +193,8 @@ class PlotLikelihood:
                 model, white = with_lasting_errors(x, P, first, F, Q, H, R, correlation ** (dt / self.usual_s)), 0.0
             score, soundness = np.empty((2, *z.shape))
             numbers = np.where(has_number, z, 0.0), R, has_number
-            log_likelihood(*model, *numbers, 1.0, shares, self.span, white, score, soundness)
+            errors = outliers, 0, law.manoeuvres, self.span, white
+            log_likelihood(*model, *numbers, 1.0, *errors, score, soundness)
             result.append((score, soundness))
         return result
 

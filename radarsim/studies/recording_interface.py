@@ -65,12 +65,16 @@ class Tracker(Protocol):
 MAX_PREPARED = 4  # cases that stay prepared: those whose plots were drawn last
 
 
+ALL_KINDS: tuple[str, ...] = ("",)  # the one law of outliers of all numbers of a plot
+
+
 class Likelihood(Protocol):
     """The likelihood of recorded plots under a filter, as a function of the config keys that it was designed with.
 
     filter: its name; tracks and rows: numbers of them; keys: dotted names; stated (n,): their values in the config;
     zero_limits (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
-    EXPLANATIONS; usual_s: the usual interval between plots."""
+    EXPLANATIONS; usual_s: the usual interval between plots; outlier_kinds: the columns with outlier laws of their own,
+    or ALL_KINDS: a plot as a whole is an outlier or none."""
 
     filter: str
     tracks: int
@@ -80,6 +84,7 @@ class Likelihood(Protocol):
     zero_limits: "np.ndarray"
     explains: tuple[str, ...]
     usual_s: float
+    outlier_kinds: tuple[str, ...]
 
     def __call__(self, values: "np.ndarray", law: ErrorLaw = STATED_ERRORS) -> float:
         """The log-likelihood of values (n,) of the keys. law: only with explanations in `explains`."""

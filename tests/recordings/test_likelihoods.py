@@ -15,7 +15,7 @@ from radarsim.recordings.study_part import recording_interface
 from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.multimodel.model_bank import start_weights
 from radarsim.studies.sonar import conversion
-from tests.recordings.error_laws import error_laws
+from tests.recordings.error_laws import error_laws, outlier_law
 from tests.tolerances import Z, assert_rounded, polynomial_condition, rounding, scaled_condition
 
 
@@ -37,7 +37,7 @@ def likelihood(case, name, *tracks):
 
 def no_outliers(numbers):
     """The arguments of the kernel for which there are neither outliers nor hard manoeuvres."""
-    return np.zeros(4), np.ones(numbers)
+    return np.zeros((numbers, 4)), 0, 0.0, np.ones(numbers)
 
 
 def density_size(off, spread):
@@ -103,7 +103,7 @@ def test_nothing_known_before_the_first_plot_costs_no_digits():
         np.tile(Q, (n, 1, 1)),
         *rows,
         q,
-        *no_outliers(1),
+        *no_outliers(2),
         1.0,
         score,
         np.empty(score.shape),
@@ -144,21 +144,22 @@ def test_errors_that_last_have_the_density_of_their_correlations():
     assert_rounded(score.sum(), expected, density_size(off, spread), operations=len(off))
 
 
-def test_an_outlier_leaves_the_moments_of_all_explanations():
+@pytest.mark.parametrize("offset", [0.0, 5.0])
+def test_an_outlier_leaves_the_moments_of_all_explanations(offset):
     """Of the second number, after a first that is a mixture: Bayes' rule by hand."""
-    P, variance, shares, span, z = 4.0, 1.0, np.array([0.2, 0.1, 0.0, 3.0]), 500.0, np.array([[7.0], [1.0]])
-    chances, widths = error_laws(shares, span, variance)
+    P, variance, law, span, z = 4.0, 1.0, outlier_law(0.2, 0.1, offset), 500.0, np.array([[7.0], [1.0]])
+    chances, offsets, widths = error_laws(law, span, variance)
     spreads = P + variance * widths**2
-    first = chances * np.exp(-0.5 * z[0] ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
+    first = chances * np.exp(-0.5 * (z[0] - offsets) ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
     w = first / first.sum()
-    means, variances = P / spreads * z[0], P - P**2 / spreads
+    means, variances = P / spreads * (z[0] - offsets), P - P**2 / spreads
     mean = w @ means
     merged = w @ (variances + (means - mean) ** 2)
     spreads = merged + variance * widths**2
-    second = chances * np.exp(-0.5 * (z[1] - mean) ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
+    second = chances * np.exp(-0.5 * (z[1] - mean - offsets) ** 2 / spreads) / np.sqrt(2 * np.pi * spreads)
     one, (score, sound) = np.ones((2, 1, 1)), np.empty((2, 2, 1))
     there, x, P = np.ones((2, 1), dtype=bool), np.zeros(1), np.array([[P]])
-    given = z, np.ones((2, 1)), there, 0.0, shares, np.array([span]), 1.0
+    given = z, np.ones((2, 1)), there, 0.0, np.array([law]), 0, 0.0, np.array([span]), 1.0
     log_likelihood(x, P, one, 0 * one, one, *given, score, sound)
     assert_rounded(score[:, 0], np.log([first.sum(), second.sum()]), operations=60)
     assert_rounded(sound[:, 0], np.array([w[0], second[0] / second.sum()]), operations=60)
@@ -179,9 +180,9 @@ def test_a_hard_manoeuvre_is_a_second_process_noise():
     mean, spread = merged([part[0] / total for part in parts], [part[1:] for part in parts])
     rows, (score, sound) = np.stack([np.zeros(2), z]), np.empty((2, 2, 2))
     there = np.array([[False, False], [True, True]])
-    x, P, shares = np.zeros(2), P.copy(), np.array([0.0, 0.0, share, 3.0])
+    x, P, errors = np.zeros(2), P.copy(), (np.zeros((2, 4)), 0, share, np.ones(2))
     twice = [np.stack([matrix] * 2) for matrix in (F, Q, H)]
-    log_likelihood(x, P, *twice, rows, np.ones((2, 2)), there, q, shares, np.ones(2), 1.0, score, sound)
+    log_likelihood(x, P, *twice, rows, np.ones((2, 2)), there, q, *errors, 1.0, score, sound)
     assert_rounded(score.sum(), np.log(total), density_size(z, S), operations=60)
     assert_rounded(x, mean, scaled_condition(S), operations=60)
     assert_rounded(P, spread, scaled_condition(S) * np.abs(spread).max(), operations=60)
@@ -329,7 +330,7 @@ def interacting(case, options, columns, T, shares=(0.0, 0.0)):
     for k in range(3, len(t)):
         c = T @ p
         smallest = np.linalg.eigvalsh(R[k])[0]
-        chances, widths = error_laws((*shares, 0.0, 3.0), np.ptp(columns["range_m"]), smallest)
+        chances, _, widths = error_laws(outlier_law(*shares), np.ptp(columns["range_m"]), smallest)
         possible = [(chance, width**2 * R[k]) for chance, width in zip(chances, widths, strict=True) if chance > 0]
         scores, parts = np.zeros((M, len(possible))), []
         for i, (F, Q) in enumerate(models_over(options, t[k] - t[k - 1])):
@@ -370,7 +371,7 @@ def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(shares):
         one = likelihood(case, name, columns)
         (options,) = (each for each in case.spec.filters if each.name == name)
         expected = interacting(case, options, columns, T, shares)
-        law = ErrorLaw(sum(shares), shares[0] / (sum(shares) or 1))
+        law = ErrorLaw(outlier_laws=(outlier_law(*shares),))
         assert one(one.stated, law) == pytest.approx(expected, rel=density_rounding(case, columns))
 
 

@@ -30,14 +30,20 @@ from radarsim.recordings.fit.likelihood_slice import (
     rival_of_outliers,
     single_explanations,
 )
-from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, FittedKey, LikelihoodSearch
+from radarsim.recordings.fit.profile_search import (
+    EXPLANATION_EVALUATIONS,
+    MAX_NEAR_SHARE,
+    MAX_NEAR_WIDTH,
+    FittedKey,
+    LikelihoodSearch,
+)
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
 from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
 from radarsim.recordings.rounding_guard import LOSS_GAP_PERIODS, gap_message
 from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
-from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
+from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
 from radarsim.studies.missed_scans import without_empty_rows
 from radarsim.studies.recording_interface import Likelihood
 
@@ -66,7 +72,7 @@ class FitStages:
 
 MAX_PLAUSIBLE_OUTLIERS = 0.3  # of numbers that may be far outliers; with more, the errors follow another law
 SOUND_SIGMAS = 3.0  # by which a sound number may differ
-MAX_OVERLAP = 0.002  # of the numbers that are near outliers and look sound: with more, intervals cover less often
+MAX_OVERLAP = 0.002  # of the numbers that are near outliers and look sound: with more, a fit says so
 OUTLIER_PROBABILITY = 0.5  # from which a number is named as an outlier
 CORRELATION_TIME_KEY = "correlation_time_s"
 ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
@@ -75,40 +81,36 @@ CLEAR_RISE = 5.4138  # gain of the log-likelihood by chance in one recording of 
 
 @dataclass(frozen=True)
 class Fit:
-    """The fit: filter, tracks and plots used, the keys, the share of outliers where allowed for, and the increase of
-    the log-likelihood over the stated values; another explanation that the plots have: then the intervals do not hold;
-    and the fit without outliers and correlation, where these are allowed for."""
+    """The fit: filter, tracks and plots used, the keys, the outliers of each kind of numbers (as in
+    `Likelihood.outlier_kinds`) where allowed for, and the increase of the log-likelihood over the stated values;
+    another explanation that the plots have: then the intervals do not hold; and the fit without outliers and
+    correlation, where these are allowed for."""
 
     filter: str
     tracks: int
     rows: int
     keys: tuple[FittedKey, ...]
-    outliers: float | None
+    outliers: Mapping[str, OutlierLaw]
     gain: float
     further_explanation: "FurtherExplanation | None" = None
     plain: "Fit | None" = None
     outlier_rows: tuple["OutlierRow", ...] = ()  # the numbers that are probably outliers
     doubles: int = 0  # further plots of a track in a scan, left out
-    near_outliers: "NearOutliers | None" = None  # where outliers are allowed for
 
     @property
     def has_overlap(self) -> bool:
-        """Whether near outliers, which the plots plainly have, overlap the sound errors: then those that look sound
-        count as such, and the intervals cover less often than they say."""
-        if self.near_outliers is None or self.plain is None or self.gain - self.plain.gain <= CLEAR_RISE:
+        """Whether near outliers, which the plots plainly have, overlap the sound errors: how many look sound is
+        uncertain then, and so is σ."""
+        if self.plain is None or self.gain - self.plain.gain <= CLEAR_RISE:
             return False
-        return self.near_outliers.share_within_sound() > MAX_OVERLAP
+        return any(share_within_sound(law) > MAX_OVERLAP for law in self.outliers.values())
 
 
-class NearOutliers(NamedTuple):
-    """The share of near outliers among the numbers, and their width in σ."""
-
-    share: float
-    width: float
-
-    def share_within_sound(self) -> float:
-        """The share of the numbers that are near outliers and differ by less than sound ones may."""
-        return self.share * math.erf(SOUND_SIGMAS / (self.width * math.sqrt(2)))
+def share_within_sound(law: OutlierLaw) -> float:
+    """The share of numbers that are near outliers and differ by less than sound ones may."""
+    width = math.sqrt(2 * (1 + law.spread**2))
+    below, above = ((side * SOUND_SIGMAS - law.offset) / width for side in (-1, 1))
+    return law.near * 0.5 * (math.erf(above) - math.erf(below))
 
 
 class FurtherExplanation(NamedTuple):
@@ -140,6 +142,7 @@ class CorrelatedLikelihood:
         self.tracks = likelihood.tracks
         self.rows = likelihood.rows
         self.usual_s = likelihood.usual_s
+        self.outlier_kinds = likelihood.outlier_kinds
         self.keys, self.stated = (*likelihood.keys, CORRELATION_TIME_KEY), np.append(likelihood.stated, 0.0)
         self.zero_limits = np.append(likelihood.zero_limits, ZERO_CORRELATION_TIME * likelihood.usual_s)
         self.explains = tuple(name for name in likelihood.explains if name not in (CORRELATION, MANOEUVRES))
@@ -339,29 +342,35 @@ def fit_keys(
     if search.top <= IMPOSSIBLE_LOG_LIKELIHOOD:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
     law = search.law(search.best)
-    if law.outliers * (1 - law.near) > MAX_PLAUSIBLE_OUTLIERS:
+    shares = [outliers.share for outliers in law.outlier_laws if _follows_another_law(outliers)]
+    if shares:
         raise ConfigError(
-            f"robust: {100 * law.outliers:.0f} % of the plots would have to be outliers: their errors follow another "
+            f"robust: {100 * max(shares):.0f} % of the plots would have to be outliers: their errors follow another "
             "law (few different values?); fit without it"
         )
     keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
-    gain = search.top - likelihood(np.array(likelihood.stated))
+    gain = likelihood(search.to_values(search.best), law) - likelihood(np.array(likelihood.stated))
     return Fit(
         likelihood.filter,
         likelihood.tracks,
         likelihood.rows,
         keys,
-        law.outliers if robust else None,
+        dict(zip(likelihood.outlier_kinds, law.outlier_laws, strict=False)),
         gain,
         _find_further_explanation(search, likelihood),
         outlier_rows=_outlier_rows(search, likelihood),
-        near_outliers=NearOutliers(law.outliers * law.near, law.near_width) if robust else None,
     )
+
+
+def _follows_another_law(outliers: OutlierLaw) -> bool:
+    """Whether outliers are so many and so far that the sound numbers would be too few or too alike."""
+    is_limit = outliers.near >= MAX_NEAR_SHARE and outliers.near_width >= MAX_NEAR_WIDTH
+    return outliers.far > MAX_PLAUSIBLE_OUTLIERS or is_limit
 
 
 def _outlier_rows(search: "LikelihoodSearch", likelihood: Likelihood) -> tuple[OutlierRow, ...]:
     """The numbers that are probably outliers at the maximum, and the gross errors before the start of a track."""
-    values = search.to_values(search.best)[: len(likelihood.keys)]
+    values = search.to_values(search.best)
     return find_outlier_rows(likelihood, values, search.law(search.best))
 
 
@@ -389,10 +398,11 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
     from scipy.stats import chi2
 
     fitted_values = search.to_values(search.best).tolist()
-    fixed = dict(zip(likelihood.keys, fitted_values, strict=False)) | search.outliers(search.best)
-    names = [name for name in single_explanations(likelihood) if name not in fixed]
+    fixed = dict(zip(likelihood.keys, fitted_values, strict=True))
+    names = [name for name in single_explanations(likelihood) if name != OUTLIERS or not search.robust]
     expected = search.evaluations + EXPLANATION_EVALUATIONS * len(names)
-    counted_likelihood = CountedLikelihood(likelihood, search.progress, search.evaluations, expected)
+    law = search.law(search.best)
+    counted_likelihood = CountedLikelihood(likelihood, search.progress, search.evaluations, expected, law)
     maxima = [maximise(counted_likelihood, [name], {}, fixed) for name in names]
     if OUTLIERS in names and likelihood.rows <= ROUGH_ROWS:
         # Outliers have raised σ, which hides a few of them: so the keys that are not zero are fitted again with them.

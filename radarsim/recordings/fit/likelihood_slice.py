@@ -1,13 +1,13 @@
 """Maximise a likelihood along some of its keys and explanations, with rough accuracy."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from radarsim.studies.error_law import BIAS, CORRELATION, EXPLANATIONS, MANOEUVRES, NEAR, NEAR_WIDTH, OUTLIERS, ErrorLaw
+from radarsim.studies.error_law import BIAS, CORRELATION, EXPLANATIONS, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.recording_interface import Likelihood
 
 ROUGH_ACCURACY = 0.01  # relative accuracy, of a key and of the likelihood, to which explanations are compared
@@ -43,11 +43,18 @@ def single_explanations(likelihood: Likelihood) -> list[str]:
 
 
 class CountedLikelihood:
-    """A likelihood that counts its evaluations and reports progress."""
+    """A likelihood that counts its evaluations and reports progress; law: of the errors, besides what is tried."""
 
-    def __init__(self, likelihood: Likelihood, progress: Progress, count: int = 0, expected: int | None = None):
+    def __init__(
+        self,
+        likelihood: Likelihood,
+        progress: Progress,
+        count: int = 0,
+        expected: int | None = None,
+        law: ErrorLaw = STATED_ERRORS,
+    ):
         self.likelihood, self.progress, self.count, self.expected = likelihood, progress, count, expected
-        self.keys, self.stated = likelihood.keys, likelihood.stated
+        self.keys, self.stated, self.law = likelihood.keys, likelihood.stated, law
 
     def __call__(self, values: np.ndarray, law: ErrorLaw) -> float:
         self.count += 1
@@ -59,8 +66,8 @@ def log_likelihood(likelihood: CountedLikelihood, changes: Mapping[str, float]) 
     """The log-likelihood with some keys changed and some explanations applied."""
     configured = zip(likelihood.keys, likelihood.stated, strict=True)
     values = np.array([changes.get(key, value) for key, value in configured])
-    fields = {name: changes[name] for name in (*EXPLANATIONS, NEAR, NEAR_WIDTH) if name in changes}
-    result = likelihood(values, ErrorLaw(**fields))
+    explanations: dict[str, Any] = {name: changes[name] for name in EXPLANATIONS if name in changes}
+    result = likelihood(values, replace(likelihood.law, **explanations))
     return result if np.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
 
 
@@ -131,7 +138,7 @@ def rival_of_outliers(likelihood: CountedLikelihood, values: Mapping[str, float]
         return None
     configured = dict(zip(likelihood.keys, starting_values(likelihood.likelihood).tolist(), strict=True))
     zero_limits = dict(zip(likelihood.keys, np.asarray(likelihood.likelihood.zero_limits).tolist(), strict=True))
-    fixed = {name: value for name, value in values.items() if name not in (OUTLIERS, NEAR, NEAR_WIDTH)}
+    fixed = {name: value for name, value in values.items() if name != OUTLIERS}
     keys = [key for key in likelihood.keys if fixed.get(key, configured[key]) > zero_limits[key]]
     maxima = {}
     for name, shares in ((OUTLIERS, [values[OUTLIERS]]), (MANOEUVRES, RIVAL_STARTS)):

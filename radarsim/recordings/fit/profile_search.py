@@ -18,8 +18,8 @@ from radarsim.recordings.fit.likelihood_slice import (
     starting_values,
 )
 from radarsim.recordings.fit.newton_steps import FIRST_STEP, TOLERANCE, Curvature, polish_maximum
-from radarsim.studies.error_law import NEAR, NEAR_WIDTH, OUTLIERS, ErrorLaw
-from radarsim.studies.recording_interface import Likelihood
+from radarsim.studies.error_law import ErrorLaw, OutlierLaw
+from radarsim.studies.recording_interface import ALL_KINDS, Likelihood
 
 # likelihood evaluations of a key to the maximum and to an end; of an explanation
 MAXIMUM_EVALUATIONS = 130
@@ -34,15 +34,25 @@ SIMPLEX_EVALUATIONS = (50, 100, 200)  # evaluations of a simplex before Newton s
 TRIAL_FALLS = np.array([2.0, 4.0, 6.0])  # below these a key that may be zero is clearly not zero, in that logarithm
 TRIAL_RISES = np.arange(1.0, 16.0)  # above what counts as zero: where a key at zero is tried
 NEAR_ZERO_LOG = 7.0  # above the value that counts as zero, in that logarithm: zero is tried
+NEAR_WIDTH_LOG = 1.0  # the same of offset and spread of near outliers
 SMALL_GAIN_FACTOR = 300.0  # times the accuracy: a Newton step that gains no more ends the search
 MIN_OUTLIER_SHARE = 1e-6  # of near or far outliers; fewer are none
 # Of near and far outliers. More of those near would make the sound plots a minority: all plots as outliers of a third
 # of the σ are as likely as none.
-MAX_OUTLIER_SHARES = np.array([0.2, 0.4])
+MAX_NEAR_SHARE, MAX_FAR_SHARE = 0.2, 0.4
+# Of the exponential prior of the share of near outliers. Without a prior a hundred sound errors are always as well
+# told by a fifth of outliers of 3 σ and half the σ; with 0.05, intervals hold σ too rarely where a tenth are of 3 σ.
+EXPECTED_NEAR_SHARE = 0.1
 FIRST_OUTLIER_SHARE = 0.03  # where the search of either begins
-MIN_NEAR_WIDTH, MAX_NEAR_WIDTH = 2.5, 100.0  # of near outliers, in σ
-NEAR_WIDTH_STARTS = (3.0, 10.0)
-NO_ZERO = -1e3  # below the logarithm of a number that has no zero
+MIN_NEAR_WIDTH, MAX_NEAR_WIDTH = 3.0, 100.0  # of near outliers, in σ
+MIN_NEAR_SIGMAS = 0.5  # of their offset or spread: less is none
+# share, offset and spread from which near outliers are searched
+NEAR_STARTS = ((0.1, 0.0, 3.0), (0.03, 0.0, 10.0), (0.1, 3.0, 0.0), (0.1, 5.0, 0.0), (0.03, 10.0, 0.0))
+NEAR_START_FACTOR = 0.65  # on a key that may have been too large without them
+CLEAR_NEAR_GAIN = 3.9074  # half the 95 % point of chi-square of their three numbers: less gain may be chance
+NEAR_CLIMBS = 2  # searches from the likeliest of these
+OUTSIDE_STEP = 0.05  # beyond an end, in the logarithm of a key: where other near outliers are tried
+LAW_SIZE = 4  # coordinates of an outlier law: the logits of its shares, the logarithms of offset and spread
 NEAR_MAXIMUM_EVALUATIONS = 30  # as MAXIMUM_EVALUATIONS, from near the maximum
 # factor on the value that counts as zero where the likelihood jumps by more there
 ZERO_REFINEMENT = 1e-3
@@ -72,27 +82,26 @@ class _ProfilePoint(NamedTuple):
 
 
 class LikelihoodSearch:
-    """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and the
-    logits of the shares of near and far outliers, and the logarithm of the width of near ones."""
+    """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and for each
+    kind of numbers LAW_SIZE of an outlier law. What is at its lowest is zero."""
 
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, start_point: np.ndarray | None = None):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         self.end_count, self.ends_started_at = 0, 0
         start, self.lowest = np.log(starting_values(likelihood)), np.log(likelihood.zero_limits)
         self.highest = start + math.log(INTERVAL_REACH)
-        if robust:
-            start, self.lowest, self.highest = (
-                np.append(keys, np.log(shares / (1 - shares)))
-                for keys, shares in (
-                    (start, np.full(2, FIRST_OUTLIER_SHARE)),
-                    (self.lowest, np.full(2, MIN_OUTLIER_SHARE)),
-                    (self.highest, MAX_OUTLIER_SHARES),
-                )
-            )
-            start = np.append(start, math.log(NEAR_WIDTH_STARTS[0]))
-            self.lowest, self.highest = np.append(self.lowest, NO_ZERO), np.append(self.highest, np.log(MAX_NEAR_WIDTH))
+        self.zero_reach = np.full(start.size, NEAR_ZERO_LOG)
+        self.law_starts = range(start.size, start.size + LAW_SIZE * len(likelihood.outlier_kinds) * robust, LAW_SIZE)
+        for _ in self.law_starts:
+            none, width = _logit(MIN_OUTLIER_SHARE), math.log(MIN_NEAR_SIGMAS)
+            first = [none - FIRST_STEP, _logit(FIRST_OUTLIER_SHARE), width - FIRST_STEP, math.log(NEAR_STARTS[0][2])]
+            start, self.lowest = np.append(start, first), np.append(self.lowest, [none, none, width, width])
+            most = [_logit(MAX_NEAR_SHARE), _logit(MAX_FAR_SHARE), *[math.log(MAX_NEAR_WIDTH)] * 2]
+            self.highest = np.append(self.highest, most)
+            self.zero_reach = np.append(self.zero_reach, [NEAR_ZERO_LOG] * 2 + [NEAR_WIDTH_LOG] * 2)
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
         self.curvature_model = Curvature(self._log_likelihood)
+        self.rival, self.rival_top = np.zeros(0), -math.inf
         self.best, self.top = self._climb(start if start_point is None else start_point, None, ROUGH_TOLERANCE)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
         for climb_count, factor in enumerate((0.1, 10.0) if start_point is None else (), 1):
@@ -105,19 +114,56 @@ class LikelihoodSearch:
             if value > self.top + 1e-6:
                 self.best, self.top = candidate, value
         if robust and start_point is None:
-            self._try_near_widths()
+            self._try_near_outliers()
         self.top = -math.inf
         self._polish(self.best)
         self.raise_zero_keys()
 
-    def _try_near_widths(self) -> None:
-        """Search from several widths of near outliers: few of one size and many of a smaller one may both be maxima."""
-        for width in NEAR_WIDTH_STARTS:
-            start = self.best.copy()
-            start[-3], start[-1] = math.log(FIRST_OUTLIER_SHARE / (1 - FIRST_OUTLIER_SHARE)), math.log(width)
-            candidate, value = self._climb(start, None, ROUGH_ACCURACY, SIMPLEX_EVALUATIONS[:1])
-            if value > self.top + ROUGH_ACCURACY:
+    def _try_near_outliers(self) -> None:
+        """Take near outliers into the best point if they clearly raise the likelihood; else, as sound errors may have
+        that shape by chance, keep the point as a rival, whose keys the intervals hold too."""
+        for i in self.law_starts:
+            candidate, value = self._climb_to_near_outliers(self.best, i, None)
+            if value > self.top + CLEAR_NEAR_GAIN:
                 self.best, self.top = self._climb(candidate, None, ROUGH_TOLERANCE)
+            elif value > max(self.top, self.rival_top):
+                self.rival, self.rival_top = candidate, value
+
+    def _climb_to_near_outliers(self, point: np.ndarray, i: int, fixed_index: int | None) -> tuple[np.ndarray, float]:
+        """The likeliest point reached from a point with near outliers of several kinds in the law that begins at
+        coordinate i, one coordinate held or none, and its log-likelihood."""
+        starts = []
+        for share, *sizes in NEAR_STARTS:
+            if sizes[0] and self.likelihood.outlier_kinds == ALL_KINDS:
+                continue
+            start = point.copy()
+            start[i] = _logit(share)
+            start[i + 2 : i + 4] = [
+                math.log(size) if size else lowest - FIRST_STEP
+                for size, lowest in zip(sizes, self.lowest[i + 2 : i + 4].tolist(), strict=True)
+            ]
+            value = self._log_likelihood(start)
+            for key in range(len(self.likelihood.keys)):
+                trial = start.copy()
+                trial[key] += math.log(NEAR_START_FACTOR)
+                if key != fixed_index and (trial_value := self._log_likelihood(trial)) > value:
+                    start, value = trial, trial_value
+            starts.append((value, start))
+        starts.sort(key=lambda start: -start[0])
+        free = np.array([j for j in range(point.size) if j != fixed_index])
+        candidates = [
+            self._climb_by_newton(start, value, free, ROUGH_ACCURACY, Curvature(self._log_likelihood))[:2]
+            for value, start in starts[: NEAR_CLIMBS if fixed_index is None else 1]
+        ]
+        return max(candidates, key=lambda candidate: candidate[1])
+
+    def _moving(self, point: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """The free coordinates on which the likelihood depends: what is zero stays so, and offset and spread of no near
+        outliers do not count."""
+        counts = point > self.lowest
+        for i in self.law_starts:
+            counts[i + 2 : i + 4] &= counts[i]
+        return free[counts[free]]
 
     def _polish(self, start: np.ndarray) -> bool:
         """Take the maximum near a point as the best if it is higher, and return whether it is."""
@@ -134,7 +180,8 @@ class LikelihoodSearch:
         self.curvature_model = Curvature(self._log_likelihood)
         self.curvature_model.step(self.best, self.top, np.arange(self.best.size))
         self.curvature = self.curvature_model.H
-        may_be_zero = [i for i in range(self.best.size) if self.lowest[i] > NO_ZERO and self._may_be_zero(i)]
+        far_shares = [i + 1 for i in self.law_starts]
+        may_be_zero = [i for i in (*range(len(self.likelihood.keys)), *far_shares) if self._may_be_zero(i)]
         self.raised_keys = {i: self._raised_log(i) for i in may_be_zero}
         self.ends_started_at = self.evaluations
 
@@ -152,35 +199,35 @@ class LikelihoodSearch:
         return point if value > self.top + TOLERANCE else None
 
     def to_values(self, point: np.ndarray) -> np.ndarray:
-        """The keys, and the shares of near and far outliers and the width of near ones at the end if allowed for."""
-        count = len(self.likelihood.stated)
-        keys = np.exp(np.clip(point[:count], -200, 200))
-        keys = np.where(keys <= self.likelihood.zero_limits, 0.0, keys)
-        if not self.robust:
-            return keys
-        shares = 1 / (1 + np.exp(-point[count:-1]))
-        shares = np.where(shares <= MIN_OUTLIER_SHARE, 0.0, np.minimum(shares, MAX_OUTLIER_SHARES))
-        width = math.exp(min(max(point[-1], math.log(MIN_NEAR_WIDTH)), math.log(MAX_NEAR_WIDTH)))
-        return np.concatenate([keys, shares, [width]])
-
-    def outliers(self, point: np.ndarray) -> dict[str, float]:
-        """The share of outliers, the part of them that is near and the width of these; empty if not allowed for."""
-        if not self.robust:
-            return {}
-        near, far, width = self.to_values(point)[-3:].tolist()
-        part = near / (near + far) if near + far else ErrorLaw.near
-        return {OUTLIERS: near + far, NEAR: part, NEAR_WIDTH: width}
+        """The values of the keys at a point."""
+        keys = np.exp(np.clip(point[: len(self.likelihood.stated)], -200, 200))
+        return np.where(keys <= self.likelihood.zero_limits, 0.0, keys)
 
     def law(self, point: np.ndarray) -> ErrorLaw:
         """The law of errors at a point."""
-        return ErrorLaw(**self.outliers(point))
+        return ErrorLaw(outlier_laws=tuple(self._outlier_law(point[i : i + LAW_SIZE]) for i in self.law_starts))
+
+    def _outlier_law(self, coordinates: np.ndarray) -> OutlierLaw:
+        """The law of outliers of its coordinates (LAW_SIZE,)."""
+        near, far = (1 / (1 + math.exp(-min(max(logit, -50.0), 50.0))) for logit in coordinates[:2].tolist())
+        offset, spread = (math.exp(min(log, math.log(MAX_NEAR_WIDTH))) for log in coordinates[2:].tolist())
+        offset, spread = (0.0 if size <= MIN_NEAR_SIGMAS else size for size in (offset, spread))
+        width, least = math.hypot(offset, spread), math.sqrt(MIN_NEAR_WIDTH**2 - 1)
+        if width < least:  # else they would be sound
+            offset, spread = (offset * least / width, spread * least / width) if width else (0.0, least)
+        return OutlierLaw(
+            0.0 if near <= MIN_OUTLIER_SHARE else min(near, MAX_NEAR_SHARE),
+            0.0 if far <= MIN_OUTLIER_SHARE else min(far, MAX_FAR_SHARE),
+            offset,
+            spread,
+        )
 
     def _log_likelihood(self, point: np.ndarray) -> float:
         values = self.to_values(point)
         self.evaluations += 1
         self.progress(self.evaluations, self._expected_evaluations())
-        count = len(self.likelihood.stated)
-        result = self.likelihood(values[:count], self.law(point))
+        law = self.law(point)
+        result = self.likelihood(values, law) - sum(kind.near for kind in law.outlier_laws) / EXPECTED_NEAR_SHARE
         return result if math.isfinite(result) else IMPOSSIBLE_LOG_LIKELIHOOD
 
     def _expected_evaluations(self) -> int:
@@ -224,7 +271,7 @@ class LikelihoodSearch:
         """As `_climb`, by Newton steps alone: where they end, and whether that is the maximum."""
         for _ in range(MAX_NEWTON_STEPS):
             point, value = self._set_zero(point, value, free)
-            moving = free[point[free] > self.lowest[free]]
+            moving = self._moving(point, free)
             if not moving.size:
                 return point, value, True
             step, predicted_gain = curvature.step(point, value, moving)
@@ -250,8 +297,8 @@ class LikelihoodSearch:
     def _set_zero(self, point: np.ndarray, value: float, free: np.ndarray) -> tuple[np.ndarray, float]:
         """A point and its likelihood, with free coordinates near zero set to zero, where that is no worse: the
         likelihood is flat in their logarithm there, and steps would never end."""
-        for j in free:
-            if self.lowest[j] < point[j] < self.lowest[j] + NEAR_ZERO_LOG:
+        for j in self._moving(point, free):
+            if self.lowest[j] < point[j] < self.lowest[j] + self.zero_reach[j]:
                 trial = point.copy()
                 trial[j] = self.lowest[j] - FIRST_STEP
                 if (trial_value := self._log_likelihood(trial)) >= value:
@@ -328,15 +375,15 @@ class LikelihoodSearch:
             log += 1.0
         return log
 
-    def _value_along(self, i: int, log: float) -> float:
-        """The log-likelihood with one key changed and all others at the maximum."""
-        point = self.best.copy()
+    def _value_along(self, i: int, log: float, point: np.ndarray | None = None) -> float:
+        """The log-likelihood with one key changed and all others at a point, by default the maximum."""
+        point = (self.best if point is None else point).copy()
         point[i] = log
         return self._log_likelihood(point)
 
     def interval(self, i: int) -> FittedKey:
         """The 95 % profile interval of key i."""
-        limit = self.top - HALF_CHI2_95
+        limit = max(self.top, min(self.rival_top, self.top + HALF_CHI2_95 / 2)) - HALF_CHI2_95
         lo, hi = (self._interval_end(i, direction, limit) for direction in (-1, 1))
         value = float(self.to_values(self.best)[i])
         lowest = self.lowest[i]
@@ -347,21 +394,39 @@ class LikelihoodSearch:
     def _interval_end(self, i: int, direction: int, limit: float) -> float | None:
         """The logarithm of key i at which the profile falls to a limit; None if not within INTERVAL_REACH."""
         lowest = float(self.lowest[i])
-        home = max(float(self.best[i]), float(self.lowest[i]))
+        point = self.best
+        if self.rival_top >= limit and direction * (self.rival[i] - point[i]) > 0:
+            point = self.rival
+        home = max(float(point[i]), lowest)
         step = self._end_distance(i)
         # from zero the end may be farther than INTERVAL_REACH: up to there it is not
         if direction > 0 and i in self.raised_keys:
             home, step = max(home, self.raised_keys[i] - 1.0), 0.1
-        inside = _ProfilePoint(home, self._value_along(i, home), self.best)
+        inside = _ProfilePoint(home, self._value_along(i, home, point), point)
         while abs(inside.log_key - home) < math.log(INTERVAL_REACH):
             log_key = inside.log_key + direction * step
             outside = _ProfilePoint(log_key, *self._profile(i, log_key, inside.point))
             if outside.value < limit:
-                self.end_count += 1
-                return self._find_crossing(i, inside, outside, limit)
+                end = self._find_crossing(i, inside, outside, limit)
+                farther = self._with_other_outliers(i, end + direction * OUTSIDE_STEP, outside.point, limit)
+                if farther is None:
+                    self.end_count += 1
+                    return end
+                outside = farther
             if log_key < lowest:
                 return None
             inside, step = outside, 2 * step
+        return None
+
+    def _with_other_outliers(self, i: int, log_key: float, neighbour: np.ndarray, limit: float) -> _ProfilePoint | None:
+        """A point outside the interval so far, with key i held, where near outliers of another kind make the plots
+        likely enough; None if none do."""
+        start = neighbour.copy()
+        start[i] = log_key
+        for j in self.law_starts:
+            point, value = self._climb_to_near_outliers(start, j, i)
+            if value > limit:
+                return _ProfilePoint(log_key, value, point)
         return None
 
     def _find_crossing(self, i: int, inside: "_ProfilePoint", outside: "_ProfilePoint", limit: float) -> float:
@@ -399,3 +464,8 @@ class LikelihoodSearch:
         except (np.linalg.LinAlgError, IndexError):  # IndexError: no curvature, where neighbours are impossible
             return 0.1
         return min(1.2 * math.sqrt(2 * HALF_CHI2_95 * spread), 1.0) if 0 < spread < math.inf else 0.1
+
+
+def _logit(share: float) -> float:
+    """The logit of a share."""
+    return math.log(share / (1 - share))

@@ -6,16 +6,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.kernels.likelihood import start_factor
 from radarsim.studies.ambiguous_doppler import filter_design
 from radarsim.studies.ambiguous_doppler.fold_resolver import FoldResolver
 from radarsim.studies.ambiguous_doppler.followers import list_limits, packed_motion, prior_covariance
 from radarsim.studies.ambiguous_doppler.kernels import recorded_rows
 from radarsim.studies.ambiguous_doppler.tracking import MEASURED, plot_rows
 from radarsim.studies.error_law import BIAS, OUTLIERS, STATED_ERRORS, ErrorLaw
-from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
+from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.recording_interface import usual_interval_s
 
-START_RANGES = 3  # of a track, among which gross errors are left out
 MIN_SIGMA_RATIO, MIN_VARIANCE_RATIO = 1e-4, 1e-6  # to the configured values: smaller ones count as zero
 
 
@@ -43,10 +43,12 @@ class PlotLikelihood:
         if self.observes == 1:
             self.explains = (OUTLIERS,)
         (self.member,) = filter_design.members(options)
-        self.columns = tuple(name for name, _ in MEASURED[: self.observes])
+        self.columns = self.outlier_kinds = tuple(name for name, _ in MEASURED[: self.observes])
         self.span = np.append(data_span(tracks, self.columns), 0.0)[:2]
         self.given_tracks = list(tracks)
-        self.cleaned_tracks = [without_gross_starts(columns, self.columns[:1], START_RANGES) for columns in tracks]
+        self.cleaned_tracks = [
+            without_gross_starts(columns, self.columns[:1], recorded_rows.START_RANGES) for columns in tracks
+        ]
         self.problems = [self._problem(columns) for columns in self.cleaned_tracks]
 
     def _problem(self, columns: Mapping[str, np.ndarray]) -> "_Problem":
@@ -69,7 +71,8 @@ class PlotLikelihood:
     def _track_scores(self, values: np.ndarray, law: ErrorLaw) -> list[np.ndarray]:
         """For each track the log-densities of its ranges and velocities, and their probabilities to be no outliers
         (2, n, 2); empty if a row cannot be taken."""
-        sigma, shares = np.ones(2), law.shares()
+        sigma, outliers = np.ones(2), np.zeros((2, 4))
+        outliers[: self.observes] = law.outlier_rows(self.observes)
         sigma[: self.observes] = values[: self.observes]
         reach = (1 if self.options.hypotheses == 1 else 2) if self.member.doppler == "folded" else 0
         prior, result = np.array(prior_covariance(self.member, self.spec)), []
@@ -78,8 +81,8 @@ class PlotLikelihood:
             rows = self._velocities(problem.rows, law.bias * sigma[1])
             present = np.isfinite(rows[:, :2])
             arguments = np.where(np.isfinite(rows), rows, 0.0), present, prior, sigma**2, float(values[-1])
-            hypotheses, outliers = (reach, *list_limits(self.options)), (shares, self.span, start_factor(shares))
-            if not recorded_rows.log_likelihood(problem.F, problem.Q, *arguments, *hypotheses, *outliers, *scores):
+            hypotheses, errors = (reach, *list_limits(self.options)), (outliers, self.span, start_factor(outliers[0]))
+            if not recorded_rows.log_likelihood(problem.F, problem.Q, *arguments, *hypotheses, *errors, *scores):
                 return []
             result.append(scores)
         return result

@@ -7,9 +7,9 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.kernels.lanes import WIDTH
-from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH
-from radarsim.studies.error_law import OUTLIERS, STATED_ERRORS, ErrorLaw
-from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
+from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH, start_factor
+from radarsim.studies.error_law import OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
+from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Filter, Keys
 from radarsim.studies.multimodel.kernels import filter_strip, layout, likelihood
@@ -17,7 +17,7 @@ from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.study import banks
 from radarsim.studies.multimodel.tracking import lane_rows, sigmas
-from radarsim.studies.recording_interface import usual_interval_s
+from radarsim.studies.recording_interface import ALL_KINDS, usual_interval_s
 
 MIN_VALUE_RATIO = 1e-4  # to a key's configured value: smaller values count as zero
 
@@ -42,6 +42,7 @@ class PlotLikelihood:
         self.keys = (*names, f"filters.{filter_index}.models.{self.hardest}.sigma_acceleration_mps2")
         self.stated = np.array([*self.spec.sensor.sigma, spreads[self.hardest]])
         self.zero_limits = np.append(MIN_VALUE_RATIO * self.stated[:3], MIN_VALUE_RATIO * (self.stated[3] or 1.0))
+        self.outlier_kinds = ALL_KINDS
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
         self.span = float(data_span(tracks, self.columns[:1] if "range_m" in self.columns else self.columns).max())
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, layout.START) for columns in tracks]
@@ -76,11 +77,12 @@ class PlotLikelihood:
         design, numbers = filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
         z, R, is_valid = local_plots(sensor, self.measured)
         plots, result = np.concatenate([z, R, is_valid[:, None]], axis=1), []
-        widths, shares = self._widths(R, law.near_width), law.shares()
+        outliers = law.outlier_rows(1)[0]
+        widths = self._widths(R, OutlierLaw(*outliers.tolist()).near_width)
         for problem in self.problems:
             work, state = work_arrays()
             start = plots[problem.start_rows]
-            start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= start_factor(shares)
+            start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= start_factor(outliers)
             filter_strip.start_strip(work, state, lane_rows(start), problem.weights, self.probabilities)
             later_plots, (score, soundness) = (
                 lane_rows(plots[problem.later_plots]),
@@ -88,7 +90,7 @@ class PlotLikelihood:
             )
             arguments = design, problem.transitions, problem.intervals, problem.times, numbers, self.frame
             later_widths = widths[problem.later_plots]
-            likelihood.log_likelihood(work, state, later_plots, later_widths, *arguments, shares, score, soundness)
+            likelihood.log_likelihood(work, state, later_plots, later_widths, *arguments, outliers, score, soundness)
             result.append((problem, score, soundness))
         return result
 

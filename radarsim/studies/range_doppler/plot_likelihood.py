@@ -8,10 +8,10 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.kernels.kalman_algebra import unpack
-from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
+from radarsim.kernels.likelihood import log_likelihood, start_factor, with_lasting_errors
 from radarsim.physics.motion import transition
 from radarsim.studies.error_law import EXPLANATIONS, STATED_ERRORS, ErrorLaw
-from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
+from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filter_design import noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import recorded_rows
@@ -48,7 +48,7 @@ class PlotLikelihood:
         self.keys, self.stated = tuple(configured), np.array(list(configured.values()), dtype=float)
         self.zero_limits = self.stated * np.array([1e-4] * self.observes + [MIN_MANOEUVRE])
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
-        self.columns = tuple(name for name, _ in MEASURED[: self.observes])
+        self.columns = self.outlier_kinds = tuple(name for name, _ in MEASURED[: self.observes])
         self.span = data_span(tracks, self.columns)
         self.given_tracks = list(tracks)
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, START_RANGES) for columns in tracks]
@@ -77,10 +77,10 @@ class PlotLikelihood:
 
     def _score(self, problem: "_Problem", values: np.ndarray, law: ErrorLaw) -> tuple[np.ndarray, np.ndarray]:
         """The log-densities (n, m) of a track's numbers, and their probabilities to be no outliers."""
-        shares, correlation = law.shares(), law.correlation
+        outliers, correlation = law.outlier_rows(self.observes), law.correlation
         variances, manoeuvre = np.square(values[: self.observes]), float(values[self.observes])
         x, P = np.zeros(3), np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
-        P[0, 0] *= start_factor(shares)
+        P[0, 0] *= start_factor(outliers[0])
         x[0] = problem.start
         score, soundness, spread = (*np.empty((2, *problem.z.shape)), np.tile(variances, (len(problem.z), 1)))
         offset = np.zeros(self.observes)
@@ -93,7 +93,8 @@ class PlotLikelihood:
             noise, shares_left = manoeuvre * problem.Q, correlation**problem.intervals
             model = with_lasting_errors(x, P, error_covariance, problem.F, noise, problem.H, spread, shares_left)
             scale, white = 1.0, 0.0
-        log_likelihood(*model, z, spread, problem.present, scale, shares, self.span, white, score, soundness)
+        errors = outliers, problem.first_scored_row, law.manoeuvres, self.span, white
+        log_likelihood(*model, z, spread, problem.present, scale, *errors, score, soundness)
         return score, soundness
 
     def _scores(self, values: np.ndarray, law: ErrorLaw) -> np.ndarray:

@@ -8,11 +8,11 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.kernels.gap_noise import manoeuvre_noise
 from radarsim.kernels.kalman_algebra import unpack
-from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
+from radarsim.kernels.likelihood import log_likelihood, start_factor, with_lasting_errors
 from radarsim.physics.motion import transition
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
-from radarsim.studies.gross_errors import data_span, soundness_by_column, start_factor, without_gross_starts
-from radarsim.studies.recording_interface import usual_interval_s
+from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
+from radarsim.studies.recording_interface import ALL_KINDS, usual_interval_s
 from radarsim.studies.sonar import conversion
 from radarsim.studies.sonar.scene import lateral_scale, third_coordinate
 from radarsim.studies.sonar.tracking import BEARING, RANGE, THIRD_COLUMN_AND_KEY, unwrap_bearings
@@ -53,6 +53,7 @@ class PlotLikelihood:
         if member.kind == "kalman":
             self.explains = (*self.explains, MANOEUVRES)
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
+        self.outlier_kinds = self.columns if self.spec.frame == "polar" else ALL_KINDS
         self.span = data_span(tracks, self.columns)
         if self.spec.frame != "polar":
             self.span[:2] = 2 * max(float(np.nanmax(np.abs(track["range_m"]), initial=0.0)) for track in tracks)
@@ -113,7 +114,7 @@ class PlotLikelihood:
     ) -> tuple[np.ndarray, np.ndarray]:
         """The log-densities (n, C) of a track's numbers, and their probabilities to be no outliers."""
         sigma, C, size = values[: self.coordinates], self.coordinates, self.size
-        shares, correlation = law.shares(), law.correlation
+        outliers, correlation = law.outlier_rows(C), law.correlation
         manoeuvre = float(values[C]) if len(values) > C else 0.0
         positions, directions, variance = self._numbers(problem, sigma)
         H = np.zeros((*directions.shape[:2], C * size))
@@ -124,7 +125,8 @@ class PlotLikelihood:
         if problem.second_whole:
             x[1::size] = (positions[problem.second_whole] - positions[0]) / problem.t[problem.second_whole]
         start = directions[0].T @ np.diag(variance[0]) @ directions[0]
-        P[::size, ::size] = start * start_factor(shares)
+        factors = np.sqrt([start_factor(row) for row in outliers])
+        P[::size, ::size] = start * np.outer(factors, factors)
         for i, rate in enumerate(problem.rates, start=1):
             P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
         model, scale, white = (x, P, problem.F, problem.Q, H), manoeuvre, 1.0
@@ -136,7 +138,8 @@ class PlotLikelihood:
             model = with_lasting_errors(x, P, error_loading, problem.F, manoeuvre * problem.Q, H, variance, lasting)
             scale, white = 1.0, 0.0
         score, soundness = np.empty((2, *z.shape))
-        log_likelihood(*model, z, variance, problem.is_used, scale, shares, self.span, white, score, soundness)
+        errors = outliers, problem.first_scored_row, law.manoeuvres, self.span, white
+        log_likelihood(*model, z, variance, problem.is_used, scale, *errors, score, soundness)
         return score, soundness
 
     def _score(self, values: np.ndarray, law: ErrorLaw) -> float:

@@ -9,7 +9,7 @@ from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.range_doppler.plot_likelihood import WIDE_ACCELERATION_MPS2, WIDE_VELOCITY_MPS, PlotLikelihood
 from radarsim.studies.range_doppler.tracking import START_RANGES
-from tests.recordings.error_laws import error_laws
+from tests.recordings.error_laws import error_laws, outlier_law
 from tests.tolerances import rounding
 
 T_S = np.array([0.0, 4.0, 9.0, 12.0, 20.0, 26.0, 30.0, 33.0])
@@ -105,15 +105,16 @@ def test_range_alone_ignores_the_velocities():
     assert likelihood(likelihood.stated) == without(likelihood.stated)
 
 
-def twin(columns, values, shares, bias):
-    """Textbook: both explanations of each number updated by themselves, then merged by their moments."""
+def twin(columns, values, laws, bias):
+    """Textbook: all explanations of each number updated by themselves, then merged by their moments; the first numbers,
+    which find the state, with the mean square of their errors."""
     sigma, total, x, P = values[:2], 0.0, None, None
     z = np.stack([columns["range_m"], columns["velocity_mps"] - bias * values[1]], axis=1)
-    wider = 1 + 8 * shares[0] + 99 * shares[1]  # the mean square of the first error, which starts the track
+    wider = [1 + law.near * (law.offset**2 + law.spread**2) + 99 * law.far for law in laws]
     spans = [np.ptp(column[np.isfinite(column)]) for column in (columns["range_m"], columns["velocity_mps"])]
     for k in range(len(T_S)):
         if k == 0:
-            x, P = np.array([z[0, 0], 0.0, 0.0]), PRIOR + np.diag([wider * sigma[0] ** 2, 0, 0])
+            x, P = np.array([z[0, 0], 0.0, 0.0]), PRIOR + np.diag([wider[0] * sigma[0] ** 2, 0, 0])
         else:
             F, Q = transition(T_S[k] - T_S[k - 1]), manoeuvre_covariance(values[2], T_S[k] - T_S[k - 1])
             x, P = F @ x, F @ P @ F.T + Q
@@ -121,11 +122,14 @@ def twin(columns, values, shares, bias):
             if (k == 0 and m == 0) or np.isnan(z[k, m]):
                 continue
             h, made = np.eye(3)[m], []
-            for weight, width in zip(*error_laws((*shares, 0, 3.0), spans[m], sigma[m] ** 2), strict=True):
+            errors = ([1.0], [0.0], [wider[m] ** 0.5])
+            if k >= START_RANGES:
+                errors = error_laws(laws[m], spans[m], sigma[m] ** 2)
+            for weight, mean, width in zip(*errors, strict=True):
                 S = h @ P @ h + (width * sigma[m]) ** 2
-                K = P @ h / S
-                density = weight * norm(x @ h, S**0.5).pdf(z[k, m])
-                made.append((density, x + K * (z[k, m] - x @ h), P - np.outer(K, K) * S))
+                K, foretold = P @ h / S, x @ h + mean * sigma[m]
+                density = weight * norm(foretold, S**0.5).pdf(z[k, m])
+                made.append((density, x + K * (z[k, m] - foretold), P - np.outer(K, K) * S))
             density = sum(one[0] for one in made)
             w = [one[0] / density for one in made]
             x = sum(a * one[1] for a, one in zip(w, made, strict=True))
@@ -135,13 +139,20 @@ def twin(columns, values, shares, bias):
 
 
 @pytest.mark.parametrize(
-    ("shares", "bias"), [((0.0, 0.0), 0.0), ((0.0, 0.05), 0.0), ((0.1, 0.2), 1.5), ((0.0, 0.0), -2.0)]
+    ("laws", "bias"),
+    [
+        ((outlier_law(0.0, 0.0),) * 2, 0.0),
+        ((outlier_law(0.0, 0.05),) * 2, 0.0),
+        ((outlier_law(0.1, 0.2),) * 2, 1.5),
+        ((outlier_law(0.0, 0.0),) * 2, -2.0),
+        ((outlier_law(0.1, 0.02, 5.0, 0.0), outlier_law(0.0, 0.1)), 0.0),
+    ],
 )
-def test_outliers_and_bias_against_a_textbook_twin(shares, bias):
+def test_outliers_and_bias_against_a_textbook_twin(laws, bias):
     columns, values = drawn(3, share=0.2), np.array([250.0, 15.0, 1e-3])
-    law = ErrorLaw(sum(shares), shares[0] / (sum(shares) or 1), bias=bias)
+    law = ErrorLaw(bias=bias, outlier_laws=laws)
     found = PlotLikelihood(case(), None, [columns])(values, law)
-    assert found == pytest.approx(twin(columns, values, shares, bias), abs=precision(found, values))
+    assert found == pytest.approx(twin(columns, values, laws, bias), abs=precision(found, values))
 
 
 def test_tracks_add_up():

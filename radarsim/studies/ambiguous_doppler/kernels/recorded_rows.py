@@ -16,9 +16,11 @@ from radarsim.kernels.kalman_algebra import (
     take_rate,
     take_value,
 )
-from radarsim.kernels.likelihood import FAR, LAW_COUNT, NEAR, WIDTH, fill_laws
+from radarsim.kernels.likelihood import FAR, LAW_COUNT, LOG_DENSITY, MEAN, NEAR, OFFSET, SPREAD, VARIANCE, fill_laws
 
 FARTHEST = 9.0  # standard deviations of the velocity's innovation within which folds are tried
+START_RANGES = 3  # of a track, among which gross errors are left out
+NEGLIGIBLE = 80.0  # below the logarithm of the greatest weight
 MAX_SEQUENCES = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
 
 
@@ -56,32 +58,46 @@ def take_range(x, w, P, R, z):
 
 
 @kernel
-def take_range_of_laws(x, w, P, R, z, shares, span, laws):
+def take_range_of_laws(x, w, P, R, z, outliers, span, laws):
     """As `take_range`, of a range that may be an outlier, whose laws are those of `radarsim.kernels.likelihood`; merged
-    by moments. Returns the logarithm of its density and the probability that it is no outlier. laws: a work array
-    (2, LAW_COUNT)."""
+    by moments. Returns the logarithm of its density and the probability that it is no outlier. outliers (4,): the law
+    of these; laws: a work array (3, LAW_COUNT)."""
     p, S = (P[0], P[1], P[2]), P[0] + R
-    prior_log_weight, chances, square = log_sum_exp(w), np.zeros(LAW_COUNT), 0.0
-    e, posterior = np.empty(w.size), np.empty((LAW_COUNT, w.size))
+    prior_log_weight, chances, greatest = log_sum_exp(w), np.zeros(LAW_COUNT), -np.inf
+    fill_laws(laws, 0.0, S, R, outliers, span)
+    laws[LOG_DENSITY] += 0.5 * laws[MEAN] * laws[MEAN] / laws[VARIANCE]
+    posterior = np.empty((w.size, LAW_COUNT))
     for i in range(w.size):
-        e[i] = z - x[0, i]
-        fill_laws(laws, e[i], S, R, shares, span)
-        posterior[:, i] = w[i] + laws[0]
-    density = log_sum_exp(posterior)
-    posterior = np.exp(posterior - density)
-    for law in range(LAW_COUNT):
-        chances[law] = posterior[law].sum()
-    gain, square_gain = (chances / laws[1]).sum(), (chances / (laws[1] * laws[1])).sum()
+        e = z - x[0, i]
+        for law in range(LAW_COUNT):
+            d = e - laws[MEAN, law]
+            posterior[i, law] = w[i] + laws[LOG_DENSITY, law] - 0.5 * d * d / laws[VARIANCE, law]
+            greatest = max(greatest, posterior[i, law])
     for i in range(w.size):
-        weight = posterior[:, i].sum()
-        square += weight * e[i] * e[i]
+        w[i] = 0.0
+        for law in range(LAW_COUNT):
+            if posterior[i, law] > greatest - NEGLIGIBLE:
+                chance = np.exp(posterior[i, law] - greatest)
+                chances[law] += chance
+                w[i] += chance
+    total = chances.sum()
+    chances /= total
+    gain = (chances / laws[VARIANCE]).sum()
+    drift = (chances * laws[MEAN] / laws[VARIANCE]).sum()
+    square = 0.0
+    for i in range(w.size):
+        e, weight = z - x[0, i], w[i] / total
+        pull = gain * e - drift
+        for law in range(LAW_COUNT):
+            step = (e - laws[MEAN, law]) / laws[VARIANCE, law]
+            square += weight * chances[law] * (step * step - pull * pull)
         w[i] = np.log(weight) if weight > 0.0 else -1e300
-        x[0, i], x[1, i], x[2, i] = add_scaled((x[0, i], x[1, i], x[2, i]), gain * e[i], p)
-    shrink = gain - square * max(square_gain - gain * gain, 0.0)
+        x[0, i], x[1, i], x[2, i] = add_scaled((x[0, i], x[1, i], x[2, i]), pull, p)
+    shrink = gain - max(square, 0.0)
     updated_P = add_outer((P[0], P[1], P[2], P[3], P[4], P[5]), -shrink, p)
     for i in range(6):
         P[i] = updated_P[i]
-    return density - prior_log_weight, chances[0]
+    return greatest + np.log(total) - prior_log_weight, chances[0]
 
 
 @kernel
@@ -114,14 +130,14 @@ def likeliest(w, max_count, min_ratio):
 
 
 @kernel
-def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, shares, span):
+def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outliers, span):
     """Update with a velocity v of variance R; returns states and weights, the likeliest first, the logarithm of the
     density of v over all hypotheses and folds, and the probability that v is no outlier. P is updated in place.
 
     max_fold: folds to either side of the nearest that are tried; -1: none, v is not folded. merge: hypotheses are
-    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. shares: of
-    near outliers, and of far ones, which are uniform over the span D of folded velocities, or `span` of the data;
-    merged by moments."""
+    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. outliers
+    (4,): near ones are normal, the offset a part of their width; far ones uniform over the span D of folded velocities,
+    or `span` of the data; merged by moments."""
     updated_P, gain, S = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), R, 1.0)
     n, folds = w.size, 2 * max(max_fold, 0) + 1
     e, weight = np.empty((n, folds)), np.empty((n, folds))
@@ -133,17 +149,17 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, share
             e[i, j] = innovation + D * (j - folds // 2)
             weight[i, j] = w[i] - e[i, j] * e[i, j] / (2.0 * S)
     log_norm, factor, soundness, spread = 0.5 * np.log(2.0 * np.pi * S), 1.0, 1.0, 0.0
-    if shares[NEAR] + shares[FAR] > 0.0:
-        T = S + (shares[WIDTH] * shares[WIDTH] - 1.0) * R
+    if outliers[NEAR] + outliers[FAR] > 0.0:
+        T = S + (outliers[OFFSET] * outliers[OFFSET] + outliers[SPREAD] * outliers[SPREAD]) * R
         width = D if max_fold >= 0 else max(span, math.sqrt(T))
-        far, near, factor, sound, square = shares[FAR] * math.exp(log_norm) / (width * folds), 0.0, 0.0, 0.0, 0.0
-        best, total = w.max(), 0.0
+        far, near, factor, sound, square = outliers[FAR] * math.exp(log_norm) / (width * folds), 0.0, 0.0, 0.0, 0.0
+        best, total, near_share = w.max(), 0.0, outliers[NEAR] * math.sqrt(S / T)
         for i in range(n):
+            prior = math.exp(w[i] - best)
             for j in range(folds):
                 e2 = e[i, j] * e[i, j]
-                regular = (1.0 - shares[NEAR] - shares[FAR]) * math.exp(-0.5 * e2 / S)
-                near = shares[NEAR] * math.sqrt(S / T) * math.exp(-0.5 * e2 / T)
-                prior = math.exp(w[i] - best)
+                regular = (1.0 - outliers[NEAR] - outliers[FAR]) * math.exp(-0.5 * e2 / S)
+                near = near_share * math.exp(-0.5 * e2 / T) if near_share > 0.0 else 0.0
                 total += prior * (regular + near + far)
                 sound += prior * regular
                 factor += prior * (regular + near * S / T)
@@ -188,7 +204,7 @@ def log_likelihood(
     merge,
     max_count,
     min_ratio,
-    shares,
+    outliers,
     span,
     start_factor,
     score,
@@ -199,24 +215,27 @@ def log_likelihood(
     F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span; present (n, 2):
     which of the first two count (a kernel has no not-a-number); prior (6,): covariance before the first plot;
     variances (2,) of range and velocity; reach: 0: velocities are not folded, 1: the nearest fold, 2: all folds that
-    matter; merge, max_count, min_ratio as in `take_velocity`; shares: of near and far outliers; span (2,): of the data;
-    start_factor: on the variance of the first range. Filled: score (n, 2), zero where nothing is measured, and
-    soundness (n, 2), the probabilities that the numbers are no outliers."""
-    x, w, P, started, laws = np.zeros((3, 1)), np.zeros(1), prior.copy(), False, np.empty((2, LAW_COUNT))
+    matter; merge, max_count, min_ratio as in `take_velocity`; outliers (2, 4): their laws; span (2,): of the data;
+    start_factor: on the variance of the first START_RANGES ranges, which are no outliers: they find the state. Filled:
+    score (n, 2), zero where nothing is measured, and soundness (n, 2), the probabilities that the numbers are no
+    outliers."""
+    x, w, P, ranges, laws = np.zeros((3, 1)), np.zeros(1), prior.copy(), 0, np.empty((3, LAW_COUNT))
     for k in range(len(rows)):
         z, v, D = rows[k, 0], rows[k, 1], rows[k, 2]
         if k > 0:
             extrapolate(x, P, F[k], Q[k], manoeuvre_variance)
         score[k], soundness[k] = 0.0, 1.0
         if present[k, 0]:
-            if started and shares[NEAR] + shares[FAR] > 0.0:
-                score[k, 0], soundness[k, 0] = take_range_of_laws(x, w, P, variances[0], z, shares, span[0], laws)
-            elif started:
-                score[k, 0] = take_range(x, w, P, variances[0], z)
+            if ranges >= START_RANGES and outliers[0, NEAR] + outliers[0, FAR] > 0.0:
+                score[k, 0], soundness[k, 0] = take_range_of_laws(x, w, P, variances[0], z, outliers[0], span[0], laws)
+            elif ranges > 0:
+                factor = start_factor if ranges < START_RANGES else 1.0
+                score[k, 0] = take_range(x, w, P, factor * variances[0], z)
             else:
                 x[0, :] = z
-                P[0], P[1], P[2], started = start_factor * variances[0], 0.0, 0.0, True
-        if started and present[k, 1]:
+                P[0], P[1], P[2] = start_factor * variances[0], 0.0, 0.0
+            ranges += 1
+        if ranges > 0 and present[k, 1]:
             S, max_fold = P[3] + variances[1], reach - 1
             if not S > 0.0:
                 return False
@@ -229,6 +248,6 @@ def log_likelihood(
                 max_fold = nearby_folds(S, D)
             hypotheses = max_fold, merge, max_count, min_ratio
             x, w, score[k, 1], soundness[k, 1] = take_velocity(
-                x, w, P, variances[1], v, D, *hypotheses, shares, span[1]
+                x, w, P, variances[1], v, D, *hypotheses, outliers[1], span[1]
             )
     return True

@@ -16,14 +16,14 @@ from radarsim.studies.multimodel.kernels.filter_strip import Scans, make_rules, 
 
 @kernel
 def log_likelihood(
-    work, numbers, plots, widths, models, transitions, intervals, times, rules, frame, shares, score, soundness
+    work, numbers, plots, widths, models, transitions, intervals, times, rules, frame, outliers, score, soundness
 ):
     """Fill score (n,) with the logarithm of each plot's density given the earlier plots, and soundness (n,) with its
     probability to be no outlier; zero and one where there is no plot.
 
     work, numbers: a filter's memory, started; plots (n · PLOT rows), the same in all lanes, of which lane l gets
     widths[k, l] times the variance (n, WIDTH); models, transitions, intervals (n,), times, rules, frame as in
-    `filter_strip`; shares: of near and far outliers."""
+    `filter_strip`; outliers (4,): their law, of which the shares count here."""
     n, filter_rules = score.size, make_rules(rules, models.size // layout.MODEL_NUMBERS)
     out, reported = np.empty(n * layout.OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
     for k in range(n):
@@ -33,8 +33,9 @@ def log_likelihood(
     listed = np.zeros(layout.MAX_MODELS, dtype=np.int64)
     memory = address(work), address(numbers), address(listed)
     design = filter_rules, address(models), address(transitions)
-    may_be_outlier, chances, densities = shares[NEAR] + shares[FAR] > 0.0, np.empty(WIDTH), np.empty(WIDTH)
-    chances[0], chances[1], chances[2:] = 1.0 - shares[NEAR] - shares[FAR], shares[NEAR], shares[FAR] / FAR_COUNT
+    near, far, chances, densities = outliers[NEAR], outliers[FAR], np.empty(WIDTH), np.empty(WIDTH)
+    may_be_outlier = near + far > 0.0
+    chances[0], chances[1], chances[2:] = 1.0 - near - far, near, far / FAR_COUNT
     for k in range(n):
         scans = Scans(k, k + 1, address(intervals), address(times), address(reported))
         run_strip(*memory, *design, scans, address(plots), address(frame), address(out))
