@@ -102,7 +102,7 @@ ODD_OF_STUDIES = {  # of the first config of each part; keys of odd values, and 
     "multimodel_families_1hz": {"sweep": {"sensor.detection_probability": [0.5, 1]}},
     "sonar_smoothing": {"scans": 4, "sensor.detection_probability": 0.3},
     "sonar_missed": {"sweep": {"sensor.detection_probability": [0.3, 1]}},
-    "sonar_manoeuvre": {"scans": 40},
+    "sonar_manoeuvre": {"scans": 60},
     "sonar_clutter": {"sensor.detection_probability": 0.3},
     "ambiguous_rls2": {"scans": 2, "radar.detection_probability": 0.3},
     "orders": {"scans": 4},
