@@ -241,9 +241,10 @@ class Keys(radial_keys.TimedStudyKeys):
         Beyond these limits the steady covariance drowns in rounding (SciPy's solver gives up at 1e15).
         """
         radar = self.radar
-        if not 1e-12 <= (radar.sigma_range_m / (radar.scan_period_s * radar.sigma_velocity_mps)) ** 2 <= 1e12:
+        value = (radar.sigma_range_m / (radar.scan_period_s * radar.sigma_velocity_mps)) ** 2
+        if not 1e-12 <= value <= 1e12:
             ratio = "(sigma_range_m / scan_period_s / sigma_velocity_mps)²"
-            yield check_error("radar.sigma_velocity_mps", f"out of proportion: {ratio} must be from 1e-12 to 1e12")
+            yield proportion_error("radar.sigma_velocity_mps", ratio, value, "from 1e-12 to 1e12")
 
     @cross_check
     def _variances_in_proportion(self) -> Iterator[CheckError]:
@@ -257,17 +258,26 @@ class Keys(radial_keys.TimedStudyKeys):
             return
         radar, dt = self.radar, self.radar.scan_period_s
         name = f"filters.{i}.manoeuvre_variance"
-        if not 1e-28 <= variance * dt**6 / radar.sigma_range_m**2 <= 1e12:
+        in_range, in_velocity = (
+            variance * dt**6 / radar.sigma_range_m**2,
+            variance * dt**4 / radar.sigma_velocity_mps**2,
+        )
+        if not 1e-28 <= in_range <= 1e12:
             ratio = "manoeuvre_variance scan_period_s⁶ / sigma_range_m²"
-            yield check_error(name, f"out of proportion: {ratio} must be from 1e-28 to 1e12")
-        elif "velocity" in filter_keys.observes and variance * dt**4 / radar.sigma_velocity_mps**2 > 1e12:
+            yield proportion_error(name, ratio, in_range, "from 1e-28 to 1e12")
+        elif "velocity" in filter_keys.observes and in_velocity > 1e12:
             ratio = "manoeuvre_variance scan_period_s⁴ / sigma_velocity_mps²"
-            yield check_error(name, f"out of proportion: {ratio} must be <= 1e12")
+            yield proportion_error(name, ratio, in_velocity, "<= 1e12")
 
     @cross_check
     def _within_reach(self) -> Iterator[CheckError]:
         last = (self.plots - 1) * self.radar.scan_period_s
         yield from radial_keys.range_errors(self.target, self.radar, last)
+
+
+def proportion_error(key: str, ratio: str, value: float, limits: str) -> CheckError:
+    """The error of a key that makes a ratio of values too small or too large."""
+    return check_error(key, f"out of proportion: {ratio}, here {value:.3g}, must be {limits}")
 
 
 def can_fold(spec: Keys) -> bool:
