@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Kind = Literal["size", "share", "signed"]
 COMMON_OPTIONS = "at", "at-k", "between", "case", "equals", "filter", "help", "json", "language", "no-code"
 RESERVED_OPTIONS = frozenset(
-    f"--{name}" for name in (*COMMON_OPTIONS, "realisations", "seed", "set", "threads")
+    f"--{name}" for name in (*COMMON_OPTIONS, "for", "realisations", "seed", "set", "threads")
 )  # options of `solve`
 
 

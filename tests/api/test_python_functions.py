@@ -181,7 +181,10 @@ def endless():
 @pytest.mark.parametrize(
     ("ask", "words"),
     [
-        (lambda: radarsim.solve(*KEY, equals=3), "name one quantity, as `radarsim solve --help` lists them: sigma=…"),
+        (
+            lambda: radarsim.solve(*KEY, equals=3),
+            "name one quantity, as `radarsim solve --help` lists them: wanted=…, sigma=…",
+        ),
         (lambda: radarsim.solve(*KEY, equals=3, gain="r", sigma="r"), "got gain, sigma"),
         (lambda: radarsim.solve(*KEY, equals=3, gain="r", at_s=1, at_k=2), "at_s and at_k do not go together"),
         (lambda: radarsim.solve(*KEY, equals=3, sigma="r"), "filter: name one of r, r+Vr"),
