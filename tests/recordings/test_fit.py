@@ -317,12 +317,18 @@ def test_outliers_do_not_break_the_robust_fit():
     assert all(0.05 < law.share < 0.2 for law in robust.outliers.values())
 
 
-@pytest.mark.parametrize("where", [0, 1, 30, 59])
-@pytest.mark.parametrize("size_sigma", [10, 1e3, 1e5])
-def test_one_plot_that_is_wrong_by_any_size_leaves_the_robust_fit_as_it_was(size_sigma, where):
-    """Of 240 in four tracks: σ of range changes by less than a quarter of its interval, and the row is named."""
+@pytest.fixture(scope="module")
+def robust_sigma():
+    """The fitted σ of range of four sound tracks."""
     tracks = [recording(np.random.default_rng(seed)) for seed in range(4)]
-    sound = fit.fit_keys(likelihood(*tracks), (OUTLIERS,)).keys[0]
+    return fit.fit_keys(likelihood(*tracks), (OUTLIERS,)).keys[0]
+
+
+@pytest.mark.parametrize("where", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 30)), 59])
+@pytest.mark.parametrize("size_sigma", [10, pytest.param(1e3, marks=pytest.mark.slow), 1e5])
+def test_one_plot_that_is_wrong_by_any_size_leaves_the_robust_fit_as_it_was(robust_sigma, size_sigma, where):
+    """Of 240 in four tracks: σ of range changes by less than a quarter of its interval, and the row is named."""
+    tracks, sound = [recording(np.random.default_rng(seed)) for seed in range(4)], robust_sigma
     tracks[2]["range_m"][where] += size_sigma * STATED["radar.sigma_range_m"]
     found = fit.fit_keys(likelihood(*tracks), (OUTLIERS,))
     assert abs(np.log(found.keys[0].value / sound.value)) < np.log(sound.hi / sound.lo) / 4
