@@ -227,7 +227,7 @@ def case_figures(
 
         curves = common.group_by(figure_tables["curves"], "case", "filter", "component")
         figures_by_name |= sweep_figures.sweep_figures(drawn_results, curves)
-    if any(has_note(tables_by_name[name]).any() for name in ("curves", "gains")):
+    if any(has_note(table).any() for table in tables_by_name.values()):
         figures_by_name = {name: panel_layout.with_remark_on_bands(figure) for name, figure in figures_by_name.items()}
     translate = partial(translate_names, names=config_names(results))
     return {

@@ -18,7 +18,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report.exact_check import ROUNDING
 from radarsim.report.quantities import COMMON, Quantity
-from radarsim.report.row_notes import RowNote, has_note, notes_where
+from radarsim.report.row_notes import RowNote, concerns, has_note, notes_where
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,14 +98,17 @@ def _with_notes(
     return table.assign(note=notes) if any(notes) else table
 
 
-def without_noted_intervals(tables_by_name: Mapping[str, "pd.DataFrame"]) -> Mapping[str, "pd.DataFrame"]:
-    """The tables for figures: without the interval of σ or gain where a note marks it."""
-    figure_tables = {}
-    for name, ends in (("curves", ("sigma_lo", "sigma_hi")), ("gains", ("gain_lo", "gain_hi"))):
-        table = tables_by_name[name]
-        if (is_marked := has_note(table)).any():
-            figure_tables[name] = table.assign(**{end: table[end].mask(is_marked) for end in ends})
-    return {**tables_by_name, **figure_tables}
+def without_noted_intervals(tables_by_name: Mapping[str, "pd.DataFrame"]) -> "dict[str, pd.DataFrame]":
+    """The tables for figures: no ends of the intervals that a note marks as resting on too little."""
+    return {name: _without_noted_intervals(table) for name, table in tables_by_name.items()}
+
+
+def _without_noted_intervals(table: "pd.DataFrame") -> "pd.DataFrame":
+    if not has_note(table).any():
+        return table
+    notes = ["" if str(note) == str(BELIEVED_VARIES) else note for note in table["note"]]
+    ends = [column for column in table if str(column).endswith(("_lo", "_hi"))]
+    return table.assign(**{end: table[end].mask([concerns(note, end) for note in notes]) for end in ends})
 
 
 def is_exact(table: "pd.DataFrame") -> np.ndarray:

@@ -10,10 +10,11 @@ import pytest
 
 import radarsim
 from radarsim.api import result as api_result
+from radarsim.api import result_content
 from radarsim.config.find_files import SHIPPED
 from radarsim.report import answer_warnings, interval_notes, statistics
 from radarsim.report.quantities import Quantity
-from radarsim.report.row_notes import has_note
+from radarsim.report.row_notes import concerns, has_note
 from radarsim.report.sentences import MeasuredInterval, Sentence, as_sentence
 from radarsim.report.statistics import MIN_TRUSTED_REALISATIONS
 from radarsim.studies import registry
@@ -44,6 +45,34 @@ def test_gaussian_errors_of_few_realisations_have_no_tails(n):
 def test_a_sound_run_of_few_realisations_has_no_marks(count):
     made = radarsim.run("sonar_smoothing", realisations=count, overrides=["scans=5"]).tables
     assert not [name for name, table in made.items() if "note" in table]
+
+
+def test_figures_get_no_interval_that_a_note_marks():
+    """Of any table, only the intervals that the note is about; what an interval is of marks none."""
+    heavy, varies = interval_notes.HEAVY_TAILS, interval_notes.BELIEVED_VARIES
+    notes = np.array(["", heavy, heavy.about("gain"), varies, "of a user study"], dtype=object)
+    columns = ["sigma", "sigma_lo", "sigma_hi", "gain_lo", "gain_hi"]
+    table = pd.DataFrame(np.ones((5, 5)), columns=columns).assign(note=notes)
+    left = interval_notes.without_noted_intervals({"any": table})["any"]
+    assert left["sigma"].tolist() == [1] * 5
+    assert left[["sigma_lo", "sigma_hi"]].notna().all(axis=1).tolist() == [True, False, True, True, False]
+    assert left[["gain_lo", "gain_hi"]].notna().all(axis=1).tolist() == [True, False, False, True, False]
+    assert table[columns].notna().all(axis=None)
+
+
+def test_no_figure_of_bursts_has_a_band_where_their_table_has_a_note():
+    """Measured velocities at 200 realisations: the rarest losses decide σ, and the least certain point has no band."""
+    ran = radarsim.run("pulses_rls2", realisations=200, figures=False)
+    figure = result_content.case_figures(ran.cases, ran.tables, ran.experiment)["measured"]
+    rows = ran.tables["estimates"].query("component == 'Vr'")
+    lines = [mark for panel in figure.panels for mark in panel.marks if mark.lo is not None]
+    are_marked = [
+        [concerns(note, "sigma_all") for note in filter_rows["note"]]
+        for _, filter_rows in rows.groupby("filter", sort=False)
+    ]
+    assert any(map(any, are_marked))
+    assert [np.isnan(line.lo).tolist() for line in lines] == are_marked
+    assert figure.caption.endswith("No band is drawn where a note marks the interval as unreliable.")
 
 
 def test_a_gain_rests_on_the_fewer_of_its_two_filters():
