@@ -107,8 +107,10 @@ def _without_noted_intervals(table: "pd.DataFrame") -> "pd.DataFrame":
     if not has_note(table).any():
         return table
     notes = ["" if str(note) == str(BELIEVED_VARIES) else note for note in table["note"]]
-    ends = [column for column in table if str(column).endswith(("_lo", "_hi"))]
-    return table.assign(**{end: table[end].mask([concerns(note, end) for note in notes]) for end in ends})
+    ends = [column for column in map(str, table) if column.endswith(("_lo", "_hi"))]
+    return table.assign(
+        **{end: table[end].mask(np.array([concerns(note, end) for note in notes], dtype=bool)) for end in ends}
+    )
 
 
 def is_exact(table: "pd.DataFrame") -> np.ndarray:
