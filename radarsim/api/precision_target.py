@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.api.case_work import CaseWork
 from radarsim.config.experiment import Case, Experiment
-from radarsim.config.quantity_phrase import PhraseError, QuantityPhrase, parse_phrase
+from radarsim.config.quantity_phrase import OVER_SCANS, PhraseError, QuantityPhrase, is_counted, parse_phrase
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report.quantities import GAIN, Quantity
@@ -76,9 +76,7 @@ def asked_table(case: Case, text: str) -> "Table":
     table = quantity_table(case, quantity)
     if phrase == QuantityPhrase(phrase.name):
         return table
-    from_s = phrase.from_s
-    if phrase.over in ("worst", "mean") and from_s is None:
-        from_s = study(case.study).counted_from_s(case, phrase.component)
+    from_s = registry.counted_from_s(case, phrase.component, phrase.over, phrase.from_s)
 
     def rows(results: Sequence[CaseResult]) -> Any:
         found = table(results)
@@ -87,8 +85,8 @@ def asked_table(case: Case, text: str) -> "Table":
             found = found[found[column].astype(str) == phrase.component]
         if "k" not in found or not len(found):
             return found
-        if phrase.over in ("worst", "mean"):
-            return found[found["t_s"] >= (from_s or 0.0) * (1 - 1e-12)]
+        if phrase.over in OVER_SCANS:
+            return found[is_counted(found["t_s"], from_s)]
         if phrase.at_s is not None:
             distance = (found["t_s"] - phrase.at_s).abs()
             return found[distance == distance.min()]

@@ -4,9 +4,11 @@
 the end`."""
 
 import re
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 Over = Literal["at", "worst", "mean", "long run"]
+OVER_SCANS = ("worst", "mean")  # what is taken over several scans
+TIME_ROUNDING = 1e-12  # of a time: the scan that a phrase names may be at a rounded one
 NUMBER = r"[\d.eE+-]+"
 PHRASE = re.compile(
     r"(?:(?P<over>worst|mean) +)?(?P<name>[\w-]+)(?: +(?:of +)?(?P<part>(?!(?:at|in|from|of) )\S.*?))??"
@@ -60,6 +62,11 @@ def parse_phrase(text: str) -> QuantityPhrase:
         int(match["k"]) if match["k"] else None,
         from_s,
     )
+
+
+def is_counted(t_s: Any, from_s: float | None) -> Any:
+    """Whether scans at times t_s, s, count from a time on; without one all do."""
+    return t_s >= (from_s or 0.0) * (1 - TIME_ROUNDING)
 
 
 def _seconds(text: str | None) -> float | None:

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 from radarsim.config.common_keys import COMMON_KEYS
 from radarsim.config.experiment import Case
 from radarsim.config.find_files import did_you_mean
+from radarsim.config.quantity_phrase import OVER_SCANS, Over
 from radarsim.config.study_keys import StudyKeys as Keys
 from radarsim.config.study_keys import extend_kinds, possible_kinds
 from radarsim.errors import AUTHOR_ERRORS, ConfigError, RadarsimError, StudyError
@@ -197,6 +198,13 @@ def quantity(name: str, case: Case) -> Quantity:
             f"{case.name}: study {case.study} measures no {name!r}, but {', '.join(measured)}{suggestion}"
         )
     return measured[spelt]
+
+
+def counted_from_s(case: Case, component: str | None, over: Over, from_s: float | None) -> float | None:
+    """The time, s, from which on the scans of a quantity over several count: the one asked for, else the study's."""
+    if over in OVER_SCANS and from_s is None:
+        return study(case.study).counted_from_s(case, component)
+    return from_s
 
 
 def quantities(name: str, spec: Keys | None) -> tuple[Quantity, ...]:

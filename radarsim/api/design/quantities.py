@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.config.find_files import did_you_mean
-from radarsim.config.quantity_phrase import Over, PhraseError, parse_phrase
+from radarsim.config.quantity_phrase import OVER_SCANS, Over, PhraseError, is_counted, parse_phrase
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import term, tr
@@ -72,7 +72,7 @@ class MeasuredQuantity:
     @property
     def is_over_scans(self) -> bool:
         """Whether it is the worst or the mean of several scans."""
-        return self.over in ("worst", "mean")
+        return self.over in OVER_SCANS
 
     @property
     def words(self) -> str:
@@ -142,8 +142,7 @@ def check_quantity(request: QuantityName, case: Case, user_filters: Sequence[str
                 f"only those of {', '.join(filter_names)}"
             )
         check_name(filter_name, filter_names)
-    if over in ("worst", "mean") and from_s is None:
-        from_s = registry.study(case.study).counted_from_s(case, component)
+    from_s = registry.counted_from_s(case, component, over, from_s)
     return MeasuredQuantity(definition, filter_name, component, at_s, at_k, over, from_s)
 
 
@@ -305,7 +304,7 @@ def interval_note(quantity: MeasuredQuantity, result: CaseResult) -> str:
     if quantity.component is not None:
         rows = rows[rows[quantity.definition.per].astype(str) == quantity.component]
     if quantity.is_over_scans and "t_s" in rows:
-        rows = rows[rows["t_s"] >= (quantity.from_s or 0.0)]
+        rows = rows[is_counted(rows["t_s"], quantity.from_s)]
         return next(filter(None, rows["note"]), "")
     if quantity.at_k is not None:
         rows = rows[rows["k"] == quantity.at_k]
@@ -369,7 +368,7 @@ def _over_scans(quantity: MeasuredQuantity, series: Series) -> Estimate:
             f"{argument('wanted', '--for')}: from must be from 0 to {series.t_s[-1]:g} s, the last scan's time, "
             f"got {from_s:g}"
         )
-    counted = np.flatnonzero((series.t_s >= from_s * (1 - 1e-12)) & ~np.isnan(series.values.value))
+    counted = np.flatnonzero(is_counted(series.t_s, from_s) & ~np.isnan(series.values.value))
     if not len(counted):
         return UNKNOWN_ESTIMATE
     columns = [np.asarray(column, dtype=float)[counted] for column in series.values]

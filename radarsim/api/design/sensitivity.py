@@ -159,8 +159,7 @@ def sensitivity(
             option = argument("of", "--of") if of is not None else argument("component", "--component")
             raise ConfigError(f"{option}: stands in {argument('wanted', '--for')} already: {wanted!r}")
         of, _, component, at_s, at_k, over, from_s = quantities.parse_request(wanted, None, at_s, at_k)
-        if over in ("worst", "mean") and from_s is None:
-            from_s = registry.study(cases.base.study).counted_from_s(cases.base, component)
+        from_s = registry.counted_from_s(cases.base, component, over, from_s)
     definitions = _definitions(of, cases.base)
     is_planned = quantities.is_planned(definitions[0])
     if is_planned:
