@@ -39,6 +39,7 @@ NO_SITE_FAULT = (
     "at: must say where the radar stands, LAT,LON,HEIGHT: the recording has positions on the earth, not ranges"
 )
 MAX_LOSS = 0.1  # of the rows that may be left out because of others
+MAX_STANDING_TRACKS = 20  # whose times stand still once, for which a recording is read again
 UNREACHABLE_REASON = term("rows that no target reaches from those beside them")
 UNKNOWN_RADAR_REASON = term("rows of radar #/#, whose place neither it nor --at says")
 OTHER_KIND_REASONS = {PLOTS: term("plots beside positions"), POSITIONS: term("positions beside plots")}
@@ -164,6 +165,8 @@ class _Import:
                 for track, count in Counter(selected.track).items():
                     self.result.tracks[track] = self.result.tracks.get(track, 0) + count
                 yield self._row_texts(selected)
+        if not self.all_at_once and 0 < self.later_rows.lost <= min(len(self.result.tracks), MAX_STANDING_TRACKS):
+            raise NeedsAllRows  # a clock that is set back by one scan stands still once in each track
 
     def _requested_batches(self) -> Iterator[Batch]:
         """The records of one kind that are requested, corrected, in the order of the file."""
@@ -187,7 +190,7 @@ class _Import:
         batches = [batch for batch in self._requested_batches() if batch.track]
         if not batches:
             return
-        batch, notes, self.disordered_count = row_order.sort_rows(row_order.join_batches(batches))
+        batch, notes, self.disordered_count = row_order.sort_rows(row_order.join_batches(batches), self._positions)
         self.result.notes += notes
         batch = self._reachable_rows(batch)
         for first in range(0, len(batch.track), BATCH_ROWS):

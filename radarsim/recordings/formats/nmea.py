@@ -38,13 +38,16 @@ def read_nmea(path: str, file: BinaryIO, only_positions: bool = False) -> Sheet:
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         fix: dict[str, float] = {}  # the numbers of all sentences of one time
+        places: dict[bytes, tuple[float, float]] = {}  # of these by talker and kind; another place is of another time
         number, dates = 0, _Dates()
         for number, line in enumerate(file, start=1):
             sentence = _parse_fix(line, sheet) if line.strip() else {}
-            if fix and sentence and sentence["clock"] != fix["clock"]:
+            head, place = line.lstrip()[:6], (sentence.get("lat", math.nan), sentence.get("lon", math.nan))
+            if fix and sentence and (sentence["clock"] != fix["clock"] or places.get(head, place) != place):
                 yield number - 1, _fix_cells(fix)
-                fix = {}
+                fix, places = {}, {}
             if sentence:
+                places[head] = place
                 if has_dates:
                     sentence["time"] = dates.time(sentence["clock"], sentence.pop("midnight", None))
                 fix |= sentence

@@ -6,17 +6,21 @@ that no target reaches, raises `NeedsAllRows`; the recording is then read again 
 import datetime
 import os
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from radarsim.language.translate import term, tr
+from radarsim.recordings.formats.clock_steps import MAX_SET_BACKS, SetBack, find_set_back
 from radarsim.recordings.formats.records import DAY_S, Batch
 from radarsim.recordings.grouping import rows_by_name
-from radarsim.recordings.time_spans import HOUR_S, ROLLOVER_S, WEEK_S
+from radarsim.recordings.time_spans import HOUR_S, MIN_DATED_S, ROLLOVER_S, WEEK_S
 
 MAX_AGE_S = 2 * DAY_S  # of a file, from the last time in it to when it was written
 MAX_STEP_INTERVALS, MAX_STEP_S = 3.0, 300.0  # from the row before a clock is set back to that after it
+LEAP_DAYS = ((1, 1), (7, 1))  # months and days before which leap seconds are
+ZONE_STEP_HOURS, ZONE_TOLERANCE = 0.5, 0.01  # by which time zones differ; of that
+LEAP_SECOND_TOLERANCE_S, MAX_LEAP_SECOND_STEP_S = 0.2, 60.0  # of the second; of rows from midnight
 SENT_AGAIN_REASON = term("rows sent again, with the same time and values")
 SAME_TIME_REASON = term("rows of the same time as one before of their track")
 SORTED_NOTE = term("rows that were earlier than one before of their track: {count} of {all}; they are sorted by time")
@@ -33,7 +37,25 @@ FALL_NOTES = {  # by how much a clock is set back, s
         "times fall by a week, as seconds of the week do when it ends: the {count} rows from there on are taken as a "
         "week later"
     ),
+    DAY_S: term(
+        "times fall by a day, as where the date changes late: the {count} rows from there on are taken as a day later"
+    ),
+    ROLLOVER_S: term(
+        "dates fall by 1024 weeks, as those of a satellite receiver do at a rollover: the {count} rows from there on "
+        "are taken as 1024 weeks later"
+    ),
 }
+SET_BACK_NOTE = term(
+    "the clock was set back by {size:.6g} s{when}: the {count} rows before are taken as that much earlier"
+)
+ZONE_NOTE = term(
+    "the clock was set back by {hours:g} hours{when}, as to another time zone: the {count} rows before are taken as "
+    "that much earlier"
+)
+LEAP_SECOND_NOTE = term(
+    "the clock counts a second twice at the end of {when:%Y-%m-%d}, as in a leap second: the {count} rows before are "
+    "taken as 1 s earlier"
+)
 ROLLOVER_NOTE = term(
     "dates step by 1024 weeks, as those of a satellite receiver do that missed a rollover: the {count} rows before are "
     "taken as 1024 weeks later"
@@ -103,10 +125,10 @@ def join_batches(batches: Iterable[Batch]) -> Batch:
     return Batch(first.kind, track, address, radar, columns, texts)
 
 
-def sort_rows(batch: Batch) -> tuple[Batch, list[str], int]:
+def sort_rows(batch: Batch, find_positions: Callable[[Batch], np.ndarray]) -> tuple[Batch, list[str], int]:
     """The rows of a whole recording in the order of time, notes on what was out of order, and how many rows were
-    earlier than one before of their track: 0 where the newest came first."""
-    notes = _undo_clock_steps(batch)
+    earlier than one before of their track: 0 where the newest came first. find_positions: of rows, (n, d), m."""
+    notes = _undo_clock_steps(batch, find_positions)
     t, late_count, is_falling = batch.columns["t_s"], 0, True
     for name, rows in rows_by_name(batch.track).items():
         if name:
@@ -119,9 +141,9 @@ def sort_rows(batch: Batch) -> tuple[Batch, list[str], int]:
     return batch.rows(np.argsort(t, kind="stable").tolist()), notes, 0 if is_falling else late_count
 
 
-def _undo_clock_steps(batch: Batch) -> list[str]:
-    """Continue times that are set back by one of FALL_NOTES, or by 1024 weeks, once in a recording; in place, with a
-    note."""
+def _undo_clock_steps(batch: Batch, find_positions: Callable[[Batch], np.ndarray]) -> list[str]:
+    """Continue times that are set back by one of FALL_NOTES, or step by 1024 weeks, once in a recording, or that are
+    set back by any time; in place, with notes."""
     t = batch.columns["t_s"]
     tracks = [rows for name, rows in rows_by_name(batch.track).items() if name]
     for size_s, note in FALL_NOTES.items():
@@ -133,7 +155,28 @@ def _undo_clock_steps(batch: Batch) -> list[str]:
         before = np.concatenate(rollover_rows)
         t[before] += ROLLOVER_S
         return [tr(ROLLOVER_NOTE, count=len(before))]
-    return []
+    notes: list[str] = []
+    if any((np.diff(t[rows]) <= 0).any() for rows in tracks):
+        positions = find_positions(batch)
+        while len(notes) < MAX_SET_BACKS and (set_back := find_set_back(t, positions, tracks)) is not None:
+            notes.append(_set_back_note(set_back))
+            t[set_back.before] -= set_back.size_s
+    return notes
+
+
+def _set_back_note(set_back: SetBack) -> str:
+    """The note on a clock that was set back: where it is the end of a half-year, by a leap second."""
+    count, end_s = len(set_back.before), set_back.until_s
+    is_dated = end_s >= MIN_DATED_S
+    if is_dated and abs(set_back.size_s - 1) < LEAP_SECOND_TOLERANCE_S:
+        midnight = datetime.datetime.fromtimestamp(DAY_S * round(end_s / DAY_S), datetime.UTC)
+        if abs(end_s - midnight.timestamp()) < MAX_LEAP_SECOND_STEP_S and (midnight.month, midnight.day) in LEAP_DAYS:
+            return tr(LEAP_SECOND_NOTE, count=count, when=midnight - datetime.timedelta(days=1))
+    when = tr(" at {time:%H:%M:%S}", time=datetime.datetime.fromtimestamp(end_s, datetime.UTC)) if is_dated else ""
+    hours = set_back.size_s / HOUR_S
+    if hours > ZONE_STEP_HOURS and abs(hours / ZONE_STEP_HOURS - round(hours / ZONE_STEP_HOURS)) < ZONE_TOLERANCE:
+        return tr(ZONE_NOTE, hours=ZONE_STEP_HOURS * round(hours / ZONE_STEP_HOURS), count=count, when=when)
+    return tr(SET_BACK_NOTE, size=set_back.size_s, count=count, when=when)
 
 
 def rollover_notes(path: str, last_s: float) -> list[str]:
