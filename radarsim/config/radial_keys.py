@@ -212,6 +212,19 @@ class RecordedTarget(Model):
         return 0.0
 
 
+def first_motion(target: Any) -> tuple[float, float]:
+    """The speed, m/s, and the largest possible radial acceleration, m/s², at the first plot that a target's keys state;
+    zero where they state none."""
+    _, speed_mps, acceleration_mps2 = (*(abs(c) for c in getattr(target, "coefficients", ())), 0.0, 0.0, 0.0)[:3]
+    if hasattr(target, "speed_mps"):
+        speed_mps = target.speed_mps
+        acceleration_mps2 = speed_mps**2 / (getattr(target, "range_m", 0.0) or target.start_range_m)
+    if getattr(target, "start_s", None) == 0:
+        in_g = STANDARD_GRAVITY_MPS2 * getattr(target, "acceleration_g", 0.0)
+        acceleration_mps2 += abs(getattr(target, "acceleration_mps2", in_g))
+    return speed_mps, acceleration_mps2
+
+
 def range_errors(target: Any, radar: Radar, last_s: float) -> Iterator[CheckError]:
     """The errors of a target that up to a time (s) flies too far for double precision, or over the radar."""
     smallest_sigma_m = min(radar.sigma_range_m, radar.sigma_velocity_mps * radar.scan_period_s)

@@ -58,7 +58,27 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
     of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name)]
     filters = [(result, name) for result in reported for name in _reported_filters(result)]
     remedies = remedy_answer.remedy_sentence(filters, tables_by_name)
-    return [*of_all_cases[:1], *of_cases, *remedies, *map(Sentence, remark)]
+    return [*of_all_cases[:1], *of_cases, *remedies, _prior_sentence(results), *map(Sentence, remark)]
+
+
+def _prior_sentence(results: Sequence[Result]) -> Sentence:
+    """What the filters know before the first plot, in any case."""
+    velocity, acceleration = (
+        _span_text([getattr(result.spec.prior, name) for result in results])
+        for name in ("sigma_velocity_mps", "sigma_acceleration_mps2")
+    )
+    text = tr(
+        "Prior of the filters: σ of the velocity {velocity} m/s, of the acceleration {acceleration} m/s².",
+        velocity=velocity,
+        acceleration=acceleration,
+    )
+    return Sentence(text)
+
+
+def _span_text(values: Sequence[float]) -> str:
+    """A value, or the least and the greatest of several."""
+    low, high = (numeral(f"{end:g}") for end in (min(values), max(values)))
+    return low if low == high else tr("{low} to {high}", low=low, high=high)
 
 
 def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Sentence]:

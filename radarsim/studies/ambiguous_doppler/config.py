@@ -24,6 +24,8 @@ MAX_FOLDS = 1e4  # spans in a standard deviation of the prior: the first scan tr
 MIN_SPAN_DIFFERENCE = 1e-9  # relative difference below which two spans count as equal
 BIAS_KEYS = ("bias_range_m", "bias_velocity_mps", "sigma_bias_range_m", "sigma_bias_velocity_mps")  # of range_doppler
 ORACLE_SUFFIX = "with known folds"  # appended to a filter's name
+DEFAULT_VELOCITY_MPS, DEFAULT_ACCELERATION_MPS2 = 300.0, 10.0  # the prior's, of a target that states no speed
+VELOCITY_TO_SPEED, SPEED_CHANGE_S = 1.2, 25.0  # which give these for an aircraft of 250 m/s
 LISTS_HYPOTHESES = {"doppler": "folded", "merge": "never"}  # keys of filters that keep several hypotheses
 
 Order = Annotated[int, WholeNumber(0, 2)]
@@ -82,12 +84,39 @@ def joint_span(span: float, other_span: float) -> float:
 class Prior(Model):
     """What the filters know before the first plot: mean zero, and these standard deviations; nothing of the range."""
 
-    sigma_velocity_mps: Positive = key(
-        "prior σ of the radial velocity", "standard deviation of the radial velocity, m/s", 300.0, symbol="σ_V0"
+    sigma_velocity_mps: Positive | None = key(
+        "prior σ of the radial velocity",
+        "standard deviation of the radial velocity, m/s; default: 1.2 times the target's speed at the first plot, 300 "
+        "where it has none",
+        None,
+        symbol="σ_V0",
     )
-    sigma_acceleration_mps2: Positive = key(
-        "prior σ of the radial acceleration", "standard deviation of the radial acceleration, m/s²", 10.0, symbol="σ_a0"
+    sigma_acceleration_mps2: Positive | None = key(
+        "prior σ of the radial acceleration",
+        "standard deviation of the radial acceleration, m/s²; default: a change by the target's speed in 25 s, but at "
+        "least its acceleration at the first plot; 10 where it has no speed",
+        None,
+        symbol="σ_a0",
     )
+
+    def fitted_to(self, target: Any) -> "Prior":
+        """The prior with what is not given filled in, from the target."""
+        speed_mps, acceleration_mps2 = radial_keys.first_motion(target)
+        defaults = (DEFAULT_VELOCITY_MPS, DEFAULT_ACCELERATION_MPS2)
+        if speed_mps:
+            defaults = VELOCITY_TO_SPEED * speed_mps, max(speed_mps / SPEED_CHANGE_S, acceleration_mps2)
+        names = ("sigma_velocity_mps", "sigma_acceleration_mps2")
+        missing = {
+            name: float(f"{value:.3g}")
+            for name, value in zip(names, defaults, strict=True)
+            if getattr(self, name) is None
+        }
+        return self.model_copy(update=missing) if missing else self
+
+
+def states_speed(target: Any) -> bool:
+    """Whether a target's keys state its speed at the first plot, so that a prior can be fitted to it."""
+    return radial_keys.first_motion(target)[0] > 0
 
 
 class RandomPolynomial(Model):
@@ -293,12 +322,13 @@ class Keys(radial_keys.TimedStudyKeys):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        """The config with the number of scans and the target's standard deviations filled in."""
-        updates = {"scans": self.plots, "duration_s": None}
+        """The config with the number of scans, the prior and the target's standard deviations filled in."""
+        prior = self.prior.fitted_to(self.target)
+        updates = {"scans": self.plots, "duration_s": None, "prior": prior}
         if not isinstance(self.target, RandomPolynomial):
             return self.model_copy(update=updates)
         sigmas = {
-            name: getattr(self.prior, name)
+            name: getattr(prior, name)
             for name in ("sigma_velocity_mps", "sigma_acceleration_mps2")
             if getattr(self.target, name) is None
         }
@@ -322,10 +352,15 @@ class Keys(radial_keys.TimedStudyKeys):
             carried["filters"] = [*carried_filters, *oracle]
         return carried
 
+    @property
+    def _whole_prior(self) -> Any:
+        """The prior that the filters start from; checks come before it is filled in."""
+        return self.prior.fitted_to(self.target)
+
     @cross_check
     def _prior_in_proportion(self) -> Iterator[CheckError]:
         """Refuse a prior so wide that a plot's accuracy is lost in rounding, or that the start has too many folds."""
-        radar, prior = self.radar, self.prior
+        radar, prior = self.radar, self._whole_prior
         if prior.sigma_velocity_mps > MAX_PROPORTION * radar.sigma_velocity_mps:
             yield check_error(
                 "prior.sigma_velocity_mps", f"must be at most {MAX_PROPORTION:g} times the velocity's accuracy"
@@ -338,7 +373,7 @@ class Keys(radial_keys.TimedStudyKeys):
 
     @cross_check
     def _range_resolved(self) -> Iterator[CheckError]:
-        radar, prior, last = self.radar, self.prior, (self.plots - 1) * self.radar.scan_period_s
+        radar, prior, last = self.radar, self._whole_prior, (self.plots - 1) * self.radar.scan_period_s
         if prior.sigma_acceleration_mps2 * radar.scan_period_s > MAX_PROPORTION * radar.sigma_velocity_mps:
             limit = f"{MAX_PROPORTION:g} times the velocity's accuracy a scan period"
             yield check_error("prior.sigma_acceleration_mps2", f"must be at most {limit}")

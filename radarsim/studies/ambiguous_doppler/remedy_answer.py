@@ -13,7 +13,7 @@ from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
 from radarsim.report import key_labels, tables
 from radarsim.report.sentences import Sentence
-from radarsim.studies.ambiguous_doppler.config import MAX_HYPOTHESES
+from radarsim.studies.ambiguous_doppler.config import MAX_HYPOTHESES, Prior, states_speed
 from radarsim.studies.ambiguous_doppler.kernels.layout import OFF_BY_HALF_SPAN_SUM
 from radarsim.studies.ambiguous_doppler.study import prepare, simulate
 from radarsim.studies.ambiguous_doppler.tables import Result
@@ -32,7 +32,7 @@ SMOOTH_MPS2 = 10.0  # acceleration that the model of order 1 allows for: what ke
 LARGER = 100.0  # times the manoeuvre variance
 STAGGER = (1.0, 7 / 6, 4 / 3)  # times the repetition rate, used in turn
 MORE_HYPOTHESES = 4  # times the hypotheses kept
-PRIOR_FACTOR = 2.0  # times the target's largest speed, as the prior's σ of velocity
+PRIOR_FACTOR = 2.0  # between the prior's σ of velocity and that which fits the target's speed, from which that is tried
 
 
 class Trial(NamedTuple):
@@ -54,19 +54,18 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
             continue
         count = min(max(result.count, TRIAL_REALISATIONS), MAX_TRIAL_REALISATIONS)
         tried = list(islice(cures(result.spec, name, dict(result.swept_values), count), MAX_NAMED))
-        case, prior = key_labels.plain_case_label(result), result.spec.prior
-        fields = {"case": case, "filter": name, "count": count}
-        fields |= {"v": f"{prior.sigma_velocity_mps:g}", "a": f"{prior.sigma_acceleration_mps2:g}"}
+        fields = {"case": key_labels.plain_case_label(result), "filter": name, "count": count}
         if not tried:
             text = tr(
                 "{case}, {filter}: nothing helps of what was tried on {count} realisations: a larger D_M, rates in "
-                "turn, two orders, more hypotheses, another prior ({v} m/s, {a} m/s²).",
+                "turn, two orders, more hypotheses, another prior.",
                 **fields,
             )
             return [Sentence(text)]
         cures_text = "; ".join(_trial_text(settings, trial) for settings, trial in tried)
         text = tr(
-            "{case}, {filter}: what helps, tried on {count} realisations (prior {v} m/s, {a} m/s²): {cures}.",
+            "{case}, {filter}: what helps (tried on {count} realisations; add to the command, with --out cured): "
+            "{cures}.",
             cures=cures_text,
             **fields,
         )
@@ -147,10 +146,11 @@ def _remedies(spec: Any, name: str) -> Iterable[_Remedy]:
             yield _Remedy(larger | in_turn, quicker, rates_in_turn, prior)
     if len(rates) == 1:
         yield _Remedy(in_turn, lost, rates_in_turn, prior)
-    speed_mps = _target_speed_mps(spec.target)
-    if speed_mps and not 0.5 < (fitting := float(f"{PRIOR_FACTOR * speed_mps:.2g}")) / prior.sigma_velocity_mps < 2:
-        fitted_prior = prior.model_copy(update={"sigma_velocity_mps": fitting})
-        yield _Remedy({"prior.sigma_velocity_mps": f"{fitting:g}"}, lost, radar, fitted_prior)
+    fitted = Prior.model_validate({}).fitted_to(spec.target)
+    ratio = fitted.sigma_velocity_mps / prior.sigma_velocity_mps
+    if states_speed(spec.target) and not 1 / PRIOR_FACTOR < ratio < PRIOR_FACTOR:
+        settings = {f"prior.{key}": f"{value:g}" for key, value in fitted}
+        yield _Remedy(settings, lost, radar, fitted)
     if lost.combine is None:
         both = {"orders": (1, 2), "combine": "likelihood", "manoeuvre_variance": (SMOOTH_MPS2**2, variance)}
         settings = {
@@ -163,12 +163,6 @@ def _remedies(spec: Any, name: str) -> Iterable[_Remedy]:
         more = min(MORE_HYPOTHESES * lost.hypotheses, MAX_HYPOTHESES)
         if more > lost.hypotheses:
             yield _Remedy({f"{key}.hypotheses": f"{more}"}, lost.model_copy(update={"hypotheses": more}), radar, prior)
-
-
-def _target_speed_mps(target: Any) -> float:
-    """The speed that a target's keys say; zero where they say none."""
-    coefficients: tuple[float, ...] = getattr(target, "coefficients", ())
-    return float(getattr(target, "speed_mps", 0.0) or (abs(coefficients[1]) if len(coefficients) > 1 else 0.0))
 
 
 @lru_cache(maxsize=64)  # the answer is made for the page, and again where a program asks for it

@@ -129,12 +129,51 @@ BOAT = {
 }
 
 
+def prior_sigmas(target, **prior):
+    """σ of velocity and of acceleration that filters start from, of the boat's radar and another target."""
+    (case,) = load({**BOAT, "target": target, **({"prior": prior} if prior else {})}, ()).cases
+    return case.spec.prior.sigma_velocity_mps, case.spec.prior.sigma_acceleration_mps2
+
+
+def test_prior_follows_the_speed_of_the_target():
+    """1.2 times the speed; a change of the speed in 25 s, or the acceleration at the first plot where it is more."""
+    boat = BOAT["target"]
+    assert prior_sigmas(boat) == (14.4, 0.48)
+    assert prior_sigmas(boat, sigma_velocity_mps=300) == (300, 0.48)
+    assert prior_sigmas(boat, sigma_acceleration_mps2=10) == (14.4, 10)
+    near = {"kind": "fly_by", "distance_m": 200, "speed_mps": 12, "start_range_m": 250}
+    assert prior_sigmas(near) == (14.4, 0.576)  # 12² / 250, as it passes
+    assert prior_sigmas(boat | {"start_s": 0}) == pytest.approx((14.4, 0.2 * 9.80665 + 12**2 / 8e3), abs=0.01)
+    assert prior_sigmas({"kind": "polynomial", "coefficients": [8e3, -12, 2]}) == (14.4, 2)
+    assert prior_sigmas({"kind": "fly_by", "distance_m": 500, "speed_mps": 12, "start_range_m": 8e3}) == (14.4, 0.48)
+    for coefficients in ([8e3], [8e3, 0, 3], [100e3, -250, 4]):  # no speed, or that of an aircraft
+        assert prior_sigmas({"kind": "polynomial", "coefficients": coefficients}) == (300, 10)
+    assert prior_sigmas({"kind": "random_polynomial"}) == (300, 10)
+
+
+def test_prior_is_in_the_answer():
+    """One sentence for all cases, whatever else the answer says."""
+    small = BOAT | {"scans": 4, "realisations": 60}
+    (line,) = [line for line in radarsim.run(small).answer if line.startswith("Prior")]
+    assert line == "Prior of the filters: σ of the velocity 14.4 m/s, of the acceleration 0.48 m/s²."
+    swept = small | {"sweep": {"target.speed_mps": [10, 20]}}
+    (line,) = [line for line in radarsim.run(swept).answer if line.startswith("Prior")]
+    assert line == "Prior of the filters: σ of the velocity 12 to 24 m/s, of the acceleration 0.4 to 0.8 m/s²."
+
+
+@pytest.mark.parametrize("config", ["ambiguous_depth", "ambiguous_manoeuvre", "ambiguous_orders", "orders"])
+def test_prior_of_shipped_configs_without_it_is_that_of_an_aircraft(config):
+    priors = {(p.sigma_velocity_mps, p.sigma_acceleration_mps2) for c in load(config, ()).cases for p in [c.spec.prior]}
+    assert priors == {(300, 10)}
+
+
 @pytest.mark.slow
 def test_a_loss_names_what_turns_it_into_a_gain():
     """1.6 % of folds are lost, and the range is four times worse than without Doppler: -281 % (and -307, -308)."""
     result = radarsim.run(BOAT)
     (text,) = [line for line in result.answer if "what helps" in line]
-    assert "(prior 300 m/s, 10 m/s²)" in text
+    assert "with --out cured" in text
+    assert any("σ of the velocity 14.4 m/s, of the acceleration 0.48 m/s²" in line for line in result.answer)
     setting = "filters.1.manoeuvre_variance=0.1"
     assert f"--set {setting} (0 % lost, gain in range" in text
     gain = float(text.partition(f"--set {setting} (0 % lost, gain in range ")[2].split()[0])
