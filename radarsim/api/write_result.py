@@ -22,6 +22,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.machine import machine_facts
 from radarsim.engine.results import CaseResult
 from radarsim.errors import AUTHOR_ERRORS, RadarsimError
+from radarsim.language.translate import tr
 from radarsim.report import atomic_files, csv_text, exact_check, provenance
 from radarsim.report.drawing.model import Figure
 from radarsim.report.drawing.page_figure import DrawnFigure
@@ -39,7 +40,7 @@ class WrittenFiles:
 
     files: with those of an earlier run that stay. removed: those that do not; remaking_options: of the command, which
     write them again. seconds: of drawing, and of writing with the report.
-    answer_warnings: warnings on the intervals that the answer rests on."""
+    answer_warnings: on the intervals that the answer rests on, and on figures that are wider than asked for."""
 
     folder: Path
     files: tuple[str, ...]
@@ -103,10 +104,8 @@ def write_files(
     if data_files := [name for name in kept_config if name != CONFIG_FILE]:
         run = {**run, "data_files": data_files}
     tables_by_name = {name: with_note_texts(table) for name, table in tables_by_name.items()}
-    run = {
-        **run,
-        "warnings": [*run.get("warnings", ()), *answer.warnings, *undeclared_figures(case_study, figures_by_name)],
-    }
+    warnings = (*answer.warnings, *_widened_figures(drawings, width_mm))
+    run = {**run, "warnings": [*run.get("warnings", ()), *warnings, *undeclared_figures(case_study, figures_by_name)]}
     with atomic_files.folder_lock(folder):
         record = provenance.record(experiment, results, run, contents, answer.texts, machine_facts())
         earlier = earlier_outputs(folder, record)
@@ -137,7 +136,21 @@ def write_files(
         tables=tables_by_name,
         answer=answer.texts,
         seconds={"drawing": draw_end - draw_start, "writing": time.perf_counter() - draw_end},
-        answer_warnings=answer.warnings,
+        answer_warnings=warnings,
+    )
+
+
+def _widened_figures(drawings: Sequence[DrawnFigure], width_mm: float | None) -> tuple[str, ...]:
+    """A line for each figure that was drawn wider than asked for."""
+    return tuple(
+        tr(
+            "figure {name}: drawn {width:g} mm wide, as words would be cut at {wanted:g} mm",
+            name=drawing.figure.name,
+            width=drawing.figure.width_mm,
+            wanted=width_mm,
+        )
+        for drawing in drawings
+        if width_mm is not None and drawing.figure.width_mm > width_mm
     )
 
 

@@ -20,13 +20,15 @@ from matplotlib.text import Annotation
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
-from radarsim.report.drawing.legend_placement import LegendPlan, at_width, plan_legends
+from radarsim.report.drawing.legend_placement import LegendPlan, at_width, longest_name, plan_legends
 from radarsim.report.drawing.line_names import draw_legend, draw_legend_below, name_line_ends, separate_names
 from radarsim.report.drawing.marks import common_map_colours, draw_panel
 from radarsim.report.drawing.model import GREY, Figure, Line, Mark, Panel, Reference
+from radarsim.report.drawing.narrow_panels import fit_rows, stack_top_notes
 from radarsim.report.drawing.page_figure import HEADLINE_ID, DrawnFigure
 from radarsim.report.drawing.page_values import headline_height_pt, value_marks
 from radarsim.report.drawing.style import (
+    END_LETTER_MM,
     HEADLINE_LETTERS_PER_MM,
     HEADLINE_MM,
     MM,
@@ -40,6 +42,9 @@ from radarsim.report.drawing.style import (
 from radarsim.report.math_text import plain_text, with_formulas
 
 FILE_STYLE: Any = {name: STYLE[name] for name in ("pdf.fonttype", "ps.fonttype", "svg.fonttype")}
+WIDTH_STEP_MM = 5.0  # by which a width is increased at which something would be cut
+LEAST_PANEL_MM = 15.0  # width of its axes
+ROUNDING_INCHES = 1e-3
 CACHED_METHODS = ("_update_ticks", "_get_ticklabel_bboxes")  # of Matplotlib's axes; arguments: none; ticks, renderer
 
 
@@ -55,6 +60,7 @@ class PrintableFigure(Canvas):
 def render(figure: Figure) -> Canvas:
     """Draw a figure with Matplotlib, laid out at its size in millimetres."""
     with matplotlib.rc_context(STYLE), _ignore_missing_glyphs():
+        figure = fit_rows(figure)
         return _layout(figure, plan_legends(figure))
 
 
@@ -63,10 +69,10 @@ def save(
 ) -> dict[str, bytes]:
     """Return the bytes of the figure in each format ("svg", "png" at 200 dpi, "pdf"), the same for the same data.
 
-    At another width its letters keep their size. Title, caption and made_by (sources and versions) are in each file's
-    metadata."""
+    At another width its letters keep their size; a width at which they would be cut is increased. Title, caption and
+    made_by (sources and versions) are in each file's metadata."""
     with _no_garbage_collection():
-        canvas = render(at_width(figure, width_mm))
+        figure, canvas = _render_at(figure, width_mm)
         with _cache_ticks(canvas):
             return {kind: _encode(canvas, kind, figure, made_by) for kind in formats}
 
@@ -74,11 +80,12 @@ def save(
 def draw(
     figure: Figure, formats: Iterable[str] = ("svg",), width_mm: float | None = None, made_by: str = ""
 ) -> DrawnFigure:
-    """Draw a figure once: its files as `save` returns them, and what a page shows of the same drawing."""
-    figure = at_width(figure, width_mm)
+    """Draw a figure once: its files as `save` returns them, and what a page shows of the same drawing.
+
+    The width of the figure that is returned is that of the drawing."""
     kinds = list(formats)
     with _no_garbage_collection():
-        canvas = render(figure)
+        figure, canvas = _render_at(figure, width_mm)
         with _cache_ticks(canvas):
             encoded = {kind: _encode(canvas, kind, figure, made_by) for kind in dict.fromkeys((*kinds, "svg"))}
     panels = [panel for panel in figure.panels if panel.marks]
@@ -86,6 +93,24 @@ def draw(
     values = [(plain_text(panels[n].title), tuple(marks)) for n, marks in groups.items() if marks]
     files = {kind: encoded[kind] for kind in kinds}
     return DrawnFigure(figure, files, encoded["svg"], tuple(values), headline_height_pt(canvas))
+
+
+def _render_at(figure: Figure, width_mm: float | None) -> tuple[Figure, Canvas]:
+    """The figure at a width, or at the next larger one at which nothing is cut, and its drawing."""
+    narrow = at_width(figure, width_mm)
+    while narrow.width_mm < figure.width_mm:
+        canvas = render(narrow)
+        if _is_whole(canvas, sum(bool(panel.marks) for panel in figure.panels)):
+            return narrow, canvas
+        narrow = at_width(figure, min(narrow.width_mm + WIDTH_STEP_MM, figure.width_mm))
+    return narrow, render(narrow)
+
+
+def _is_whole(canvas: Canvas, panel_count: int) -> bool:
+    """Whether all that is drawn lies within the figure, and its panels have room."""
+    box, page = canvas.get_tightbbox(), canvas.bbox_inches
+    is_inside = min(box.x0, box.y0, page.x1 - box.x1, page.y1 - box.y1) > -ROUNDING_INCHES
+    return is_inside and all(axes.bbox.width / canvas.dpi > LEAST_PANEL_MM * MM for axes in canvas.axes[:panel_count])
 
 
 def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
@@ -189,7 +214,8 @@ def _fill_grid(figure: Figure, plan: LegendPlan, grid: np.ndarray, columns: int)
         x, y = wrap_label(panel.x, cell_mm), wrap_label(panel.y, figure.panel_height_mm - 5)
         y = replace(y, label="") if figure.share_y and n % columns else y
         title = wrap(panel.title, TITLE_LETTERS_PER_MM * cell_mm)
-        draw_panel(axes, replace(panel, title=title, x=x, y=y), map_colours)
+        length_mm = cell_mm - SIDE_MM - (END_LETTER_MM * longest_name(panel) if plan.at_ends[n] else 0.0)
+        draw_panel(axes, stack_top_notes(replace(panel, title=title, x=x, y=y), length_mm), map_colours)
         end_names.append(name_line_ends(axes, panel) if plan.at_ends[n] else [])
         draw_legend_below(axes, plan.panel_legends[n], cell_mm)
     for axes in grid.flat[len(plan.panels) :]:

@@ -59,7 +59,7 @@ def plan_legends(figure: Figure) -> LegendPlan:
     """Decide for a figure which lines are named at their ends, and which legends explain the others."""
     panels = tuple(panel for panel in figure.panels if panel.marks)
     cell_mm = figure.width_mm / min(figure.columns, max(1, len(panels)))
-    too_wide = any(LETTER_MM * _longest_name(panel) > MAX_END_NAMES_SHARE * cell_mm for panel in panels if panel.direct)
+    too_wide = any(LETTER_MM * longest_name(panel) > MAX_END_NAMES_SHARE * cell_mm for panel in panels if panel.direct)
     at_ends = tuple(not too_wide and _names_fit(panel, figure.panel_height_mm) for panel in panels)
     explained_crosses: set[str] = set()
     keys = [_legend_keys(panel, ends, explained_crosses) for panel, ends in zip(panels, at_ends, strict=True)]
@@ -111,7 +111,8 @@ def named_lines(panel: Panel) -> list[Line]:
     return [m for m in panel.marks if isinstance(m, Line) and m.label and np.isfinite(m.y).any()]
 
 
-def _longest_name(panel: Panel) -> int:
+def longest_name(panel: Panel) -> int:
+    """Letters of the longest name of a panel's lines."""
     return max((len(plain_text(line.label)) for line in named_lines(panel)), default=0)
 
 

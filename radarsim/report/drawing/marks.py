@@ -14,7 +14,7 @@ from radarsim.report.drawing.line_points import lone_points, marker_indices, mar
 from radarsim.report.drawing.model import Axis as AxisSpec
 from radarsim.report.drawing.model import Bars, Heat, Line, Mark, Note, Panel, Reference
 from radarsim.report.drawing.scales import Scale, scans_of, tick_text
-from radarsim.report.drawing.style import EXACT, SYMBOL, TOP_NOTE_PT, UPRIGHT, line_options, style_colour
+from radarsim.report.drawing.style import EXACT, SYMBOL, TOP_NOTE_PT, TOP_ROW_PT, UPRIGHT, line_options, style_colour
 from radarsim.report.drawing.ticks import set_ticks
 from radarsim.report.wording import number
 
@@ -32,8 +32,9 @@ def draw_panel(axes: Axes, panel: Panel, map_colours: MapColours) -> None:
         _draw_mark(axes, mark, panel, map_colours)
     axes.set_xlabel(panel.x.label)
     axes.set_ylabel(panel.y.label, **(UPRIGHT if SYMBOL.fullmatch(panel.y.label) else {}))
-    has_top_notes = any(isinstance(mark, Note) and mark.place == "top" for mark in panel.marks)
-    axes.set_title(panel.title, loc="left", fontweight="bold", pad=TOP_NOTE_PT if has_top_notes else None)
+    top_rows = 1 + max((mark.row for mark in panel.marks if isinstance(mark, Note) and mark.place == "top"), default=-1)
+    title_pad = TOP_NOTE_PT + TOP_ROW_PT * (top_rows - 1) if top_rows else None
+    axes.set_title(panel.title, loc="left", fontweight="bold", pad=title_pad)
     for limits, set_limits in ((panel.x.limits, axes.set_xlim), (panel.y.limits, axes.set_ylim)):
         if limits != (None, None):
             set_limits(*limits)
@@ -141,14 +142,27 @@ def _draw_map(axes: Axes, heat: Heat, map_colours: MapColours) -> None:
 def _draw_note(axes: Axes, note: Note) -> None:
     if note.place == "top":
         grey: dict[str, Any] = {"color": "#555555", "fontsize": 7, "ha": "center", "va": "bottom"}
-        axes.annotate(note.text, (note.x, 1.0), (0, 1.5), axes.get_xaxis_transform(), "offset points", **grey)
+        axes.annotate(
+            note.text,
+            (note.x, 1.0),
+            (0, 1.5 + TOP_ROW_PT * note.row),
+            axes.get_xaxis_transform(),
+            "offset points",
+            **grey,
+        )
+        return
+    if note.place == "row":
+        options: dict[str, Any] = {"fontsize": 7, "va": "bottom", "annotation_clip": False, "zorder": 1.8}
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 0.4}
+        place: dict[str, Any] = {"xycoords": axes.get_yaxis_transform(), "textcoords": "offset points"}
+        axes.annotate(note.text, (0.0, note.y), xytext=(0, 4.5), bbox=box, **place, **options)
         return
     if note.place == "on":
         box = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
         axes.text(note.x, note.y, note.text, ha="center", va="center", fontsize=7, zorder=3.5, bbox=box)
         return
     up, right, level = "n" in note.place, "e" in note.place, note.place == "e"
-    options: dict[str, Any] = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": 7}
+    options = {"ha": "left" if right else "right", "va": "bottom" if up else "top", "fontsize": 7}
     options |= {"va": "center", "annotation_clip": False} if level else {}
-    shift = (3 if right else -3, 0 if level else 3 if up else -3)
+    shift = 3.0 if right else -3.0, 0.0 if level else 3.0 if up else -3.0
     axes.annotate(note.text, (note.x, note.y), xytext=shift, textcoords="offset points", **options)

@@ -95,12 +95,13 @@ class Note:
     """Text near a point of the data: above or below it ("n", "s"), to its right or left ("e", "w").
 
     "on": upon the point, which interrupts its line. "e" alone: to its right, outside the panel too. "top": along the
-    panel's top, whatever y."""
+    panel's top, whatever y. "row": above y from the panel's left edge on, whatever x."""
 
     x: float
     y: float
     text: str
     place: str = "ne"
+    row: int = 0  # of those along the top, from the panel upwards
 
 
 Mark = Line | Reference | Bars | Heat | Note

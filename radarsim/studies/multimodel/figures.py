@@ -13,7 +13,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, term, tr
-from radarsim.report import caption_remarks, case_selection, figure_lines, key_labels, math_text, panel_layout, tables
+from radarsim.report import caption_remarks, case_selection, figure_lines, key_labels, panel_layout, tables
 from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.studies.multimodel import stage_ranking
@@ -38,7 +38,6 @@ SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
 STAGE_SPREAD = 0.5  # width over which a stage's points are spread; stages are one apart
-LETTERS_ACROSS, LETTERS_ACROSS_NARROW = 60, 28  # letters across a panel in a row of two, and of three
 MAX_LOOKS = 8  # filters with distinct colours, dashes and markers
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
 
@@ -173,7 +172,6 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
         "The true flight: the ground track from its start, at one scale "
         "north and east, with the radar at the origin. Dotted: ends of the stages."
     )
-    caption += _stages_sentence(flight_panels, results)
     return _with_paper_number(
         _figure_of_panels("trajectory", tr("Flight"), caption, flight_panels, 56), results, "1 … 4"
     )
@@ -203,8 +201,8 @@ def _arrow(track: Line, index: int) -> str:
     return "→↗↑↖←↙↓↘"[round(float(turn) / (np.pi / 4)) % 8]
 
 
-def _stage_lines(results: Sequence[CaseResult], letters: int = LETTERS_ACROSS) -> tuple[Reference | Note, ...]:
-    """The ends of the stages, and the names of those that are long enough; empty if the cases' stages differ."""
+def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference | Note, ...]:
+    """The ends of the stages, and their names; empty if the cases' stages differ."""
     if len({result.spec.target.stages for result in results}) > 1:
         return ()
     stages, last = results[0].spec.target.stages, max(float(result.axes.t_s[-1]) for result in results)
@@ -213,21 +211,8 @@ def _stage_lines(results: Sequence[CaseResult], letters: int = LETTERS_ACROSS) -
         return ()
     marks: list[Reference | Note] = [Reference(end, "x") for end in ends]
     for stage, (begin, end) in zip(stages, pairwise([0.0, *ends, last]), strict=True):
-        if math_text.letters_in(name := tr(stage.name)) <= letters * (end - begin) / last:
-            marks.append(Note((begin + end) / 2, np.nan, name, "top"))
+        marks.append(Note((begin + end) / 2, np.nan, tr(stage.name), "top"))
     return tuple(marks)
-
-
-def _stages_sentence(figure_panels: Sequence[Panel], results: Sequence[CaseResult]) -> str:
-    """A sentence for a caption that lists the stages, if a panel has no space for all their names; else empty."""
-    stages = {result.spec.target.stages for result in results}
-    name_counts = [
-        sum(isinstance(mark, Note) and mark.place == "top" for mark in panel.marks) for panel in figure_panels
-    ]
-    (shared_stages,) = stages if len(stages) == 1 else ((),)
-    if len(shared_stages) < 2 or min(filter(None, name_counts), default=0) >= len(shared_stages):
-        return ""
-    return " " + tr("Stages in order: {names}.", names=join_names([tr(stage.name) for stage in shared_stages]))
 
 
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
@@ -236,7 +221,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
     quantity, symbol, unit = SIGMAS[component]
     sigma_panels = []
     for result in results:
-        marks: list = list(_stage_lines([result], LETTERS_ACROSS if len(results) == 1 else LETTERS_ACROSS_NARROW))
+        marks: list = list(_stage_lines([result]))
         for f, style in zip(result.axes.filters, _styles(result), strict=True):
             filter_rows = rows.get((result.name, f))
             if filter_rows is not None:
@@ -262,7 +247,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         "intervals. Dotted: ends of the stages.",
         quantity=quantity,
         count=results[0].count if results else 0,
-    ) + _stages_sentence(sigma_panels, results)
+    )
     figure = _figure_of_panels(
         f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, sigma_panels, 76
     )
@@ -285,11 +270,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
         for name, options in zip(result.axes.filters, result.spec.filters, strict=True):
             if len(options.models) < 2:
                 continue
-            marks: list = list(
-                _stage_lines(
-                    [result], LETTERS_ACROSS if len(result.axes.filters) < MAX_LOOKS else LETTERS_ACROSS_NARROW
-                )
-            )
+            marks: list = list(_stage_lines([result]))
             for m, motion in enumerate(_motions(options.models)):
                 columns = ("t_s", "probability", "probability_lo", "probability_hi")
                 model_rows = rows[(result.name, name, m + 1)]
@@ -319,7 +300,6 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
             "Mean posterior probabilities of the models; the numbers after the motions are the spreads of "
             "the random acceleration, m/s². Dotted: ends of the stages."
         )
-        + _stages_sentence(probability_panels, results)
         + left_out
     )
     return _with_paper_number(

@@ -1,0 +1,91 @@
+"""No figure of any width has words cut, or one over the other."""
+
+import io
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from radarsim.api.run import run
+from radarsim.config.find_files import SHIPPED
+from radarsim.papers.forest_plot import forest_plot
+from radarsim.report.drawing import canvas as drawing_canvas
+from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel
+from radarsim.report.drawing.style import MM, PNG_DPI
+from tests.report.test_claims_page import row
+
+CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
+WIDTHS_MM = (85.0, 120.0, 180.0)
+INK = 230  # of 255: a darker pixel is part of a letter or a line
+
+
+def picture(png):
+    """The grey values of a picture, and its width in mm."""
+    with Image.open(io.BytesIO(png)) as image:
+        return np.asarray(image.convert("L")), image.width / PNG_DPI / MM
+
+
+def cut_edges(pixels):
+    """The edges of a picture that have ink."""
+    edges = {"left": pixels[:, 0], "right": pixels[:, -1], "top": pixels[0], "bottom": pixels[-1]}
+    return [name for name, edge in edges.items() if (edge < INK).any()]
+
+
+def faults_of_widths(figures):
+    """Figures that are cut at a width, or cannot be had at it."""
+    faults = []
+    for name, figure in figures.items():
+        for width in WIDTHS_MM:
+            pixels, width_mm = picture(drawing_canvas.save(figure, ("png",), width)["png"])
+            if (edges := cut_edges(pixels)) or round(width_mm) != width:
+                faults.append(f"{name} at {width:g} mm: {width_mm:.0f} mm, cut: {edges}")
+    return faults
+
+
+def claim_figure():
+    rows = [row(f"P9.{n}", measured=value, unit="m/s²") for n, value in enumerate((6.0, -1.317e-13, 123456.0))]
+    return forest_plot([{**one, "statement": "A statement of many words on what a radar gains " * 2} for one in rows])
+
+
+def test_claims_keep_statement_and_unit_at_every_width():
+    figure = claim_figure()
+    assert faults_of_widths({"claims": figure}) == []
+    axes = drawing_canvas.render(drawing_canvas.at_width(figure, COLUMN_MM)).axes[0]
+    names = [text for text in axes.texts if "A statement" in text.get_text()]
+    assert [text.xy[1] for text in names] == [0, 1, 2]
+    boxes = [text.get_window_extent() for text in sorted(axes.texts, key=lambda text: text.get_window_extent().y0)]
+    for below, above in pairwise(boxes):
+        assert below.y1 < above.y0 + 1 or below.x0 > above.x1 or above.x0 > below.x1
+    wide = drawing_canvas.render(replace(figure, width_mm=PAGE_MM)).axes[0]
+    assert not [text for text in wide.texts if "A statement" in text.get_text()]
+
+
+def test_notes_along_the_top_that_would_meet_stand_in_rows():
+    x = np.linspace(0, 186, 50)
+    stages = ((10, "start"), (72, "ballistic"), (147, "manoeuvre"), (178, "after"))
+    notes = tuple(Note(float(at), np.nan, name, "top") for at, name in stages)
+    panel = Panel(Axis("time, s", limits=(0, None)), Axis("y"), (Line(x, x, "Kalman-1 20"), *notes), title="flight")
+    figure = Figure("f", "F", "A flight.", (panel,))
+    for width in WIDTHS_MM:
+        axes = drawing_canvas.render(drawing_canvas.at_width(figure, width)).axes[0]
+        boxes = [text.get_window_extent() for text in axes.texts if text.get_text() in dict(map(reversed, stages))]
+        assert len(boxes) == len(stages)
+        assert not any(a.overlaps(b) for n, a in enumerate(boxes) for b in boxes[n + 1 :])
+        assert axes._left_title.get_window_extent().y0 >= max(box.y1 for box in boxes)
+
+
+def test_a_width_at_which_words_would_be_cut_is_increased_and_said(tmp_path):
+    result = run("rls2", realisations=64, overrides={"figures": ["sigma_r"]})
+    written = result.write(tmp_path, figures="png", width_mm=20)
+    pixels, width_mm = picture((written.folder / "figures" / "sigma_r.png").read_bytes())
+    assert cut_edges(pixels) == []
+    assert f"figure sigma_r: drawn {width_mm:.0f} mm wide, as words would be cut at 20 mm" in result.warnings
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", CONFIGS)
+def test_no_figure_of_a_shipped_config_is_cut(config):
+    result = run(config, realisations=200)
+    assert faults_of_widths(result._figures_by_name) == []
