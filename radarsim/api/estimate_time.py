@@ -47,9 +47,9 @@ def _shift_warning(name: str, shift: int, factor: float) -> str:
     scans = plural("{count} scan", "{count} scans", abs(shift))
     fields = {"name": name, "scans": scans, "factor": f"{factor:.2g}"}
     if shift < 0:
-        return tr("{name}: the estimates fit the truth of {scans} before: their errors are then {factor} times "
-                  "smaller; do they stand too late?", **fields)  # fmt: skip
-    return tr("{name}: the estimates fit the truth of {scans} after: their errors are then {factor} times smaller; do "
+        return tr("{name}: the estimates fit the truth of {scans} earlier: their errors are then {factor} "
+                  "times smaller; do they stand too late?", **fields)  # fmt: skip
+    return tr("{name}: the estimates fit the truth of {scans} later: their errors are then {factor} times smaller; do "
               "they stand too early?", **fields)  # fmt: skip
 
 

@@ -16,7 +16,6 @@ from typing import Any, BinaryIO
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
-from radarsim.recordings.formats.columns import KNOT_MPS
 from radarsim.recordings.formats.records import (
     BATCH_ROWS,
     NO_TIME_OR_POSITION,
@@ -28,6 +27,7 @@ from radarsim.recordings.formats.records import (
     missing_package,
     utc_s,
 )
+from radarsim.recordings.formats.units import KNOT_MPS
 
 pyais: ModuleType | None
 try:

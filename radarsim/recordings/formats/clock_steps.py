@@ -10,7 +10,7 @@ import numpy as np
 MAX_SET_BACKS = 4  # in a recording
 MAX_MISSED_SCANS = 4  # while the clock was set back
 FITTED_ROWS = 8  # of a track, on each side
-MIN_FITTED_ROWS = 5  # on both sides together
+MIN_SIDE_ROWS, MIN_FITTED_ROWS = 2, 5  # on each side, and together
 MIN_MISFIT_RATIO = 4.0  # of sums of squares: rows sorted by time, over those of a clock that was set back
 RELATIVE_RESOLUTION = 1e-6  # of the distances between rows, below which misfits are rounding
 
@@ -94,7 +94,7 @@ def _misfit(t: np.ndarray, positions: np.ndarray, joins: list[_Join], size_s: fl
         times = t[rows] - np.where(np.arange(rows.size) < join.before.size, size_s, 0.0)
         places = positions[rows]
         is_known = np.isfinite(places).all(axis=1)
-        if not (join.before.size and join.after.size and is_known.sum() >= MIN_FITTED_ROWS):
+        if min(join.before.size, join.after.size) < MIN_SIDE_ROWS or is_known.sum() < MIN_FITTED_ROWS:
             continue
         times, places = times[is_known], places[is_known]
         span = float(np.ptp(times)) or 1.0

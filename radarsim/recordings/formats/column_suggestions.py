@@ -4,14 +4,16 @@ A guess is offered as an option to copy, never taken: by names that are alike, b
 the cells of the first rows."""
 
 import difflib
+import math
 import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 
+from radarsim.recordings.formats.units import TURNS
+
 MIN_LIKENESS = 0.72  # of two names, by difflib
 MIN_PART_LETTERS = 3  # of a name that begins or ends another
 MIN_METRES = 500.0  # of the largest range: smaller numbers are kilometres
-TURNS = {"acp": 4096, "acp8192": 8192, "acp16384": 16384, "acp65536": 65536}  # an encoder's counts in a turn, by unit
 TIME_CELL = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}.*|\d{1,2}:\d\d.*")
 
 
@@ -36,7 +38,7 @@ def suggest_options(
             continue
         free.remove(best)
         name = unit_of(ours, stems[best][1]) if stems[best][1] else ""
-        options.append(f"--column {name or _name_by_cells(ours, _cells(sample, best))}={shlex.quote(names[best])}")
+        options.append(f"--column {name or name_by_cells(ours, _cells(sample, best))}={shlex.quote(names[best])}")
     return options
 
 
@@ -68,11 +70,18 @@ def _likeness(stem: str, known_names: Sequence[str]) -> float:
     return best if best >= MIN_LIKENESS else 0.0
 
 
-def _numbers(cells: Sequence[str]) -> list[float] | None:
+def cell_number(cell: str) -> float:
+    """The number in a cell, with a decimal point or comma; not-a-number of another text."""
     try:
-        return [float(cell.replace(",", ".")) for cell in cells if cell]
+        return float(cell.strip().replace(",", "."))
     except ValueError:
-        return None
+        return math.nan
+
+
+def _numbers(cells: Sequence[str]) -> list[float] | None:
+    """The numbers in cells that are not empty; None where one is none."""
+    numbers = [cell_number(cell) for cell in cells if cell]
+    return None if any(map(math.isnan, numbers)) else numbers
 
 
 def _rises(cells: Sequence[str]) -> bool:
@@ -85,12 +94,12 @@ def _rises(cells: Sequence[str]) -> bool:
     )
 
 
-def _name_by_cells(ours: str, cells: Sequence[str]) -> str:
-    """A quantity with a unit that its numbers suggest."""
+def name_by_cells(ours: str, cells: Sequence[str]) -> str:
+    """The name of a quantity in the unit that its numbers suggest."""
     largest = max(map(abs, _numbers(cells) or [0.0]), default=0.0)
     if ours == "range_m":
         return "range_m" if largest >= MIN_METRES else "range_km"
     if ours == "bearing_rad":
-        turns = {"rad": 6.3, "deg": 360, **TURNS}
+        turns = {"rad": 6.3, "deg": 360.5, **TURNS}
         return f"bearing_{next((unit for unit, turn in turns.items() if largest <= turn), 'deg')}"
     return ours

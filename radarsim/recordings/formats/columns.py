@@ -5,39 +5,27 @@ A column is found by its name, whatever its case and spaces, in English, German 
 positions with names from aviation (`gs`, `alt_baro`, …) are in feet, knots and feet a minute, and speeds of ships in
 knots, like the exports that use them. Ranges and bearings have no such convention: their units must be stated."""
 
-import math
-import re
 import shlex
 import types
-import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
-from radarsim.recordings.formats.column_suggestions import TURNS, suggest_options
+from radarsim.recordings.formats.column_suggestions import name_by_cells, suggest_options
+from radarsim.recordings.formats.units import (
+    DEGREES,
+    FLIGHT_LEVELS,
+    HEIGHTS,
+    LENGTHS,
+    RADIANS,
+    SPEEDS,
+    TIME_UNITS,
+    UNITS,
+    split_unit,
+)
 
-KNOT_MPS = 1852 / 3600
-
-LENGTHS = {"m": 1.0, "km": 1e3, "ft": 0.3048, "feet": 0.3048, "nm": 1852.0, "nmi": 1852.0}
-HEIGHTS, FLIGHT_LEVELS = {**LENGTHS, "fl": 30.48}, ("fl", "flight_level")  # of 100 ft; names that are this unit
-SPEEDS = {
-    **dict.fromkeys(("mps", "m/s", "ms"), 1.0), **dict.fromkeys(("kn", "kt", "kts", "knots"), KNOT_MPS),
-    **dict.fromkeys(("kmh", "km/h"), 1 / 3.6), **dict.fromkeys(("fpm", "ft/min"), 0.3048 / 60),
-}  # fmt: skip
-DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 / math.pi}
-RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()}
-RADIANS |= {unit: 2 * math.pi / turn for unit, turn in ({"acp": TURNS["acp"], "gon": 400, "mil": 6400} | TURNS).items()}
 MAX_NAMED_UNITS = 4  # in a fault, beside the first
-DAYS = "days"  # of a spreadsheet, of Matlab, Julian ones: numbers that `cell_times` tells apart
-CLOCK_DIGITS = "hhmmss"  # a time of day as a number, 120006.25
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0}  # dmy: day before month
-TIME_UNITS |= {DAYS: 1.0, CLOCK_DIGITS: 1.0}
-UNIT_SYNONYMS = {  # German and Russian
-    **{"м": "m", "км": "km", "м/с": "m/s", "км/ч": "km/h", "уз": "kn", "узлы": "kn", "knoten": "kn", "sm": "nm"},
-    **{"град": "deg", "град.": "deg", "grad": "deg", "рад": "rad", "с": "s", "сек": "s", "sek": "s", "мс": "ms"},
-    **{"футы": "ft", "фут": "ft", "tage": DAYS, "дни": DAYS},
-}
 
 
 class Quantity(NamedTuple):
@@ -89,13 +77,15 @@ QUANTITIES = {
 }  # fmt: skip
 FOREIGN_NAMES = {  # German and Russian; looked for where no English name is found
     "t_s": (
-        *("zeit", "uhrzeit", "zeitstempel", "zeitpunkt", "datum_uhrzeit", "datum"),
-        *("время", "метка_времени", "дата_время", "дата_и_время", "дата"),
+        *("zeit", "uhrzeit", "zeitstempel", "zeitpunkt", "messzeit", "utc-zeit", "zeit_utc", "datum_uhrzeit"),
+        *("datum/uhrzeit", "datum_und_uhrzeit", "datum", "время", "метка_времени", "время_измерения"),
+        *("время_локации", "дата_время", "дата/время", "дата_и_время", "дата"),
     ),
     "date": ("datum", "дата"),
     "track": (
-        *("spur", "spurnummer", "ziel", "zielnummer", "track_nr", "track-nr", "kennung"),
-        *("трасса", "номер_трассы", "цель", "номер_цели", "борт"),
+        *("spur", "spurnummer", "spur-nr", "spur_nr", "spurnr", "ziel", "zielnummer", "ziel-nr", "ziel_nr", "zielnr"),
+        *("track_nr", "track-nr", "tracknr", "objekt", "objekt-nr", "kennung"),
+        *("трасса", "номер_трассы", "№_трассы", "трасса_№", "цель", "номер_цели", "№_цели", "цель_№", "борт", "№"),
     ),
     "latitude_deg": ("breite", "breitengrad", "широта"),
     "longitude_deg": ("länge", "laenge", "längengrad", "laengengrad", "долгота"),
@@ -103,13 +93,15 @@ FOREIGN_NAMES = {  # German and Russian; looked for where no English name is fou
     "speed_mps": ("geschwindigkeit", "fahrt", "скорость", "путевая_скорость"),
     "course_deg": ("kurs", "курс"),
     "range_m": (
-        *("entfernung", "entf", "entf.", "schrägentfernung", "schraegentfernung", "distanz", "abstand"),
-        *("дальность", "наклонная_дальность", "расстояние"),
+        *("entfernung", "entf", "schrägentfernung", "schraegentfernung", "zielentfernung", "schrägdistanz"),
+        *("distanz", "abstand", "дальность", "наклонная_дальность", "дальность_наклонная", "дальность_до_цели"),
+        "расстояние",
     ),
-    "bearing_rad": ("azimut", "peilung", "азимут", "пеленг"),
+    "bearing_rad": ("azimut", "peilung", "peilwinkel", "seitenwinkel", "азимут", "аз", "пеленг"),
     "velocity_mps": (
-        *("vr", "v_r", "radialgeschwindigkeit", "dopplergeschwindigkeit"),
-        *("радиальная_скорость", "доплеровская_скорость", "доплер"),
+        *("vr", "v_r", "vrad", "v_rad", "vрад", "radialgeschwindigkeit", "radialgeschw", "dopplergeschwindigkeit"),
+        *("dopplergeschw", "радиальная_скорость", "скорость_радиальная", "доплеровская_скорость", "допл_скорость"),
+        *("допплеровская_скорость", "доплер", "допплер"),
     ),
 }
 IDENTITIES = {  # what identifies an aircraft or a ship, by the names of columns
@@ -117,10 +109,10 @@ IDENTITIES = {  # what identifies an aircraft or a ship, by the names of columns
     "callsign": ("callsign", "flight"),
     "mode_3a": ("squawk", "mode_3a", "mode3a", "ssr"),
 }
-UNITS = {unit for quantity in QUANTITIES.values() for unit in quantity.units if unit}
 UNITLESS = ("t_s", "date", "track")  # what a bracket says of these is no unit: Time (UTC)
 EARTH_COLUMNS = ("latitude_deg", "longitude_deg")
 PLOT_COLUMNS = ("range_m", "bearing_rad")
+OPTIONAL_PLOT_COLUMNS = ("bearing_rad", "velocity_mps", "track")
 JOINT_POSITION = "position"  # latitude and longitude in one cell, parted by a comma
 AVIATION_NAMES = (  # names without a unit
     *("gs", "groundspeed", "ground_speed", "alt", "alt_baro", "alt_geom", "direction", "mode_c", "modec"),
@@ -129,8 +121,6 @@ AVIATION_UNITS = {"altitude_m": "ft", "barometric_m": "ft", "speed_mps": "kn", "
 MARITIME_NAMES = ("sog", "cog", "mmsi")  # names of AIS
 HEADING_NAME = "heading"
 MARITIME_UNITS = {"speed_mps": "kn"}
-UNIT_PATTERN = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
-COMMA_UNIT_PATTERN = re.compile(r"^(.*?)\s*,\s*(\S+)$")
 
 
 class Column(NamedTuple):
@@ -142,22 +132,6 @@ class Column(NamedTuple):
     factor: float
     unit: str
     is_assumed: bool
-
-
-def split_unit(name: str) -> tuple[str, str]:
-    """A column's name without its unit, in lower case, and its unit: `Range [km]`, `range_km` and `Range, km` are
-    (range, km)."""
-    name = unicodedata.normalize("NFC", name).strip().lower()
-    if match := UNIT_PATTERN.match(name):
-        unit = match[2].strip()
-        return re.sub(r"\s+", "_", match[1].strip()), UNIT_SYNONYMS.get(unit, unit)
-    match = COMMA_UNIT_PATTERN.match(name)
-    if match and (unit := UNIT_SYNONYMS.get(match[2], match[2])) in UNITS:
-        return re.sub(r"\s+", "_", match[1]), unit
-    name = re.sub(r"\s+", "_", name)
-    stem, _, last = name.rpartition("_")
-    unit = UNIT_SYNONYMS.get(last, last)
-    return (stem, unit) if stem and unit in UNITS else (name, "fl" if name in FLIGHT_LEVELS else "")
 
 
 def known_names(ours: str) -> tuple[str, ...]:
@@ -183,6 +157,9 @@ class Header:
         self.aviation = any((name, "") in self.stems for name in AVIATION_NAMES)
         self.customary_units = AVIATION_UNITS if self.aviation else MARITIME_UNITS if self.maritime else {}
         self.columns: dict[str, Column] = {}
+        self.user_units: set[str] = set()  # quantities whose unit the user states
+        self.overruled: list[tuple[str, str, str]] = []  # names of columns, the unit that the user states, their own
+        self.unknown_units: dict[str, str] = {}  # of columns found, by quantity
         self._assign_columns(assigned)
         has_positions = all(self._has(ours) or JOINT_POSITION in dict(self.stems) for ours in EARTH_COLUMNS)
         self.reads_positions = has_positions and not any(ours in self.columns for ours in PLOT_COLUMNS)
@@ -212,12 +189,14 @@ class Header:
                     f"a column of {', '.join(self.names)}" if ours else f"one of {', '.join(QUANTITIES)}, in any unit"
                 )
                 raise ConfigError(f"{self.path}:1: column {name}={theirs}: must name {allowed}")
-            stated_unit = split_unit(theirs)[1]
-            if unit and stated_unit and name != ours and unit != stated_unit:
-                raise ConfigError(
-                    f"{self.path}:1: column {name}={theirs}: must have the unit of its own name, {stated_unit}"
-                )
-            self.columns[ours] = self._column(ours, self.names.index(theirs), stated_unit or unit)
+            stated_unit, units = split_unit(theirs)[1], QUANTITIES[ours].units
+            if name == ours or not unit:
+                unit = stated_unit if stated_unit in units else unit
+            else:
+                self.user_units.add(ours)
+            if stated_unit in units and units[stated_unit] != units.get(unit):
+                self.overruled.append((theirs, unit, stated_unit))
+            self.columns[ours] = self._column(ours, self.names.index(theirs), unit)
 
     def _column_indices(self) -> dict[str, int]:
         """The index of each name, of the first column that has it."""
@@ -256,9 +235,7 @@ class Header:
             raise ConfigError(f"{self.path}:1: {name}: must be the name of one column; several have it")
         is_known = unit in quantity.units or ours in UNITLESS
         if unit and not is_known:
-            raise ConfigError(
-                f"{self.path}:1: {name}: the unit must be one of {', '.join(quantity.units)}; got {unit!r}"
-            )
+            self.unknown_units[ours] = unit
         unit_or_default = unit or self.customary_units.get(ours, quantity.default_unit)
         is_assumed = not unit and ours not in UNITLESS and quantity.units is not DEGREES
         return Column(index, name, quantity.units.get(unit_or_default, 1.0), unit_or_default, is_assumed)
@@ -266,7 +243,7 @@ class Header:
     def _check(self) -> None:
         """Raise ConfigError for missing columns, and for units that must be stated, all at once."""
         required = ("t_s", *EARTH_COLUMNS) if self.reads_positions else ("t_s", "range_m")
-        faults = []
+        faults = [self._unknown_unit_fault(ours, unit) for ours, unit in self.unknown_units.items()]
         if missing := [name for name in required if name not in self.columns]:
             got = ", ".join(self.names)[:200] or "nothing"
             needed = "columns of time, and of latitude and longitude or of range (name them: --column OURS=THEIRS)"
@@ -289,12 +266,25 @@ class Header:
         if faults:
             raise ConfigError(*faults)
 
-    def _guesses(self, missing: Sequence[str]) -> list[str]:
+    def _unknown_unit_fault(self, ours: str, unit: str) -> str:
+        name, units = self.columns[ours].name, ", ".join(QUANTITIES[ours].units)
+        cure = f"--column {name_by_cells(ours, self._cells(ours))}={shlex.quote(name)}"
+        return f"{self.path}:1: {name}: the unit must be one of {units}; got {unit!r}; it is stated by {cure}"
+
+    def _cells(self, ours: str) -> list[str]:
+        """The cells of a quantity's column in the sample."""
+        position = self.columns[ours].position
+        return [row[position].strip() for row in self.sample if position < len(row)]
+
+    def _guesses(self, missing: Sequence[str], optional: Sequence[str] = OPTIONAL_PLOT_COLUMNS) -> list[str]:
         """The options that may name the missing columns, and others of a plot that no name is known of."""
-        optional = () if self.reads_positions else ("bearing_rad", "velocity_mps", "track")
-        quantities = [*missing, *(ours for ours in optional if ours not in self.columns)]
+        quantities = [*missing, *(ours for ours in optional if ours not in self.columns and not self.reads_positions)]
         used = {column.position for column in self.columns.values()}
-        stems = [("", "") if i in used else stem for i, stem in enumerate(self.stems)]
+        other_names = {name for ours in QUANTITIES if ours not in quantities for name in known_names(ours)}
+        stems = [
+            ("", "") if i in used or stem in other_names else (stem, unit if unit in UNITS else "")
+            for i, (stem, unit) in enumerate(self.stems)
+        ]
         return suggest_options({ours: known_names(ours) for ours in quantities}, _name_with_unit, stems, self.names,
                              self.sample)  # fmt: skip
 
@@ -303,6 +293,12 @@ class Header:
         assumed = [column for column in self.columns.values() if column.is_assumed and column.unit]
         unit_texts = ", ".join(tr("{name} in {unit}", name=column.name, unit=column.unit) for column in assumed)
         lines = [tr("assumed because the name has no unit: {units}", units=unit_texts)] if unit_texts else []
+        lines += [
+            tr("{name} is read in {unit}, as --column says, not in {stated}", name=name, unit=unit, stated=stated)
+            for name, unit, stated in self.overruled
+        ]
+        if guesses := self._guesses((), ("bearing_rad", "velocity_mps")):
+            lines.append(tr("columns that may be read too: {options}", options=" ".join(guesses)))
         time = self.columns["t_s"].name
         names_by_stem = {stem: name for (stem, _), name in zip(self.stems, self.names, strict=True)}
         used = {column.name for column in self.columns.values()}

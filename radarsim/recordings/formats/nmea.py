@@ -13,27 +13,31 @@ from radarsim.recordings.formats.cell_text import cell_text, finite_number
 from radarsim.recordings.formats.sheet import Sheet
 
 NMEA_COLUMNS = {"lat": "lat", "lon": "lon", "speed": "speed [kn]", "course": "course [deg]", "altitude": "altitude [m]"}
-TARGET_COLUMNS = {"track": "track", "range": "range [m]", "bearing": "bearing [deg]", "altitude": "altitude [m]"}
-SENTENCE_PATTERN = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC|TTM),[^\r\n]*")
-TARGET_PATTERN = re.compile(rb"\$[A-Z]{2}TTM,[^\r\n]*")
-HEADING_PATTERN = re.compile(rb"\$[A-Z]{2}HDT,([\d.]+),T[^\r\n]*")
+TARGET_COLUMNS = {  # of targets by their distance and bearing (TTM), and by their place (TLL)
+    b"TTM": {"track": "track", "range": "range [m]", "bearing": "bearing [deg]", "altitude": "altitude [m]"},
+    b"TLL": {"track": "track", "lat": "lat", "lon": "lon", "altitude": "altitude [m]"},
+}
+SENTENCE_PATTERN = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC|ZDA|TTM|TLL),[^\r\n]*")
+TARGET_PATTERN = re.compile(rb"\$[A-Z]{2}(TTM|TLL),[^\r\n]*")
+HEADING_PATTERN = re.compile(rb"\$[A-Z]{2}(?:HDT,([\d.]+),T|THS,([\d.]+),A)[^\r\n]*")
 DISTANCE_UNITS_M = {"N": 1852.0, "K": 1000.0, "S": 1609.344}
 FIRST_SECOND_OF_MINUTE = 60.0
 LEAP_SECOND_REASON = term("sentences in a leap second (23:59:60), which seconds from 1970 do not count")
-DATED_SENTENCE = re.compile(rb"\$[A-Z]{2}RMC,[^,]*,A(?:,[^,]*){6},\d{6}")
+NO_CLOCK_REASON = term("targets whose time neither they nor sentences RMC, GGA or ZDA state")
+DATED_SENTENCE = re.compile(rb"\$[A-Z]{2}(?:RMC,[^,]*,A(?:,[^,]*){6},\d{6}|ZDA,\d{6}[^,]*,\d\d,\d\d,\d{4})")
 CLOCK_PATTERN = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-6]\d(?:\.\d+)?)")
 
 
 def read_nmea(path: str, file: BinaryIO, only_positions: bool = False) -> Sheet:
     """Positions by a satellite receiver, NMEA 0183: RMC (place, speed, course, date) and GGA (place, height), of any
     talker, those of one time as one row. Heights are above the ellipsoid where GGA has that of the geoid. Where the
-    first sentences have targets of a radar (TTM), these are read instead, unless only positions are wanted.
+    first sentences have targets of a radar (TTM, else TLL), these are read instead, unless only positions are wanted.
 
-    Where no RMC stands among the first sentences, dates are left alone: times are of the day."""
+    Where no RMC or ZDA stands among the first sentences, dates are left alone: times are of the day."""
     head = file.peek(io.DEFAULT_BUFFER_SIZE)  # type: ignore[attr-defined]
     has_dates = bool(DATED_SENTENCE.search(head))
-    if TARGET_PATTERN.search(head) and not only_positions:
-        return _read_targets(path, file, has_dates)
+    if (kinds := set(TARGET_PATTERN.findall(head))) and not only_positions:
+        return _read_targets(path, file, has_dates, max(kinds))
     sheet = Sheet(path, ["time", *NMEA_COLUMNS.values()], iter(()), is_one_track=True)
 
     def rows() -> Iterator[tuple[int, list[str]]]:
@@ -42,6 +46,9 @@ def read_nmea(path: str, file: BinaryIO, only_positions: bool = False) -> Sheet:
         number, dates = 0, _Dates()
         for number, line in enumerate(file, start=1):
             sentence = _parse_fix(line, sheet) if line.strip() else {}
+            if sentence and "lat" not in sentence:  # ZDA
+                dates.time(sentence["clock"], sentence.get("midnight"))
+                continue
             head, place = line.lstrip()[:6], (sentence.get("lat", math.nan), sentence.get("lon", math.nan))
             if fix and sentence and (sentence["clock"] != fix["clock"] or places.get(head, place) != place):
                 yield number - 1, _fix_cells(fix)
@@ -72,56 +79,78 @@ class _Dates:
         return self.midnight + clock
 
 
-def _read_targets(path: str, file: BinaryIO, has_dates: bool) -> Sheet:
-    """The targets that a ship's radar tracks (TTM): number, distance, bearing, time of day; bearings from the bow are
-    turned by the heading (HDT) before them. Lost targets and own positions are left out."""
-    sheet = Sheet(path, ["time", *TARGET_COLUMNS.values()], iter(()))
+def _read_targets(path: str, file: BinaryIO, has_dates: bool, kind: bytes) -> Sheet:
+    """The targets that a ship's radar tracks, of sentences of a kind: number, place, time of day; bearings from the bow
+    are turned by the heading (HDT, THS) before them. Lost targets, those of the other kind and own positions are left
+    out. A target that states no time has that of the clock before it, else of the first."""
+    columns = TARGET_COLUMNS[kind]
+    sheet = Sheet(path, ["time", *columns.values()], iter(()))
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         dates, heading, own_clock = _Dates(), math.nan, math.nan
+        waiting: list[tuple[int, dict[str, Any]]] = []  # for the first clock
+
+        def cells_of(target: dict[str, Any]) -> list[str]:
+            clock = target["clock"]
+            time = dates.time(clock) if has_dates else math.nan
+            texts = (cell_text(target[name]) for name in columns)
+            return [cell_text(_clock_text(clock) if math.isnan(time) else time), *texts]
+
         for number, line in enumerate(file, start=1):
             if match := HEADING_PATTERN.search(line):
-                heading = _parse_number(match[1].decode("ascii"))
-            elif not TARGET_PATTERN.search(line):
-                fix = _parse_fix(line, sheet) if line.strip() else {}
-                if fix:
-                    own_clock = fix["clock"]
-                    dates.time(own_clock, fix.get("midnight"))
+                heading = _parse_number((match[1] or match[2]).decode("ascii"))
+            elif target_match := TARGET_PATTERN.search(line):
+                if target_match[1] != kind:
+                    sheet.skipped[term("targets by their place, beside their plots")] += 1
+                elif target := _parse_target(target_match, heading, sheet):
+                    target["clock"] = own_clock if math.isnan(target["clock"]) else target["clock"]
+                    if math.isnan(target["clock"]):
+                        waiting.append((number, target))
+                    else:
+                        yield number, cells_of(target)
+            elif line.strip() and (fix := _parse_fix(line, sheet)):
+                own_clock = fix["clock"]
+                dates.time(own_clock, fix.get("midnight"))
+                if "lat" in fix:
                     sheet.skipped[term("positions of the ship itself, beside its radar's targets")] += 1
-            elif target := _parse_target(line, heading, own_clock, sheet):
-                clock = target.pop("clock")
-                time = dates.time(clock) if has_dates else math.nan
-                cells = [target[name] for name in TARGET_COLUMNS]
-                yield number, [cell_text(_clock_text(clock) if math.isnan(time) else time), *map(cell_text, cells)]
+                for waiting_number, target in waiting:
+                    yield waiting_number, cells_of(target | {"clock": own_clock})
+                waiting = []
+        if waiting:
+            sheet.skipped[NO_CLOCK_REASON] += len(waiting)
 
     sheet.rows = rows()
     return sheet
 
 
-def _parse_target(line: bytes, heading: float, own_clock: float, sheet: Sheet) -> dict[str, Any]:
-    """The values of TARGET_COLUMNS of a sentence TTM and its `clock`, s of the day, or that of the sentence before it;
-    empty where it has no place, or is of a lost target."""
-    match = TARGET_PATTERN.search(line)
-    assert match is not None
+def _parse_target(match: re.Match[bytes], heading: float, sheet: Sheet) -> dict[str, Any]:
+    """The values of TARGET_COLUMNS of a sentence and its `clock`, s of the day, not-a-number if it states none; empty
+    where it has no place, or is of a lost target."""
     if b"*" in match[0] and not ais.has_valid_checksum(match[0]):
         sheet.skipped[term("damaged sentences")] += 1
         return {}
-    _, name, distance, bearing, reference, *cells = [
-        *match[0].partition(b"*")[0].decode("ascii", "replace").split(","),
-        *[""] * 16,
-    ]
-    unit_m, status, time = DISTANCE_UNITS_M.get(cells[5].strip()), cells[7].strip(), CLOCK_PATTERN.fullmatch(cells[9])
-    clock = _clock_s(time) if time else own_clock
-    angle = _parse_number(bearing) + (heading if reference == "R" else 0.0)
-    if status == "L":
-        sheet.skipped[term("targets that the radar has lost")] += 1
-    elif reference == "R" and math.isnan(heading):
-        sheet.skipped[term("targets by the bow, whose heading no sentence HDT states")] += 1
-    elif unit_m is None or math.isnan(clock + angle + _parse_number(distance)):
-        sheet.skipped[records.NO_TIME_OR_POSITION] += 1
+    _, name, *cells = [*match[0].partition(b"*")[0].decode("ascii", "replace").split(","), *[""] * 16]
+    is_place = match[1] == b"TLL"
+    status, time = (cells[6], cells[5]) if is_place else (cells[10], cells[12])
+    clock_match = CLOCK_PATTERN.fullmatch(time.strip())
+    target: dict[str, Any] = {"clock": _clock_s(clock_match) if clock_match else math.nan, "track": name}
+    target["altitude"] = 0.0  # at sea
+    if is_place:
+        target |= {"lat": _angle_deg(*cells[0:2]), "lon": _angle_deg(*cells[2:4])}
+        place = target["lat"] + target["lon"]
     else:
-        place = {"range": _parse_number(distance) * unit_m, "bearing": angle % 360, "altitude": 0.0}  # at sea
-        return {"clock": clock, "track": name, **place}
+        angle = _parse_number(cells[1]) + (heading if cells[2] == "R" else 0.0)
+        unit_m = DISTANCE_UNITS_M.get(cells[8].strip(), math.nan)
+        target |= {"range": _parse_number(cells[0]) * unit_m, "bearing": angle % 360}
+        place = target["range"] + (0.0 if cells[2] == "R" else angle)
+    if status.strip() == "L":
+        sheet.skipped[term("targets that the radar has lost")] += 1
+    elif math.isnan(place):
+        sheet.skipped[records.NO_TIME_OR_POSITION] += 1
+    elif not is_place and math.isnan(target["bearing"]):
+        sheet.skipped[term("targets by the bow, whose heading no sentence HDT states")] += 1
+    else:
+        return target
     return {}
 
 
@@ -143,13 +172,17 @@ def _clock_s(match: re.Match[str]) -> float:
 
 
 def _parse_fix(line: bytes, sheet: Sheet) -> dict[str, float]:
-    """The numbers of a sentence by the names of NMEA_COLUMNS, `clock` in s of the day; empty without a fix."""
+    """The numbers of a sentence by the names of NMEA_COLUMNS, `clock` in s of the day; empty without a fix; of
+    ZDA only times."""
     match = SENTENCE_PATTERN.search(line)
     if not match or (b"*" in match[0] and not ais.has_valid_checksum(match[0])):
         sheet.skipped[term("damaged sentences") if match else term("other lines")] += 1
         return {}
     kind, clock, *cells = [*match[0].partition(b"*")[0].decode("ascii", "replace").split(","), *[""] * 12]
     time = CLOCK_PATTERN.fullmatch(clock)
+    if kind.endswith("ZDA"):
+        day, month, year = cells[:3]
+        return {"clock": _clock_s(time), **_midnight(f"{year}-{month}-{day}")} if time else {}
     is_rmc = kind.endswith("RMC")  # the place then begins one later
     if not time or (cells[0] != "A" if is_rmc else cells[4] in ("", "0")):
         sheet.skipped[term("sentences without a fix")] += 1
@@ -164,9 +197,14 @@ def _parse_fix(line: bytes, sheet: Sheet) -> dict[str, float]:
         return fix | {"altitude": sea + (0 if math.isnan(geoid) else geoid)}
     fix |= {"speed": _parse_number(cells[5]), "course": _parse_number(cells[6])}
     day = cells[7]
+    return fix | _midnight(f"{'19' if day[4:] > '79' else '20'}{day[4:]}-{day[2:4]}-{day[:2]}")
+
+
+def _midnight(date: str) -> dict[str, float]:
+    """The `midnight` at which a day begins, s from 1970; empty where there is no such day."""
     with contextlib.suppress(ValueError):
-        fix["midnight"] = records.utc_s(f"{'19' if day[4:] > '79' else '20'}{day[4:]}-{day[2:4]}-{day[:2]}")
-    return fix
+        return {"midnight": records.utc_s(date)}
+    return {}
 
 
 def _angle_deg(text: str, side: str) -> float:

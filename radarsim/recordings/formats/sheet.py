@@ -18,7 +18,8 @@ from typing import TextIO
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term
-from radarsim.recordings.formats.columns import QUANTITIES, known_names, split_unit
+from radarsim.recordings.formats.columns import QUANTITIES, known_names
+from radarsim.recordings.formats.units import split_unit
 
 DELIMITERS = ",;\t"
 SAMPLE_LINES = 20  # lines after the header that show the separator, and what the columns hold

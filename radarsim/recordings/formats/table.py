@@ -14,14 +14,15 @@ from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats import cell_times, columns, records, table_checks
 from radarsim.recordings.formats.cell_times import TIME_FORMATS
-from radarsim.recordings.formats.column_suggestions import TURNS
+from radarsim.recordings.formats.column_suggestions import cell_number
 from radarsim.recordings.formats.columns import EARTH_COLUMNS, Header
 from radarsim.recordings.formats.sheet import Sheet
+from radarsim.recordings.formats.units import CLOCK_DIGITS, DAYS, DEGREES, KNOT_MPS, TURNS
 from radarsim.recordings.row_faults import Faults
 
 LARGEST_NUMBER = 1e15
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
-MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * columns.KNOT_MPS, 360.0  # of AIS: what is not below them means missing
+MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * KNOT_MPS, 360.0  # of AIS: what is not below them means missing
 UNKNOWN_POSITION, UNKNOWN_DEGREES = (91.0, 181.0), (999.0, 9999.0, 99999.0)  # of AIS, and of other exports
 MISSING_TEXTS = ("nan", "null", "none", "na", "n/a", "#n/a")
 THOUSANDS_PATTERN = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand or a decimal
@@ -33,6 +34,8 @@ GROUPED_PATTERN = re.compile(  # 1,234.5, 1.234,5, 1 234,5 and 1,234,567: commas
 MIDNIGHT_S = 3600.0  # a falling time of day has passed midnight if both are as near it; else a file is sorted by track
 STILL_MPS = 1.0  # below it a position may stay the same
 MAX_CELL_VALUES = 10_000  # different cells in a column that may name aircraft
+MAX_LIKELY_TURNS = 3  # units of bearings that are named
+NOISE_TURNS = 1 + 10 / 360  # up to which a bearing beyond north is noise
 MAX_ALTITUDE_M = 20_000.0  # of an aircraft; higher altitudes are feet
 LEAP_SECOND_REASON = term("rows in a leap second (23:59:60), which seconds from 1970 do not count")
 
@@ -59,6 +62,7 @@ class Table:
         self.has_clock_times = False  # times of day or dates were read
         self.is_checked = False  # whether the first batch has been looked at
         self.long_step: tuple[float, str] | None = None  # from row to row, if longer than a scan, and the likely unit
+        self.largest_bearing = 0.0  # of those beyond a turn, in the unit of its column
         self.flight_level_column = ""  # whose numbers were taken as hundreds of feet
         self.slashed_dates: dict[str, str] = {}  # the first date of 1/2/2024 by what it shows: the order, or nothing
         self.last_positions: dict[str, tuple[float, ...]] = {}  # the last position of each track
@@ -108,6 +112,12 @@ class Table:
             name = (self.columns.get("altitude_m") or self.columns["barometric_m"]).name
             message = term("altitudes up to {highest:.0f} m: if {name} is in feet, name it {name}_ft")
             lines.append(tr(message, highest=self.highest_m, name=name))
+        bearing = self.columns.get("bearing_rad")
+        is_in_degrees = bearing is not None and bearing.unit in DEGREES and bearing.unit != "rad"
+        if bearing is not None and is_in_degrees and 360 * NOISE_TURNS < self.largest_bearing <= TURNS["gon"]:
+            option = f"--column bearing_gon={shlex.quote(bearing.name)}"
+            message = term("bearings up to {largest:.1f}° are read as beyond a turn; if they are in gon: {option}")
+            lines.append(tr(message, largest=self.largest_bearing, option=option))
         if likely := self._likely_track_columns():
             lines.append(tr("no column identifies the tracks, all rows are taken as one; if a column does, "
                             "--column track=THEIRS; it may be: {likely}", likely=likely))  # fmt: skip
@@ -157,11 +167,13 @@ class Table:
         if not self.is_checked:
             self.is_checked = True
             time = self.columns["t_s"]
-            if time.unit not in (columns.DAYS, columns.CLOCK_DIGITS) and not self.has_clock_times:
+            if time.unit not in (DAYS, CLOCK_DIGITS) and not self.has_clock_times:
                 first_cell = next((row[time.position] for row in self.sheet.sample), f"{batch.columns['t_s'][0]:.15g}")
                 table_checks.refuse_clock_digits(batch, self.path, time.name, first_cell)
                 table_checks.refuse_day_numbers(batch, self.path, time.name, "date" in self.columns, first_cell)
                 self.long_step = table_checks.long_step(batch)
+            if "bearing_rad" in self.columns and "bearing_rad" not in self.header.user_units:
+                table_checks.refuse_wrapped_bearings(batch, self.path, self.columns["bearing_rad"])
             if factor := table_checks.flight_level_factor(batch, self.columns):
                 (self.flight_level_column,) = table_checks.assumed_altitude(self.columns)
                 ours = "altitude_m" if "altitude_m" in self.columns else "barometric_m"
@@ -224,18 +236,29 @@ class Table:
     def _bearing(self, cells: list[str]) -> float:
         """The bearing, rad; beyond a full turn by noise it is turned back."""
         bearing, column = self._parse_number(cells, "bearing_rad"), self.columns.get("bearing_rad")
-        turn = 4 * math.pi if column is None or column.unit not in TURNS else 2 * math.pi  # counts have no noise
-        if abs(bearing) > 2 * math.pi or bearing > turn:
-            if column is not None and not -2 * math.pi <= bearing <= turn:
+        if column is not None and abs(bearing) > 2 * math.pi:
+            number = bearing / column.factor
+            most = 4 * math.pi if not column.unit.startswith("acp") else 2 * math.pi  # counts have no noise
+            if not -2 * math.pi <= bearing <= most:
                 must = f"must be within a turn, in {column.unit}"
-                number = bearing / column.factor
-                name = shlex.quote(column.name)
-                likely = [f"{count} a turn: --column bearing_{unit}={name}" for unit, count in TURNS.items()
-                          if number <= count and column.unit != unit]  # fmt: skip
-                cure = f"if it counts {', '.join(likely[:2])}" if likely and number > 0 else ""
+                cure = f"if it counts {self._likely_turns(column, number)}" if number > 0 else ""
                 self._add_fault("bearing_rad", must, repr(cells[column.position].strip()[:60]), cure)
+            self.largest_bearing = max(self.largest_bearing, number)
             return bearing % (2 * math.pi)
         return bearing
+
+    def _likely_turns(self, column: columns.Column, number: float) -> str:
+        """The units, at most MAX_LIKELY_TURNS, in which a number and those of the sample are within a turn."""
+        sample = [cell_number(row[column.position]) for row in self.sheet.sample if column.position < len(row)]
+        largest = max([number, *(value for value in sample if not math.isnan(value))])
+        turns = {"deg": 360, **TURNS} if column.unit == "rad" else TURNS
+        name = shlex.quote(column.name)
+        likely = [
+            f"{turn} a turn: --column bearing_{unit}={name}"
+            for unit, turn in sorted(turns.items(), key=lambda item: item[1])
+            if largest <= turn and column.unit != unit
+        ]
+        return ", ".join(likely[:MAX_LIKELY_TURNS])
 
     def _altitude(self, cells: list[str]) -> float:
         """The geometric altitude, m; where there is none the barometric one; of a ship 0."""
@@ -259,11 +282,11 @@ class Table:
                 t = float(self._with_decimal_point(text)) * column.factor
             except ValueError:
                 return self._parse_time(text, cells)
-            if column.unit == columns.CLOCK_DIGITS:
+            if column.unit == CLOCK_DIGITS:
                 return self._at_date(cell_times.clock_digits_s(t), cells)
             if (date := cell_times.digits_date_s(text)) is not None:
                 return date
-            if column.unit == columns.DAYS:
+            if column.unit == DAYS:
                 is_time_of_day = 0 <= t < 1
                 return self._at_date(t * records.DAY_S, cells) if is_time_of_day else cell_times.day_number_s(t)
             return self._at_date(t, cells) if 0 <= t < records.DAY_S else self._scale_time(t)

@@ -1,5 +1,6 @@
 """Tell by the numbers of a table in which unit they are, where its header does not say."""
 
+import math
 import shlex
 from collections.abc import Mapping
 
@@ -7,8 +8,9 @@ import numpy as np
 
 from radarsim.errors import ConfigError
 from radarsim.recordings.formats import cell_times, records
-from radarsim.recordings.formats.columns import FLIGHT_LEVELS, HEIGHTS, Column, split_unit
+from radarsim.recordings.formats.columns import Column
 from radarsim.recordings.formats.records import Batch
+from radarsim.recordings.formats.units import FLIGHT_LEVELS, HEIGHTS, TURNS, split_unit, turn_of
 from radarsim.recordings.grouping import rows_by_name
 
 MAX_PLAUSIBLE_MPS = 3000.0  # of a target: numbers that say more are of another unit
@@ -17,6 +19,8 @@ DATE_STEMS = ("date", "day", "datum", "дата")
 MIN_LONG_STEP_S = 300.0  # from row to row, as no sensor scans
 SMALL_UNITS_S = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 MAX_FLIGHT_LEVEL = 600.0  # hundreds of feet
+MIN_JUMP_STEPS = 20.0  # of the usual steps of a bearing
+TURN_TOLERANCE = 0.02  # of jumps by a turn, and of all numbers within it
 HORIZON_M = 4120.0  # per root of a height in m: the radio horizon, with 4/3 of the earth's radius
 RADAR_HEIGHT_M = 100.0  # of a radar of which nothing is known
 MIN_HIDDEN_SHARE = 0.1  # of the plots that would lie below the horizon: more than errors and bent rays explain
@@ -51,6 +55,27 @@ def refuse_day_numbers(batch: Batch, path: str, name: str, has_date: bool, first
         description = kind if kind == cell_times.FRACTIONS_OF_DAY else f"day numbers, as of {kind}"
         raise ConfigError(f"{path}: {name}: must be in s; {first_cell!r} and the others are {description}: "
                           f"--column t_days={shlex.quote(name)}")  # fmt: skip
+
+
+def refuse_wrapped_bearings(batch: Batch, path: str, column: Column) -> None:
+    """Raise ConfigError if bearings jump by a full turn of another unit than that of their column.
+
+    Then all numbers lie within that turn, and those of a track that passes its end jump by it, but for a few of their
+    usual steps."""
+    numbers = batch.columns["bearing_rad"] / column.factor
+    steps = np.concatenate([np.diff(numbers[rows]) for name, rows in rows_by_name(batch.track).items() if name] or [[]])
+    steps = np.abs(steps[np.isfinite(steps)])
+    own_turn = turn_of(column.unit)
+    jumps = steps[steps > MIN_JUMP_STEPS * np.median(steps)] if steps.size else steps
+    extent = float(np.ptp(numbers[np.isfinite(numbers)])) if jumps.size else 0.0
+    for unit, turn in {"radian": 2 * math.pi, "deg": 360.0, **TURNS}.items():
+        is_other = abs(turn / own_turn - 1) > TURN_TOLERANCE and turn < own_turn
+        if is_other and abs(extent / turn - 1) < TURN_TOLERANCE and (np.abs(jumps / turn - 1) < TURN_TOLERANCE).any():
+            cure = f"--column bearing_{unit}={shlex.quote(column.name)}"
+            raise ConfigError(
+                f"{path}: {column.name}: must be in {column.unit}; it jumps by {turn:.4g}, as bearings of {turn:.4g} a "
+                f"turn do: {cure}"
+            )
 
 
 def long_step(batch: Batch) -> tuple[float, str] | None:

@@ -230,3 +230,38 @@ def test_separators_of_thousands_that_can_be_nothing_else(tmp_path, cell, metres
 def test_a_comma_that_may_be_either_is_refused(tmp_path):
     (line,) = refused(tmp_path, b'time,range_m\n0,"1,234"\n')
     assert "range_m: must be a number, got '1,234'" in line
+
+
+def target_place(k, number=1, status="T", time=True):
+    """A target by its place, which goes north by 0.05′ in each of 10 s turns."""
+    clock = f"1200{k:02}.50" if time else ""
+    return sentence(f"RATLL,{number:02},52{36 + 0.05 * k:09.6f},N,00445.600000,E,TUG,{clock},{status},")
+
+
+def test_targets_by_their_place_are_positions(tmp_path):
+    """A lost target is left out; where the same targets are given by distance and bearing, these are read."""
+    lines = [text for k in range(20) for text in (own(k), target_place(k))] + [target_place(21, status="L")]
+    done, columns, tracks = imported(tmp_path, "".join(lines).encode(), AT)
+    assert (done.format, set(tracks)) == ("nmea", {"01"})
+    np.testing.assert_array_equal(columns["t_s"], np.arange(20))
+    np.testing.assert_allclose(np.diff(columns["x_m"]), 0.05 * NM, rtol=0.002)
+    assert "targets that the radar has lost (1)" in done.skipped
+    (tmp_path / "plots.csv").unlink()
+    both = "".join(own(k) + target_place(k) + target(k) for k in range(20))
+    done, columns, _ = imported(tmp_path, both.encode())
+    np.testing.assert_allclose(columns["range_m"], NM * (5 + 0.05 * np.arange(20)), rtol=0, atol=NM * 1e-12)
+    assert "targets by their place, beside their plots (20)" in done.skipped
+
+
+@pytest.mark.parametrize("write", [target, target_place])
+def test_targets_without_time_have_that_of_the_clock_beside_them(tmp_path, write):
+    """Of a sentence ZDA, which has a date; the first targets stand before it."""
+    text = write(0, time=False) + "".join(
+        sentence(f"GPZDA,1200{k:02}.00,31,01,2024,00,00") + write(k, time=False) for k in range(1, 20)
+    )
+    done, columns, _ = imported(tmp_path, text.encode(), Options(site=SITE, zero=1_706_702_400.0))
+    assert sorted(columns["t_s"]) == [*range(1, 20)]  # the first target has the time of the second
+    assert len(done.skipped) == 1
+    (tmp_path / "plots.csv").unlink(missing_ok=True)
+    (line,) = refused(tmp_path, "".join(write(k, time=False) for k in range(5)).encode(), AT)
+    assert line.endswith("left out: targets whose time neither they nor sentences RMC, GGA or ZDA state (5)")

@@ -19,8 +19,8 @@ def test_ranges_and_angles_without_units_are_asked_for(tmp_path):
     text = b"TIME(s),RHO,THETA\n1,18.79,350\n2,18.80,351\n"
     assert refused(tmp_path, text) == [
         "recording:1: RHO, THETA: must have a unit in the name; where it has none, --column range_m=RHO (or range_km, "
-        "range_ft, range_nm), --column bearing_deg=THETA (or bearing_rad, bearing_acp, bearing_gon, bearing_mil) "
-        "states it"
+        "range_ft, range_nm, range_yd), --column bearing_deg=THETA (or bearing_rad, bearing_acp, bearing_gon, "
+        "bearing_mil) states it"
     ]
     _, columns, _ = imported(tmp_path, text, Options(columns={"range_nm": "RHO", "bearing_deg": "THETA"}))
     assert_rounded(columns["range_m"], [18.79 * NM, 18.80 * NM])
