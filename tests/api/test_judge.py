@@ -204,11 +204,11 @@ def test_estimates_of_another_scan_are_found_by_the_truth_of_that_scan(estimates
     moved = np.full_like(estimates, np.nan)
     moved[:, 1:] = estimates[:, :-1]
     (late,) = tried(moved[..., :components])
-    assert "fit the truth of 1 scan before" in late
+    assert "fit the truth of 1 scan earlier" in late
     moved = np.full_like(estimates, np.nan)
     moved[:, :-2] = estimates[:, 2:]
     (early,) = tried(moved[..., :components])
-    assert "fit the truth of 2 scans after" in early
+    assert "fit the truth of 2 scans later" in early
 
 
 @pytest.mark.parametrize("components", [1, 2, 3])
