@@ -20,6 +20,7 @@ SPACE_BEFORE_UNIT = re.compile(  # the space between a number and its unit, in a
 SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
 MAX_PLAIN_DIGITS = 6  # digits before the point that are still written out
 MAX_SHARE_DIGITS = 12  # digits of a share near one
+NEARLY_ONE = 1e-3  # under one, from which more digits are written
 
 
 def plural(count: int, noun: str) -> str:
@@ -58,10 +59,15 @@ def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
     """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]; without an
     interval where the ends are not known."""
     numbers = tuple(values)
-    value, low, high = (numeral(format(number, form)).replace("inf", "∞") for number in numbers)
+    value, low, high = (_text_unless_one(value, format(value, form)).replace("inf", "∞") for value in numbers)
     if all(math.isnan(end) for end in numbers[1:]):
         return " ".join(filter(None, (value, unit)))
     return f"{' '.join(filter(None, (value, unit)))} {interval(low, high)}"
+
+
+def _text_unless_one(value: float, text: str) -> str:
+    """The text of a number; one with more digits where the number is a little under one and the text is one."""
+    return number(value) if 0 < 1 - value < NEARLY_ONE and float(text) == 1 else numeral(text)
 
 
 def share(value: float, low: float, high: float) -> str:
@@ -70,9 +76,12 @@ def share(value: float, low: float, high: float) -> str:
 
     >>> share(100, 99.9962, 100), share(94.123, 93.9, 94.3), share(99.99, 99.9885, 99.9915)
     ('100 % [99.996, 100]', '94.12 % [93.90, 94.30]', '99.990 % [99.989, 99.992]')
+    >>> share(99.9975, math.nan, math.nan), share(100, math.nan, math.nan)
+    ('99.998 %', '100 %')
     """
     if math.isnan(low) or math.isnan(high):
-        return f"{numeral(f'{value:.4g}')} %"
+        digits = next(n for n in range(4, MAX_SHARE_DIGITS + 1) if value == 100 or float(f"{value:.{n}g}") != 100)
+        return f"{numeral(f'{value:.{digits}g}')} %"
     rounded, limits = [round(number, MAX_SHARE_DIGITS) for number in (value, low, high)], (0.0, 100.0)
     for digits in range(2, MAX_SHARE_DIGITS):
         texts = [f"{number:.{digits}f}" for number in rounded]
@@ -129,6 +138,8 @@ def split_clauses(sentence: str) -> list[str]:
 def significant_digits(value: float, form: str = "#.4g") -> str:
     """A number in a format, of four digits, for sentences: no trailing point, no minus zero, a true minus."""
     text = format(value, form).removesuffix(".")
+    if float(text) == 1 and "+" not in form:
+        return _text_unless_one(value, text)
     return numeral(text if float(text) else text.removeprefix("-"))
 
 

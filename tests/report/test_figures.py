@@ -17,9 +17,10 @@ from radarsim.report import (
     sweep_figures,
     tables,
     time_figures,
+    wording,
 )
 from radarsim.report.drawing import canvas as drawing_canvas
-from radarsim.report.drawing import line_names, line_points, style
+from radarsim.report.drawing import line_names, line_points, page_figure, style
 from radarsim.report.drawing.model import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.studies.range_doppler import figures as range_doppler_figures
@@ -256,6 +257,19 @@ def test_maps_side_by_side_have_one_scale_of_colours():
     both = tuple(Panel(Axis("x"), Axis("y"), (heat,)) for heat in heats)
     axes = drawing_canvas.render(Figure("f", "", "", both, columns=2)).axes[:2]
     assert {one.collections[0].get_clim() for one in axes} == {(1.0, 6.0)}
+
+
+def test_a_share_just_under_one_is_never_written_as_one():
+    shares = np.array([[1.0, 0.99975, 0.99951], [0.99999, 0.5, 0.0]])
+    heat = Panel(Axis("x"), Axis("y"), (Heat(np.arange(3.0), np.arange(2.0), shares, "share"),))
+    drawing = drawing_canvas.draw(Figure("f", "F", "Shares.", (heat,)))
+    written = [text.get_text() for text in drawing_canvas.render(drawing.figure).axes[0].texts]
+    assert written == ["1", "0.9998", "0.9995", "0.99999", "0.5", "0"]
+    assert all(f">{text}<" in page_figure.embed(drawing, "p") for text in written)
+    assert wording.estimate((0.99996, 0.9, 1.0)) == "0.99996 [0.9, 1]"
+    assert [wording.significant_digits(value) for value in (0.99999, 1.0, 1.00001)] == ["0.99999", "1.000", "1.000"]
+    nan = float("nan")
+    assert [wording.share(value, nan, nan) for value in (100.0, 99.9999)] == ["100 %", "99.9999 %"]
 
 
 def test_a_ground_track_has_one_scale_north_and_east():
