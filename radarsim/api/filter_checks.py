@@ -72,18 +72,23 @@ def check_user_filter(case: Case, member: UserFilter) -> list[str]:
     if not sees_plots:
         _check_follows_plots(case, member, errors.error, inner)
     rms = np.sqrt(_mean(np.square(errors.error), (0, 1)))[component_indices]
-    lines = _rounding_warnings(member, estimates.plain(estimates.parts(output)[0]), x, rms)
+    lines, faults = _rounding_warnings(member, estimates.plain(estimates.parts(output)[0]), x, rms), list[str]()
     measured = [column for column in plot_arrays.columns.values() if column.shape == x.shape[:2]]
     if measured:
         plot_columns = np.stack(measured, axis=-1)
-        lines += time_warnings(member.name, x, truth[..., component_indices], plot_columns, truth)
+        faults = time_warnings(member.name, x, truth[..., component_indices], plot_columns, truth)
     if sees_plots:
         columns = plot_arrays.columns
         if any(not np.array_equal(plots[name], columns[name], equal_nan=True) for name in columns):
             lines.append(tr("{name}: changes the plots it is given; it gets copies", name=member.name))
-        lines += _check_repeatable(plan, member, x, MATERIAL_CHANGE * rms)
+        unrepeatable = list(_check_repeatable(plan, member, x, MATERIAL_CHANGE * rms))
+        if plan.invalid_intervals(case.realisations):  # which the verdict says itself
+            lines += unrepeatable
+        else:
+            faults += unrepeatable
         lines += _check_training(case, plan, member, (errors.error, inner))
-    return lines
+    member.note_faults(case.name, tuple(faults))
+    return [*faults, *lines]
 
 
 def _rounding_warnings(member: UserFilter, output: np.ndarray, x: np.ndarray, rms: np.ndarray) -> list[str]:

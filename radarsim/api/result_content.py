@@ -113,18 +113,23 @@ MAX_BASELINE_SENTENCES = 6  # on baselines after the first
 
 
 class Answer(NamedTuple):
-    """The answer of an experiment: its sentences, and warnings on the intervals that they rest on."""
+    """The answer of an experiment: its sentences, and warnings on the intervals that they rest on.
+
+    main_count: how many of the sentences, which come first, `radarsim judge` prints."""
 
     texts: tuple[str, ...]
     warnings: tuple[str, ...]
+    main_count: int
 
 
 def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
     """The answer of an experiment: on user filters, of its study, and gains against further baselines."""
     study_tables = with_first_baseline(user_filters_rows.without_user_filters(tables_by_name, results), results)
     further_baselines = [gain for result in results for gain in result.further_baselines]
+    main, details = _user_filter_answer(results, tables_by_name)
     answer = [
-        *_user_filter_answer(results, tables_by_name),
+        *main,
+        *details,
         *(
             sentences.as_sentence(sentence, study_tables)
             for sentence in study(results[0].study).answer(results, study_tables)
@@ -142,7 +147,7 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
     warnings = [
         translate_names(line, names) for line in answer_warnings.answer_warnings(results, tables_by_name, answer)
     ]
-    return Answer(tuple(texts), tuple(warnings))
+    return Answer(tuple(texts), tuple(warnings), len(main))
 
 
 def question_text(experiment: Experiment) -> str:
@@ -158,13 +163,13 @@ def question_text(experiment: Experiment) -> str:
 
 def _user_filter_answer(
     results: Sequence[CaseResult], tables_by_name: "Mapping[str, pd.DataFrame]"
-) -> Sequence[Sentence]:
-    """How user filters compare with the config's; nothing where there are none."""
+) -> tuple[Sequence[Sentence], Sequence[Sentence]]:
+    """How user filters compare with the config's, and more of them; nothing where there are none."""
     if not _has_user_filters(results):
-        return ()
+        return (), ()
     from radarsim.report.user_filters import answer as user_filters_answer
 
-    return user_filters_answer.answer(results, tables_by_name)
+    return user_filters_answer.judgement(results, tables_by_name)
 
 
 def config_names(cases: Iterable[Case | CaseResult]) -> frozenset[str]:

@@ -40,7 +40,8 @@ class WrittenFiles:
 
     files: with those of an earlier run that stay. removed: those that do not; remaking_options: of the command, which
     write them again. seconds: of drawing, and of writing with the report.
-    answer_warnings: on the intervals that the answer rests on, and on figures that are wider than asked for."""
+    answer_warnings: on the intervals that the answer rests on, and on figures that are wider than asked for.
+    main_count: see `Answer`."""
 
     folder: Path
     files: tuple[str, ...]
@@ -50,6 +51,7 @@ class WrittenFiles:
     answer: tuple[str, ...]
     seconds: Mapping[str, float]
     answer_warnings: tuple[str, ...]
+    main_count: int
 
 
 ALWAYS_WRITTEN = ("curves", "gains")  # tables written even without a row; others only if they have rows
@@ -137,6 +139,7 @@ def write_files(
         answer=answer.texts,
         seconds={"drawing": draw_end - draw_start, "writing": time.perf_counter() - draw_end},
         answer_warnings=warnings,
+        main_count=answer.main_count,
     )
 
 

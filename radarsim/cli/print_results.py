@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import print_field, print_line, print_table, print_warnings
 from radarsim.extensions import extensions
-from radarsim.language.translate import join_names, shorten_names, term, tr
+from radarsim.language.translate import join_names, plural, shorten_names, term, tr
 from radarsim.report.wording import format_if_known, significant_digits
 from radarsim.report.wording import unit as unit_of
 
@@ -29,12 +29,28 @@ NARROW_INTERVAL_MARKS = {  # behind intervals that are too narrow
 
 def print_result(result: "Result") -> None:
     """The answer of a run, σ at the last scan, the verdicts, and where the files are."""
-
-    written = result.written
-    assert written is not None  # the commands write what they print
-    for line in written.answer:
+    assert result.written is not None  # the commands write what they print
+    for line in result.written.answer:
         print_line(line)
     print_last_scan(result)
+    _print_verdicts_and_files(result)
+
+
+def print_judgement(result: "Result") -> None:
+    """The verdict on a user filter, σ at the last scan, how to see more, and where the files are."""
+    written = result.written
+    assert written is not None  # the commands write what they print
+    for line in written.answer[: written.main_count]:
+        print_line(line)
+    print_last_scan(result)
+    if omitted := len(written.answer) - written.main_count:
+        print_field("more", plural("{count} sentence, with --all", "{count} sentences, with --all", omitted))
+    _print_verdicts_and_files(result)
+
+
+def _print_verdicts_and_files(result: "Result") -> None:
+    written = result.written
+    assert written is not None
     for label, text in (line for extension in extensions() for line in extension.result_lines(result)):
         print_field(label, text)
     figure_files = [Path(name) for name in written.files if name.startswith("figures/") and not name.endswith(".md")]
@@ -58,7 +74,7 @@ def print_result(result: "Result") -> None:
         print_field(
             "removed", tr("{words}; to have them again: {options}", words=words, options=options) if options else words
         )
-    print_warnings(result.warnings)
+    print_warnings([line for line in result.warnings if f"{line}." not in written.answer])
 
 
 def print_last_scan(result: "Result") -> None:

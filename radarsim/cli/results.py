@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 @options.out_option
 @options.replace_option
 @options.drawing_options
+@click.option("--all", "print_all", is_flag=True, help="Print every sentence of the answer, not only the judgement.")
 @click.option("-q", "--quiet", is_flag=True, help="Print only errors.")
 @options.json_option
 def judge(
@@ -50,6 +51,7 @@ def judge(
     out: str,
     replace: bool,
     drawing: options.Drawing,
+    print_all: bool,
     quiet: bool,
     as_json: bool,
 ) -> None:
@@ -82,6 +84,7 @@ def judge(
     with stop_conditions.Signals() as stop:
         from radarsim.api import judge as api_judge
         from radarsim.api import load_experiments, precision_target
+        from radarsim.cli import print_results
 
         (loaded,) = load_experiments.load_all([config], load_experiments.combine_overrides(overrides, None, seed))
         tuned: dict[str, Any] = {"against": against, "wanted": wanted}
@@ -97,7 +100,8 @@ def judge(
         compute_arguments: dict[str, Any] = {"precision": precision, "of": of, "threads": threads, "stop": stop}
         compute_arguments |= {"replace": replace, "command": repeat_command, **drawing.arguments}
         compute = partial(api_judge.run_judged_experiment, warnings=warnings, out=out, **compute_arguments)
-        compute_each([experiment], compute, out, quiet, as_json)
+        print_finished = print_results.print_result if print_all else print_results.print_judgement
+        compute_each([experiment], compute, out, quiet, as_json, print_finished=print_finished)
 
 
 @command_group.main.command()

@@ -200,10 +200,13 @@ def compute_each(
     quiet: bool,
     as_json: bool,
     gaps: bool = False,
+    print_finished: "Callable[[Result], None] | None" = None,
 ) -> None:
-    """Compute experiments one by one and print the results; gaps: say before what a store with gaps lacks. Raises
-    DisagreementError at the end for differences beyond chance, else MeasureError where the measure of a claim failed,
-    else TargetUnmet for targets that were not reached."""
+    """Compute experiments one by one and print the results; gaps: say before what a store with gaps lacks;
+    print_finished: prints a result, by default as `run` does.
+
+    Raises DisagreementError at the end for differences beyond chance, else MeasureError where the measure of a claim
+    failed, else TargetUnmet for targets that were not reached."""
     from radarsim.api import json_output, simulate_cases
     from radarsim.api.stored_runs import store_gap_sentence
     from radarsim.cli import console, print_results
@@ -242,7 +245,7 @@ def compute_each(
         else:
             documents.append(json_output.result(result))
             if not (quiet or as_json):
-                print_results.print_result(result)
+                (print_finished or print_results.print_result)(result)
     if as_json:
         click.echo(json_output.text(documents))
     if disagreements:

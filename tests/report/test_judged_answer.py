@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import radarsim
-from radarsim.report.user_filters import answer
+from radarsim.report.user_filters import answer, rival_comparison
 from radarsim.studies import registry
 from tests.api.test_judge import twin
 
@@ -22,8 +22,13 @@ def judged(target, **options):
     return radarsim.judge("rls2", target, figures=False, threads=1, **({"realisations": 1000} | options))
 
 
+def floor_sentence(answer):
+    return next(line for line in answer if line.startswith("The floor there"))
+
+
 def test_an_equal_filter_has_the_exact_number_and_no_other():
-    first, floor, *_ = (str(sentence) for sentence in judged(twin).answer)
+    answer = judged(twin).answer
+    first, floor = answer[0], floor_sentence(answer)
     assert re.search(r"mine is equal to r\+Vr, .*, identical in all 1,000 realisations: .* fewer than 0\.3 % ", first)
     assert first.endswith("; the σ of both is 154.7 m (exact).")
     assert floor.endswith(": above it is r+Vr 5.18 % (exact), and mine as far.")
@@ -45,10 +50,10 @@ def test_sigma_and_gain_of_one_sentence_agree():
 
     twin_truth = radarsim.plots("rls2", n=1000).truth[..., 0]
     result = judged(failing)
-    found = re.search(r"its σ is (\S+) m \[.*\], that of r\+Vr in the same realisations (\S+) m\.", result.answer[0])
+    found = re.search(r"its σ is (\S+) m \[.*\], that of r\+Vr in the same realisations (\S+) m\.", result.answer[1])
     assert found
     assert found[1] == found[2]
-    assert "147.1 m; above it is r+Vr 5.18 % (exact). mine, which has an estimate in other" in result.answer[1]
+    assert "m; above it is r+Vr 5.18 % (exact). mine, which has an estimate in other" in floor_sentence(result.answer)
 
 
 def test_a_loss_in_another_component_is_in_the_first_sentence():
@@ -67,12 +72,11 @@ def test_below_a_posterior_bound_is_nothing_that_sees_only_the_plots():
     plots = radarsim.plots("rls2", n=300, overrides={"target": DRAWN_TARGET})
     knowing = plots.truth[..., 0] + 0.1 * (plots["range_m"] - plots.truth[..., 0])
     result = judged(knowing, realisations=300, overrides={"target": DRAWN_TARGET})
-    assert "the posterior Cramér-Rao bound" in result.answer[1]
-    assert "Below it no estimator can be, biased or not" in result.answer[1]
-    assert "biased, or knows" not in result.answer[1]
-    assert re.search(
-        r": mine is \d\d\.\d % \[\d\d\.?\d*, \d\d\.?\d*\] below it; above it is r\+Vr \d", result.answer[1]
-    )
+    floor = floor_sentence(result.answer)
+    assert "the posterior Cramér-Rao bound" in floor
+    assert "Below it no estimator can be, biased or not" in floor
+    assert "biased, or knows" not in floor
+    assert re.search(r": mine is \d\d\.\d % \[\d\d\.?\d*, \d\d\.?\d*\] below it; above it is r\+Vr \d", floor)
 
 
 def test_of_gains_over_all_scans_those_are_left_out_that_compare_nothing():
@@ -101,7 +105,7 @@ def test_a_filter_is_judged_at_the_worst_point_of_the_studys_own_answer(point):
     axes = SimpleNamespace(components=(("x", "m"), ("y", "m")), filters=("best",), answer_at=None, answer_points=point)
     axes.dependent = ()
     result = SimpleNamespace(name="a", axes=axes, user_filters=SimpleNamespace(axes=axes))
-    worst = answer._worst_comparison(result, "mine", pd.DataFrame(rows), {"curves": pd.DataFrame(curves)})
+    worst = rival_comparison.worst_comparison(result, "mine", pd.DataFrame(rows), {"curves": pd.DataFrame(curves)})
     row = worst.row_against("best")
     assert (row["component"], row["k"]) == (("x", 3) if len(point) > 1 else ("y", 2))
 
@@ -113,3 +117,53 @@ def test_a_flight_is_judged_by_the_height_at_the_end_of_each_stage():
     flight = SimpleNamespace(spec=SimpleNamespace(target=target), axes=axes)
     points = registry.study("multimodel").answer_points(flight)
     assert points == [("y", 13.0), ("y", 43.0), ("y", 63.0)]
+
+
+def late(plots):
+    x = twin(plots)
+    x[:, 1:] = x[:, :-1].copy()
+    return x
+
+
+def bold(plots):
+    """The config's filter, with a covariance that is far too small."""
+    x = twin(plots)
+    return x, np.broadcast_to(np.eye(3) * (1.0, 0.1, 1e-4), (*x.shape, 3))
+
+
+def main_sentences(target, **options):
+    result = judged(target, **options)
+    return result.answer[: result._answer.main_count]
+
+
+def test_a_recognised_fault_comes_first_then_the_verdict_and_the_next_step():
+    fault, verdict, next_step = main_sentences(late)
+    assert "stand too late" in fault or "stand a scan too late" in fault
+    assert verdict.startswith("mine is worse than r+Vr")
+    assert next_step.startswith("Next: mend this")
+
+
+def test_the_judgement_is_verdict_consistency_and_next_step():
+    verdict, consistency, next_step = main_sentences(twin)
+    assert verdict.startswith("mine is equal to r+Vr")
+    assert "gives no covariances" in consistency
+    assert "--against tuned" in next_step
+    _, consistency, _ = main_sentences(bold)
+    assert "(1 is right): its errors are larger than its covariance says." in consistency
+    *_, next_step = main_sentences(lambda plots: plots["range_m"])
+    assert "tune it" in next_step
+
+
+def test_an_undecided_judgement_says_how_many_realisations_decide(monkeypatch):
+    def disturbed(plots):
+        x = twin(plots)
+        x[..., 0] += 10 * plots.normals(1)[..., 0]
+        return x
+
+    verdict, _, next_step = main_sentences(disturbed, realisations=300)
+    assert "cannot be distinguished" in verdict
+    needed = int(re.search(r"about ([\d,]+) realisations", next_step)[1].replace(",", ""))
+    gain, low, high = (float(end) for end in re.search(r"gain −(\S+) % \[−?(\S+), −?(\S+)\]", verdict).groups())
+    assert needed == pytest.approx(300 * ((high + low) / 2 / gain) ** 2, rel=0.1)
+    monkeypatch.setattr(answer, "MAX_SUGGESTED_REALISATIONS", needed - 100)
+    assert "decides nothing" in main_sentences(disturbed, realisations=300)[-1]

@@ -55,7 +55,7 @@ from radarsim.config.yaml_text import one_line_yaml
 from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import plural, tr
-from radarsim.report.user_filters.answer import TUNED
+from radarsim.report.user_filters.rival_comparison import TUNED
 from radarsim.report.wording import format_number
 from radarsim.studies import registry
 

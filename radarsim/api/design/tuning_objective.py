@@ -17,7 +17,7 @@ from radarsim.config.experiment import Case
 from radarsim.config.identity import all_keys
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.report.user_filters.answer import TUNED
+from radarsim.report.user_filters.rival_comparison import TUNED
 
 PILOT_SHARE = 8  # all realisations over those of a value of the scan
 MIN_PILOT_REALISATIONS = 200  # of a value of the scan

@@ -11,7 +11,7 @@ from radarsim.config.experiment import Case
 from radarsim.config.identity import all_keys
 from radarsim.language.translate import join_names, plural, tr
 from radarsim.report import tables
-from radarsim.report.user_filters.answer import TUNED
+from radarsim.report.user_filters.rival_comparison import TUNED
 from radarsim.report.wording import format_number, with_unit
 
 if TYPE_CHECKING:

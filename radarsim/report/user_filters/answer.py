@@ -1,10 +1,8 @@
 """Question and answer of an experiment with user filters: how each compares with the config's filters."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,11 +10,12 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, shorten_names, term, tr
-from radarsim.report import compared_value, gain_sentences, key_labels, sentences, wording
+from radarsim.report import compared_value, consistency_tables, gain_sentences, sentences, wording
 from radarsim.report import tables as common
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import GAIN
 from radarsim.report.sentences import Sentence
+from radarsim.report.user_filters.rival_comparison import RivalComparison, compare_with_rivals, worst_comparison
 from radarsim.report.user_filters.rows import TablesByName, user_filter_cases
 from radarsim.report.user_filters.tables import IMPROPER, REASONS
 
@@ -24,10 +23,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-TUNED = ", tuned"  # the end of the names of filters that `radarsim tune` has tuned
-ROUNDING = 1e-9  # relative difference of σ of filters that are the same but for rounding
 MATERIAL_LOSS = 1.0  # per cent: a smaller one in another component is not told in the first sentence
 NEGLIGIBLE = 1e-3  # of the largest σ of a filter's component over time: what is below is known, not estimated
+NEGLIGIBLE_GAIN = 1e-6  # per cent
+MAX_SUGGESTED_REALISATIONS = 10**8
+CONSISTENCY = {  # by the verdict of `consistency_tables`
+    consistency_tables.CONSISTENT: term("its errors are as large as its covariance says"),
+    consistency_tables.OPTIMISTIC: term("its errors are larger than its covariance says"),
+    consistency_tables.PESSIMISTIC: term("its errors are smaller than its covariance says"),
+}
 DEPENDENCES = {  # why a filter has no intervals, after "as"
     "repeated": term("its random numbers repeat in every block"),
     "shared": term("all realisations share its random numbers"),
@@ -46,94 +50,92 @@ def question(experiment: Experiment) -> str:
     return tr("Is {name} better than the filters of the config?", name=filters[0]) if filters else ""
 
 
-def answer(results: Sequence[CaseResult], tables_by_name: TablesByName) -> list[Sentence]:
+class Judgement(NamedTuple):
+    """What is said of user filters: for each the verdict, its consistency or a fault, and the next step; then more."""
+
+    main: list[Sentence]
+    details: list[Sentence]
+
+
+def judgement(results: Sequence[CaseResult], tables_by_name: TablesByName) -> Judgement:
     """How every user filter compares with the config's filters, case by case."""
-    return [
-        sentence
+    judgements = [
+        _judge_filter(result, name, f"{result.name}: " if len(results) > 1 else "", tables_by_name)
         for result in results
         for case in user_filter_cases(result)
         for name in case.axes.filters
-        for sentence in _filter_sentences(result, name, f"{result.name}: " if len(results) > 1 else "", tables_by_name)
     ]
+    return Judgement(*([sentence for part in parts for sentence in part] for parts in zip(*judgements, strict=True)))
 
 
-@dataclass(frozen=True)
-class _Comparison:
-    """The rows by which a user filter is compared with the config's filters: of one component at one scan."""
+def _judge_filter(result: CaseResult, name: str, prefix: str, tables_by_name: TablesByName) -> Judgement:
+    """Whether a user filter is better than the config's best, how often it fails, then all gains at that scan.
 
-    name: str
-    unit: str
-    gains: "pd.DataFrame"  # against every other filter
-    sigma: "pd.Series[Any]"  # of `curves`: the user filter's
-    rivals: Mapping[str, "pd.Series[Any]"]  # of `curves`: the best filter, then the best tuned one
-    equal: tuple[str, ...]  # the config's other filters with the σ of its best one, but for rounding
-    dependence: str  # why the user filter has no intervals; empty where it has
-
-    @property
-    def best(self) -> str:
-        return next(iter(self.rivals))
-
-    @property
-    def best_name(self) -> str:
-        """The config's best filter in a sentence, with those that are equal to it."""
-        return (
-            tr("{name} (equal to {others})", name=self.best, others=join_names(self.equal)) if self.equal else self.best
-        )
-
-    @property
-    def best_sigma(self) -> ComparedValue:
-        return compared_value.row_value(self.rivals[self.best])
-
-    @property
-    def has_same_realisations(self) -> bool:
-        """Whether the user filter has an estimate in as many realisations as the config's best filter."""
-        return bool(self.sigma["n"] == self.rivals[self.best]["n"])
-
-    @property
-    def is_equal(self) -> bool:
-        """Whether it has the same errors as the config's best filter, wherever both have an estimate."""
-        return gain_sentences.is_equal(self.gain_against(self.best))
-
-    def row_against(self, baseline: str) -> "pd.Series[Any]":
-        return self.gains[self.gains["baseline"] == baseline].iloc[0]
-
-    def gain_against(self, baseline: str) -> ComparedValue:
-        return compared_value.row_value(self.row_against(baseline), GAIN)
-
-    def gain_text(self, baseline: str) -> str:
-        """The gain against a baseline with its interval, or what was not seen of equal filters."""
-        return gain_sentences.percent_text(self.gain_against(baseline), self.sigma["n"])
-
-    @cached_property
-    def own_sigma(self) -> ComparedValue:
-        """σ of the user filter: beside an exact rival that times the paired ratio, else measured."""
-        if self.best_sigma.is_exact and self.has_same_realisations:
-            return compared_value.paired_sigma(self.best_sigma.value, self.row_against(self.best))
-        return compared_value.row_value(self.sigma)
-
-
-def _filter_sentences(result: CaseResult, name: str, prefix: str, tables_by_name: TablesByName) -> list[Sentence]:
-    """Whether a user filter is better than the config's best, how often it fails, then all gains at that scan."""
+    A fault of its estimates comes first, in place of their consistency, which is then a detail."""
+    faults = [Sentence(f"{fault}.") for member, fault in user_filter_cases(result)[0].axes.faults if member == name]
     gains = common.select_rows(tables_by_name["gains"], case=result.name, filter=name)
     failing = _failing_clause(common.select_rows(tables_by_name["failures"], case=result.name, filter=name), name)
     if not len(gains):
         no_estimate = tr("{name} has no estimate that could be compared", name=name)
-        return [clause.with_text(f"{prefix}{clause.text}.") for clause in failing or [Sentence(no_estimate)]]
+        verdicts = [clause.with_text(f"{prefix}{clause.text}.") for clause in failing or [Sentence(no_estimate)]]
+        return Judgement([*faults, *verdicts], [])
 
-    comparison = _worst_comparison(result, name, gains, tables_by_name)
+    comparison = worst_comparison(result, name, gains, tables_by_name)
     verdict = _training_clause(
         result, name, _verdict_sentence(comparison, _losses(result, comparison, gains, tables_by_name))
     )
     if failing:
         text = tr("{failing}, and in the others ", failing=failing[0].text)
         verdict = sentences.compose(text + verdict.text, [*failing, verdict])
-    return [
+    consistency = _consistency_sentence(result, name, tables_by_name)
+    is_unsound = bool(faults or failing or comparison.dependence)
+    main = [
+        *faults,
         verdict.with_text(prefix + verdict.text),
-        *_floor_sentence(comparison),
-        *_further_gains(comparison),
-        *_extreme_gains(_comparable(gains, result, tables_by_name), comparison),
-        *_nees_sentences(result, name, tables_by_name),
+        *([] if faults else [consistency]),
+        Sentence(_next_step(comparison, is_unsound, is_trained=_training_ratio(result, name) is not None)),
     ]
+    return Judgement(
+        main,
+        [
+            *_floor_sentence(comparison),
+            *_further_gains(comparison),
+            *_extreme_gains(_comparable(gains, result, tables_by_name), comparison),
+            *([consistency] if faults and consistency.intervals else []),
+            *_improper_sentence(result, name, tables_by_name),
+        ],
+    )
+
+
+def _next_step(comparison: RivalComparison, is_unsound: bool, is_trained: bool) -> str:
+    """What to do after a verdict. is_unsound: whether estimates are missing, at fault, or depend on each other."""
+    gains = [comparison.gain_against(rival) for rival in comparison.rivals]
+    undecided = [
+        gain for gain in gains if gain.estimate.lo <= 0 <= gain.estimate.hi and not gain_sentences.is_equal(gain)
+    ]
+    if is_trained:
+        return tr('Next: train it on other noise: radarsim.plots(…, purpose="training").')
+    if is_unsound:
+        return tr("Next: mend this; the numbers are of the estimates as they stand.")
+    if undecided:
+        needed = _deciding_realisations(undecided[-1], int(comparison.sigma["n"]))
+        if not math.isfinite(needed):
+            return tr("Next: judge it on more realisations.")
+        if needed > MAX_SUGGESTED_REALISATIONS:
+            return tr("Next: choose by cost, or judge it at another time (--for); a gain this small decides nothing.")
+        n = math.ceil(float(f"{needed:.1e}"))
+        return tr("Next: about {n:,} realisations would tell a gain of this size from none.", n=n)
+    if any(gain.estimate.hi < 0 for gain in gains):
+        return tr('Next: tune it on other noise (radarsim.plots(…, purpose="training")), and judge it again.')
+    if len(gains) == 1:
+        return tr("Next: judge it against the config's filters at their best, with --against tuned.")
+    return tr("Next: judge it on other targets; a filter tuned for one may be poor for others.")
+
+
+def _deciding_realisations(gain: ComparedValue, n: int) -> float:
+    """How many realisations tell a gain from 0 if it stays as it is: intervals narrow as the root of their number."""
+    half_width = (gain.estimate.hi - gain.estimate.lo) / 2
+    return float(n * (half_width / max(abs(gain.value), NEGLIGIBLE_GAIN)) ** 2)
 
 
 def _failing_clause(failures: "pd.DataFrame", name: str) -> list[Sentence]:
@@ -153,55 +155,9 @@ def _failing_clause(failures: "pd.DataFrame", name: str) -> list[Sentence]:
     return [Sentence(text, sentences.intervals("failures", "share", total))]
 
 
-def _worst_comparison(
-    result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_name: TablesByName
-) -> _Comparison:
-    """The comparison by which a filter is judged: at the point asked for, else at the worst of those that the study's
-    answer is about."""
-    axes = user_filter_cases(result)[0].axes
-    points = [axes.answer_at] if axes.answer_at else axes.answer_points
-    present = set(gains["component"])
-    first = next(component for component, _ in result.axes.components if component in present)
-    usable_points = [point for point in points if point[0] in present] or [(first, points[-1][1])]
-    comparisons = [_compare(result, name, gains, tables_by_name, point) for point in usable_points]
-    return min(comparisons, key=lambda comparison: comparison.row_against(comparison.best)["gain_percent"])
-
-
-def _compare(
-    result: CaseResult, name: str, gains: "pd.DataFrame", tables_by_name: TablesByName, point: tuple[str, float]
-) -> _Comparison:
-    """The rows of a component at the scan next to a time."""
-    (component, unit), t_s = next(c for c in result.axes.components if c[0] == point[0]), point[1]
-    gains = gains[gains["component"] == component]
-    distance_s = (gains["t_s"] - min(t_s, gains["t_s"].max())).abs()
-    gains = gains[gains["k"] == gains["k"][distance_s.idxmin()]]
-    curves = common.select_rows(tables_by_name["curves"], case=result.name, component=component, k=gains["k"].iloc[0])
-    rows = {row["filter"]: row for _, row in curves.iterrows()}
-    baselines = [baseline for baseline in gains["baseline"] if baseline in result.axes.filters]
-    rank = _ranks(baselines, rows, gains)
-    tuned = [baseline for baseline in baselines if baseline.endswith(TUNED)]
-    best = min((baseline for baseline in baselines if baseline not in tuned), key=rank.__getitem__)
-    rivals = {rival: rows[rival] for rival in (best, *sorted(tuned, key=rank.__getitem__)[:1])}
-    dependence = dict(user_filter_cases(result)[0].axes.dependent).get(name, "")
-    equal = tuple(
-        baseline
-        for baseline in baselines
-        if baseline != best and math.isclose(rows[baseline]["sigma"], rows[best]["sigma"], rel_tol=ROUNDING)
-    )
-    return _Comparison(name, key_labels.unit_label(unit), gains, rows[name], rivals, equal, dependence)
-
-
-def _ranks(baselines: Sequence[str], rows: Mapping[str, "pd.Series[Any]"], gains: "pd.DataFrame") -> dict[str, float]:
-    """By what the config's filters are ranked: exact σ where all have it, else how little is gained against them."""
-    exact = {baseline: float(rows[baseline]["exact_sigma"]) for baseline in baselines}
-    if not np.isnan(list(exact.values())).any():
-        return exact
-    return dict(zip(gains["baseline"], gains["gain_percent"], strict=True))
-
-
 def _losses(
-    result: CaseResult, comparison: _Comparison, gains: "pd.DataFrame", tables_by_name: TablesByName
-) -> list[_Comparison]:
+    result: CaseResult, comparison: RivalComparison, gains: "pd.DataFrame", tables_by_name: TablesByName
+) -> list[RivalComparison]:
     """The other components in which a filter that is not worse at the point of the answer is surely worse than the
     config's best one, at the same scan."""
     row = comparison.row_against(comparison.best)
@@ -209,15 +165,20 @@ def _losses(
         return []
     rows = gains[(gains["k"] == row["k"]) & (gains["component"] != row["component"])]
     comparisons = [
-        _compare(result, comparison.name, rows, tables_by_name, (component, np.inf))
+        compare_with_rivals(result, comparison.name, rows, tables_by_name, (component, np.inf))
         for component in dict.fromkeys(rows["component"])
     ]
     return [loss for loss in comparisons if loss.gain_against(loss.best).estimate.hi < -MATERIAL_LOSS]
 
 
+def _training_ratio(result: CaseResult, name: str) -> float | None:
+    """How many times larger σ of a user filter is on other noise, where it seems to know the judged realisations."""
+    return dict(user_filter_cases(result)[0].axes.training_ratios).get(name)
+
+
 def _training_clause(result: CaseResult, name: str, verdict: Sentence) -> Sentence:
     """The verdict after the warning that a filter seems to know the realisations by which it is judged."""
-    ratio = dict(user_filter_cases(result)[0].axes.training_ratios).get(name)
+    ratio = _training_ratio(result, name)
     if ratio is None:
         return verdict
     text = tr(
@@ -240,7 +201,7 @@ def _comparable(gains: "pd.DataFrame", result: CaseResult, tables_by_name: Table
     return gains[[row in comparable for row in rows] & np.isfinite(gains["gain_percent"].to_numpy(dtype=float))]
 
 
-def _verdict_sentence(comparison: _Comparison, losses: Sequence[_Comparison] = ()) -> Sentence:
+def _verdict_sentence(comparison: RivalComparison, losses: Sequence[RivalComparison] = ()) -> Sentence:
     """Whether a filter is better than the config's best one, and than its best tuned one; where it is worse; its σ, and
     theirs."""
     best, *tuned = comparison.rivals
@@ -250,7 +211,7 @@ def _verdict_sentence(comparison: _Comparison, losses: Sequence[_Comparison] = (
     return sentences.compose(f"{sentences.join('', clauses).text}; {sigmas.text}", [*clauses, sigmas])
 
 
-def _against_best(comparison: _Comparison, best: str) -> Sentence:
+def _against_best(comparison: RivalComparison, best: str) -> Sentence:
     row, gain = comparison.row_against(best), comparison.gain_against(best)
     fields = {
         "name": comparison.name,
@@ -280,14 +241,14 @@ def _against_best(comparison: _Comparison, best: str) -> Sentence:
     return Sentence(text, gain.intervals)
 
 
-def _loss_clause(comparison: _Comparison) -> Sentence:
+def _loss_clause(comparison: RivalComparison) -> Sentence:
     row = comparison.row_against(comparison.best)
     text = tr(", but worse than {best} in {component} there: gain {gain}",
               best=comparison.best, component=row["component"], gain=comparison.gain_text(comparison.best))  # fmt: skip
     return Sentence(text, sentences.intervals("gains", "gain", row))
 
 
-def _against_tuned(comparison: _Comparison, rival: str) -> Sentence:
+def _against_tuned(comparison: RivalComparison, rival: str) -> Sentence:
     gain, rival_sigma = comparison.gain_against(rival), compared_value.row_value(comparison.rivals[rival])
     fields = {"best": rival, "gain": comparison.gain_text(rival)}
     if np.isnan(gain.estimate.lo):
@@ -304,7 +265,7 @@ def _against_tuned(comparison: _Comparison, rival: str) -> Sentence:
     return Sentence(text, (*gain.intervals, *rival_sigma.intervals))
 
 
-def _sigma_clause(comparison: _Comparison) -> Sentence:
+def _sigma_clause(comparison: RivalComparison) -> Sentence:
     """σ of the user filter and of the config's best one, of the same realisations."""
     own, best, unit = comparison.own_sigma, comparison.best_sigma, comparison.unit
     if comparison.is_equal and comparison.has_same_realisations:
@@ -319,7 +280,7 @@ def _sigma_clause(comparison: _Comparison) -> Sentence:
     return Sentence(text, own.intervals)
 
 
-def _floor_sentence(comparison: _Comparison) -> list[Sentence]:
+def _floor_sentence(comparison: RivalComparison) -> list[Sentence]:
     """How far the user filter, the config's best one, and the best tuned one are above the floor; none without one.
 
     A filter that fails is not compared with it: the floor is one of all realisations."""
@@ -371,7 +332,7 @@ def _floor_sentence(comparison: _Comparison) -> list[Sentence]:
     return [Sentence(text, comparison.own_sigma.intervals)]
 
 
-def _further_gains(comparison: _Comparison) -> list[Sentence]:
+def _further_gains(comparison: RivalComparison) -> list[Sentence]:
     """The gains at the same scan against all filters but the config's best."""
     rows = comparison.gains[~comparison.gains["baseline"].isin([comparison.best, *comparison.equal])]
     if not len(rows):
@@ -381,7 +342,7 @@ def _further_gains(comparison: _Comparison) -> list[Sentence]:
     return [Sentence(text, sentences.intervals("gains", "gain", rows))]
 
 
-def _extreme_gains(gains: "pd.DataFrame", comparison: _Comparison) -> list[Sentence]:
+def _extreme_gains(gains: "pd.DataFrame", comparison: RivalComparison) -> list[Sentence]:
     """The least and the largest gain against the config's best over all components and scans, if there are several."""
     rows = gains[gains["baseline"] == comparison.best]
     if len(rows) < 2:
@@ -410,26 +371,34 @@ def _extreme_gains(gains: "pd.DataFrame", comparison: _Comparison) -> list[Sente
     return [Sentence(text, tuple(interval for _, gain in extremes for interval in gain.intervals))]
 
 
-def _nees_sentences(result: CaseResult, name: str, tables_by_name: TablesByName) -> Iterator[Sentence]:
-    """Whether the covariances of a user filter are right at the last scan, and how many are no covariances."""
+def _consistency_sentence(result: CaseResult, name: str, tables_by_name: TablesByName) -> Sentence:
+    """Whether the covariances of a user filter are right at the last scan."""
     rows = (
         common.select_rows(tables_by_name["nees"], case=result.name, filter=name) if "nees" in tables_by_name else None
     )
-    if rows is not None and len(rows):
-        row = rows.iloc[-1]
-        nees = wording.estimate((row[key] for key in ("nees", "nees_lo", "nees_hi")), "", ".3g")
-        text = tr(
-            "NEES of {name} at {t} s: {nees} (1 if its covariance is right).", name=name, t=f"{row['t_s']:g}", nees=nees
-        )
-        yield Sentence(text, sentences.intervals("nees", "nees", row))
+    if rows is None or not len(rows):
+        return Sentence(tr("Its consistency is not judged, as {name} gives no covariances.", name=name))
+    row = rows.iloc[-1]
+    text = tr(
+        "NEES of {name} at {t} s: {nees} (1 is right): {meaning}.",
+        name=name,
+        t=numeral(f"{row['t_s']:g}"),
+        nees=wording.estimate((row[key] for key in ("nees", "nees_lo", "nees_hi")), "", ".3g"),
+        meaning=tr(CONSISTENCY[row["nees_verdict"]]),
+    )
+    return Sentence(text, sentences.intervals("nees", "nees", row))
+
+
+def _improper_sentence(result: CaseResult, name: str, tables_by_name: TablesByName) -> list[Sentence]:
+    """How many covariances of a user filter are none, if any."""
     improper = common.select_rows(tables_by_name["failures"], case=result.name, filter=name, reason=IMPROPER)
-    if len(improper) and (count := int(improper["failed"].iloc[0])):
-        yield Sentence(
-            tr(
-                "In {count:,} of {n:,} realisations {name} gives a covariance that is not positive definite: it is no "
-                "part of NEES.",
-                count=count,
-                n=int(improper["n"].iloc[0]),
-                name=name,
-            )
-        )
+    if not len(improper) or not (count := int(improper["failed"].iloc[0])):
+        return []
+    text = tr(
+        "In {count:,} of {n:,} realisations {name} gives a covariance that is not positive definite: it is no "
+        "part of NEES.",
+        count=count,
+        n=int(improper["n"].iloc[0]),
+        name=name,
+    )
+    return [Sentence(text)]

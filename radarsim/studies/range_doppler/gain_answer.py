@@ -86,13 +86,20 @@ def _gain_sentence(
     else:
         shown = compared.iloc[0]
         final_gain = compared_value.row_value(shown, GAIN)
-        text = tr(
-            "{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}",
-            quantity=_capitalised(quantity),
-            t_s=shown["t_s"],
-            gain=gain_sentences.comparison_text(final_gain),
-            base=baseline,
-        )
+        fields = {
+            "quantity": _capitalised(quantity),
+            "t_s": shown["t_s"],
+            "gain": gain_sentences.comparison_text(final_gain),
+            "base": baseline,
+        }
+        if _is_range_alone(results):
+            text = tr("{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}", **fields)
+        else:
+            text = tr(
+                "{quantity}: at {t_s:g} s, the last scan, σ with filter '{filter}' is {gain} {base}",
+                filter=shown["filter"],
+                **fields,
+            )
         clauses = [Sentence(text, final_gain.intervals), *_long_run_clause(_long_run_gain(results, shown))]
         if not all(map(follows_the_model, results)):  # else, once settled, the gain stays what it is at the end
             best_clause = _best_gain(gains, shown, scans)
@@ -251,12 +258,18 @@ def _than_baseline(results: Sequence[Result]) -> str:
     return baseline
 
 
+def _is_range_alone(results: Sequence[Result]) -> bool:
+    """Whether the baseline filter, and no other, observes the range alone."""
+    baselines = [result.spec.filters[result.axes.baseline] for result in results]
+    range_filters = [f.name for result in results for f in result.spec.filters if f.observes == ("range",)]
+    return all(f.observes == ("range",) for f in baselines) and len(range_filters) == len(baselines)
+
+
 def _with_baseline(results: Sequence[Result]) -> str:
     """The baseline after `than`: `with range alone` if only the baseline filter observes no more."""
     baselines = [result.spec.filters[result.axes.baseline] for result in results]
     variances = {variance for variance in map(configured_variance, baselines) if isinstance(variance, float)}
-    range_filters = [f.name for result in results for f in result.spec.filters if f.observes == ("range",)]
-    if all(f.observes == ("range",) for f in baselines) and len(range_filters) == len(baselines):
+    if _is_range_alone(results):
         if len(variances) > 1:
             return tr("with range alone at the same D_M")
         return tr("with range alone")

@@ -78,6 +78,7 @@ class UserFilter(ABC):
     answer_at: tuple[str, float] | None = None  #: component and time, s, that the answer is about; None: first, last
     training_ratios: Mapping[str, float] = MappingProxyType({})  #: by case, see `note_training`
     dependent_cases: frozenset[str] = frozenset()  #: see `note_dependence`
+    faults: Mapping[str, tuple[str, ...]] = MappingProxyType({})  #: by case, see `note_faults`
 
     @abstractmethod
     def estimates(self, plots: Plots) -> Any:
@@ -95,6 +96,10 @@ class UserFilter(ABC):
     def note_dependence(self, case: str) -> None:
         """Note that its estimates of a realisation depend on the others in the batch, in a case."""
         vars(self)["dependent_cases"] = self.dependent_cases | {case}
+
+    def note_faults(self, case: str, faults: tuple[str, ...]) -> None:
+        """Note what is wrong with its estimates in a case, in sentences: a judgement says it first."""
+        vars(self)["faults"] = {**self.faults, case: faults}
 
     def warnings(self) -> list[str]:
         """Warnings about its numbers, from what has run so far."""

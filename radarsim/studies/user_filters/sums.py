@@ -48,6 +48,7 @@ class UserFilterAxes(Axes):
     answer_points: tuple[tuple[str, float], ...] = ()  #: see `Study.answer_points`
     training_ratios: tuple[tuple[str, float], ...] = ()  #: by the name of a filter: see `UserFilter.note_training`
     dependent: tuple[tuple[str, Dependence], ...] = ()  #: filters whose intervals do not hold, and why
+    faults: tuple[tuple[str, str], ...] = ()  #: by the name of a filter: see `UserFilter.note_faults`
 
 
 @dataclass(frozen=True)
@@ -263,5 +264,6 @@ def result(plan: Plan, study_result: CaseResult, sums: Mapping[str, np.ndarray])
         answer_points=tuple(plan.study.answer_points(study_result)),
         training_ratios=ratios,
         dependent=plan.invalid_intervals(study_result.count),
+        faults=tuple((member.name, fault) for member in plan.members for fault in member.faults.get(case, ())),
     )
     return replace(study_result, sums=sums, axes=axes, further_baselines=())
