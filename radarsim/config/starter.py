@@ -5,12 +5,13 @@ from typing import Any
 
 from radarsim.config.commented_yaml import CommentedYaml, description, with_comment
 from radarsim.config.common_keys import COMMON_KEYS, CommonKeys
-from radarsim.config.model import Model
+from radarsim.config.study_keys import StudyKeys
+from radarsim.config.yaml_text import one_line_yaml
 
 NAMING_KEYS = ("name", "like")  # of the config that it is taken from
 
 
-def starter_text(data: Mapping[str, Any], study_keys: type[Model], name: str, like: str) -> str:
+def starter_text(data: Mapping[str, Any], study_keys: type[StudyKeys], name: str, like: str) -> str:
     """The YAML of a config under a new name, each key with its description from the schema.
 
     data: as read, with keys as written. Missing optional keys follow as comments, with their defaults."""
@@ -31,7 +32,10 @@ def starter_text(data: Mapping[str, Any], study_keys: type[Model], name: str, li
     if study_data:
         lines += study_yaml.mapping_lines(study_data, study_keys, "")
     lines += [line for key, value in common_data.items() for line in yaml.key_lines(key, value, CommonKeys, "")]
-    missing_keys = [key for key in ("sweep", "realisations", "seed") if key not in data]
-    samples = {"sweep": "{some_key: [1, 2, 3]}", "realisations": "1e5", "seed": "1"}
-    lines += [with_comment(f"# {key}: {samples[key]}", description(CommonKeys, key)) for key in missing_keys]
+    sweep, purpose = study_keys.sample_sweep(data)
+    samples = {
+        "sweep": (one_line_yaml(sweep), purpose or description(CommonKeys, "sweep")),
+        **{key: (value, description(CommonKeys, key)) for key, value in (("realisations", "1e5"), ("seed", "1"))},
+    }
+    lines += [with_comment(f"# {key}: {value}", text) for key, (value, text) in samples.items() if key not in data]
     return "\n".join(lines) + "\n"

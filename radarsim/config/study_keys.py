@@ -35,6 +35,11 @@ class StudyKeys(Model):
         Keys that this study lacks stay as they are, so that the check refuses them. None if it cannot convert."""
         return None
 
+    @classmethod
+    def sample_sweep(cls, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+        """A sweep for a new config with this data, which stands there as a comment, and what it shows."""
+        return {"some_key": [1, 2, 3]}, ""
+
     @property
     def device(self) -> str | None:
         """The display name of the sensor: that of the first mapping with a name."""

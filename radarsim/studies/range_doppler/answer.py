@@ -42,7 +42,7 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
     return [
         *([*best, *gains] if variance_answer.sweeps_variance_only(results) else [*gains, *best]),
         *_broken_model_sentences(results, tables_by_name),
-        *variance_answer.optimised_variances(results)[:MAX_CASES],
+        *variance_answer.optimised_variances(results[:MAX_CASES]),
         *_ambiguity_sentences(results),
     ]
 

@@ -11,8 +11,9 @@ from radarsim.report import case_selection, compared_value, key_labels, tables
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import SIGMA
 from radarsim.report.sentences import Sentence
-from radarsim.report.statistics import Estimate
-from radarsim.studies.range_doppler import best_variance, counted_scans
+from radarsim.report.statistics import Estimate, simultaneous_sizes
+from radarsim.studies.range_doppler import best_gain_answer, best_variance, counted_scans
+from radarsim.studies.range_doppler.best_gain_answer import FilterChoices
 from radarsim.studies.range_doppler.config import Best, Filter
 from radarsim.studies.range_doppler.designed_case import design_case
 from radarsim.studies.range_doppler.gain_answer import TablesByName, since_text
@@ -37,20 +38,23 @@ def sweeps_variance_only(results: Sequence[Result]) -> bool:
 
 
 def best_variances(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """The best of several D_M, of targets as the filters take them to be and of others."""
-    return [*_best_settled_variances(results, tables_by_name), *_best_variances_of_broken(results, tables_by_name)]
+    """The best of several D_M: by the steady σ where it is known, else by the worst σ."""
+    return [*_best_settled_variances(results, tables_by_name), *_best_variances_by_worst(results, tables_by_name)]
 
 
 def _best_settled_variances(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
     """The best manoeuvre variance of each radar and filter where several were tried, by exact values."""
     table = tables_by_name["steady"]
     lines: list[str] = []
+    gains: list[Sentence] = []
     for members in case_selection.group_by_config(results).values():
         rows = table[table["case"].isin([result.name for result in members]) & (table["component"] == "r")]
         if rows.groupby("filter")["manoeuvre_variance"].nunique().max() > 1:
             rows_with_variance = rows[rows["manoeuvre_variance"].notna()]  # a filter of a package may have none
             best = [_best_variance(rows, str(name)) for name, rows in rows_with_variance.groupby("filter", sort=False)]
-            lines.append(f"{key_labels.without_markup(key_labels.config_device(members[0]))}: {'; '.join(best)}.")
+            name = key_labels.without_markup(key_labels.config_device(members[0]))
+            lines.append(f"{name}: {'; '.join(best)}.")
+            gains += _gains_over(members[0], name, "sigma_r", "steady", _steady_choices(rows_with_variance))
     rule = plural(
         "Best manoeuvre variance D_M, (m/s³)² (least steady σ of the range among those that settle in under {count} "
         "scan period).",
@@ -58,7 +62,29 @@ def _best_settled_variances(results: Sequence[Result], tables_by_name: TablesByN
         "scan periods).",
         PERIODS,
     )
-    return _with_rule(rule, lines)
+    return [*_with_rule(rule, lines), *gains]
+
+
+def _steady_choices(rows: "pd.DataFrame") -> list[FilterChoices]:
+    """The filters of rows of `steady` with their steady σ by D_M; best the one of those that settle."""
+    choices = []
+    for name, of_filter in rows.groupby("filter", sort=False):
+        sigmas = dict(zip(of_filter["manoeuvre_variance"], of_filter["steady_sigma"], strict=True))
+        best = [float(variance) for variance in of_filter.loc[of_filter["best"], "manoeuvre_variance"].unique()]
+        choices.append(FilterChoices(str(name), {float(v): Estimate(s, s, s) for v, s in sigmas.items()}, best))
+    return choices
+
+
+def _gains_over(
+    result: Result, subject: str, error: str, measure: str, choices: Sequence[FilterChoices]
+) -> list[Sentence]:
+    """The gains over a case's baseline, where that is among the filters with several D_M."""
+    baseline_name = result.axes.filters[result.axes.baseline]
+    baseline = next((choice for choice in choices if choice.name == baseline_name), None)
+    if baseline is None:
+        return []
+    others = [choice for choice in choices if choice.name != baseline_name]
+    return best_gain_answer.gain_sentences(subject, error, measure, baseline, others)
 
 
 def _with_rule(rule: str, lines: Sequence[str]) -> list[Sentence]:
@@ -81,10 +107,11 @@ def _best_variance(rows: "pd.DataFrame", filter_name: str) -> str:
 
 
 def cases_over_variance(results: Sequence[Result]) -> dict[str, list[Result]]:
-    """Cases of targets that break the model and differ in the D_M given, by what else they are."""
+    """Cases without a steady σ, as of targets that break the model, that differ in the D_M given, by what else they
+    are."""
     groups: dict[str, list[Result]] = {}
     for result in results:
-        if not follows_the_model(result):
+        if not (follows_the_model(result) and result.axes.plain):
             other_keys = ", ".join(
                 f"{key_labels.key_symbol(result, key)} = {key_labels.value_with_unit(result, key, value)}"
                 for key, value in result.swept_values
@@ -106,22 +133,27 @@ def _has_swept_variance(result: Result) -> bool:
     return any(_is_variance(key) for key, _ in result.swept_values) and not _optimised_filters(result)
 
 
-def _best_variances_of_broken(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """The D_M of those tried with which the worst error on a manoeuvring target is least, by radar and filter."""
+def _best_variances_by_worst(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """The D_M of those tried with which the worst error is least, by radar and filter."""
     rows = tables.group_by(tables.select_rows(tables_by_name["curves"], component="r"), "case", "filter")
-    lines = []
-    for name, members in cases_over_variance(results).items():
-        scans = _member_scans(members)
-        best = [
-            _least_worst_error(filter_name, _worst_errors(f, members, rows, scans))
+    lines: list[str] = []
+    gains: list[Sentence] = []
+    for group, members in cases_over_variance(results).items():
+        scans, name = _member_scans(members), key_labels.without_markup(group)
+        by_filter = {
+            filter_name: _worst_errors(f, members, rows, scans)
             for f, filter_name in enumerate(members[0].axes.filters)
             if not np.isnan(members[0].axes.manoeuvre_variance[f])
+        }
+        best = [_least_worst_error(filter_name, worst) for filter_name, worst in by_filter.items()]
+        lines.append(f"{name}, {since_text(scans)}: {'; '.join(best)}.")
+        choices = [
+            FilterChoices(filter_name, {v: error.bounds for v, error in worst.items()}, _equally_good(worst))
+            for filter_name, worst in by_filter.items()
         ]
-        lines.append(f"{key_labels.without_markup(name)}, {since_text(scans)}: {'; '.join(best)}.")
-    rule = tr(
-        "Best manoeuvre variance D_M, (m/s³)², on a target that breaks the filters' model (least worst σ of the range)."
-    )
-    return _with_rule(rule, lines)
+        gains += _gains_over(members[0], name, "sigma_r", "worst", choices)
+    rule = tr("Best manoeuvre variance D_M, (m/s³)² (least worst σ of the range).")
+    return [*_with_rule(rule, lines), *gains]
 
 
 def _member_scans(members: Sequence[Result]) -> counted_scans.CountedScans:
@@ -131,10 +163,19 @@ def _member_scans(members: Sequence[Result]) -> counted_scans.CountedScans:
 
 
 class _WorstError(NamedTuple):
-    """The greatest σ of a filter over the scans that count, and its time, s."""
+    """The greatest σ of a filter over the scans that count, and its time, s; with the ends of intervals that hold for
+    all scans, D_M and filters at once, so that the least of several may be taken."""
 
     sigma: ComparedValue
     t_s: float
+    bounds: Estimate
+
+
+def _worst_bounds(rows: "pd.DataFrame", looks: int) -> Estimate:
+    """The greatest σ of rows of `curves`, with an interval of which so many hold at once."""
+    measured = Estimate(*(rows[name].to_numpy(dtype=float) for name in ("sigma", "sigma_lo", "sigma_hi")))
+    widened, exact = simultaneous_sizes(measured, looks), rows["exact_sigma"].to_numpy(dtype=float)
+    return Estimate(*(float(np.nanmax(np.where(np.isnan(exact), end, exact))) for end in widened))
 
 
 def _worst_errors(
@@ -149,14 +190,16 @@ def _worst_errors(
         if not np.isnan(sigma).any():
             t_s = members[0].axes.t_s[scans.k - 1 :]
             return {
-                variance: _WorstError(ComparedValue(Estimate(worst, worst, worst), True), float(t_s[values.argmax()]))
+                variance: _WorstError(ComparedValue(worst, True), float(t_s[values.argmax()]), worst)
                 for variance, values in zip(variances, sigma, strict=True)
-                for worst in [float(values.max())]
+                for worst in [Estimate(*[float(values.max())] * 3)]
             }
-    worst_rows = [compared_value.extreme(table[table["k"] >= scans.k], SIGMA) for table in tables_of_members]
+    counted_rows = [table[table["k"] >= scans.k] for table in tables_of_members]
+    looks = len(members[0].axes.filters) * sum(map(len, counted_rows))
+    worst_rows = [compared_value.extreme(table, SIGMA) for table in counted_rows]
     return {
-        variance: _WorstError(value, float(row["t_s"]))
-        for variance, (row, value) in zip(variances, worst_rows, strict=True)
+        variance: _WorstError(value, float(row["t_s"]), _worst_bounds(table, looks))
+        for variance, (row, value), table in zip(variances, worst_rows, counted_rows, strict=True)
     }
 
 
@@ -166,6 +209,11 @@ def _computed_sigma(result: Result, f: int, variances: np.ndarray) -> np.ndarray
     filter_, spec = result.spec.filters[f], result.spec
     if spec.plots > MAX_COMPUTED_SCANS or not isinstance(filter_, Filter):
         return np.full((len(variances), spec.plots, 3), np.nan)
+    with_variances = tuple(  # those found, so that no search is made again
+        each.model_copy(update={"manoeuvre_variance": float(found)}) if isinstance(each, Filter) else each
+        for each, found in zip(spec.filters, result.axes.manoeuvre_variance, strict=True)
+    )
+    spec = spec.model_copy(update={"filters": with_variances})
     designed = design_case(Case(result.name, key_labels.config_stem(result), result.study, spec, (), 1, 1))
     filter_inputs = best_variance.FilterInputs(designed.plots, designed.x, designed.dt, designed.random_truth)
     return best_variance.errors(filter_, variances, filter_inputs)
@@ -173,10 +221,9 @@ def _computed_sigma(result: Result, f: int, variances: np.ndarray) -> np.ndarray
 
 def _least_worst_error(filter_name: str, worst_by_variance: Mapping[float, _WorstError]) -> str:
     """The D_M of a filter with the least worst σ; those together that differ by no more than their noise."""
-    ranked = sorted(worst_by_variance)
+    ranked, equal = sorted(worst_by_variance), _equally_good(worst_by_variance)
     best = min(ranked, key=lambda variance: worst_by_variance[variance].sigma.value)
     least = worst_by_variance[best].sigma
-    equal = [variance for variance in ranked if _is_equal(worst_by_variance[variance].sigma, least)]
     if len(equal) == 1:
         return tr(
             "{filter} {variance} (σ at worst {sigma:.4g} m, at {t_s:g} s)",
@@ -186,12 +233,18 @@ def _least_worst_error(filter_name: str, worst_by_variance: Mapping[float, _Wors
             t_s=worst_by_variance[best].t_s,
         )
     return tr(
-        "{filter} {variances} do equally well (σ at worst {low:.3g} to {high:.3g} m)",
+        "{filter} {variances} do equally well (σ at worst {low:.4g} to {high:.4g} m)",
         filter=filter_name,
         variances=_value_range(equal, ranked),
         low=least.value,
         high=max(worst_by_variance[variance].sigma.value for variance in equal),
     )
+
+
+def _equally_good(worst_by_variance: Mapping[float, _WorstError]) -> list[float]:
+    """The D_M with the least worst σ, and those that differ from it by no more than their noise."""
+    least = min((worst.sigma for worst in worst_by_variance.values()), key=lambda sigma: sigma.value)
+    return [variance for variance in sorted(worst_by_variance) if _is_equal(worst_by_variance[variance].sigma, least)]
 
 
 def _is_equal(worst: ComparedValue, least: ComparedValue) -> bool:
@@ -215,18 +268,34 @@ def _optimised_filters(result: Result) -> list[tuple[str, Best, float]]:
 
 
 def optimised_variances(results: Sequence[Result]) -> list[Sentence]:
-    """The D_M that were optimised on the exact errors."""
-    return [
-        Sentence(
-            tr(
-                "{case}: D_M, (m/s³)², optimised on the exact errors: {filters}.",
-                case=key_labels.plain_case_label(result),
-                filters="; ".join(_optimised_variance(result, *f) for f in _optimised_filters(result)),
-            )
-        )
-        for result in results
-        if _optimised_filters(result)
-    ]
+    """The D_M that were optimised on the exact errors, each with the gain between the filters so optimised."""
+    sentences = []
+    for result in results:
+        if optimised := _optimised_filters(result):
+            case = key_labels.plain_case_label(result)
+            filters = "; ".join(_optimised_variance(result, *f) for f in optimised)
+            text = tr("{case}: D_M, (m/s³)², optimised on the exact errors: {filters}.", case=case, filters=filters)
+            sentences += [Sentence(text), *_optimised_gains(result, case)]
+    return sentences
+
+
+def _optimised_gains(result: Result, case: str) -> list[Sentence]:
+    """The gains between filters whose D_M minimise the same, each at its best; and with the D_M of either for both."""
+    axes = result.axes
+    criterion = axes.criteria[axes.baseline]
+    if criterion is None:
+        return []
+    alike = [f for f, other in enumerate(axes.criteria) if other == criterion]
+    variances = list(dict.fromkeys(float(axes.manoeuvre_variance[f]) for f in alike))
+    choices = []
+    for f in alike:
+        sigma = _computed_sigma(result, f, np.array(variances))
+        if np.isnan(sigma[:, (criterion.from_k or 1) - 1 :]).any():
+            return []
+        values = best_variance.objective(criterion, sigma)
+        sigmas = {variance: Estimate(*[float(v)] * 3) for variance, v in zip(variances, values, strict=True)}
+        choices.append(FilterChoices(axes.filters[f], sigmas, (float(axes.manoeuvre_variance[f]),)))
+    return _gains_over(result, case, criterion.minimise, criterion.over, choices)
 
 
 def _optimised_variance(result: Result, filter_name: str, objective: Best, variance: float) -> str:
