@@ -19,14 +19,15 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.find_files import is_stem
 from radarsim.config.identity import digest, identity_keys, world_keys
 from radarsim.errors import ConfigError
-from radarsim.language.translate import translate_names
+from radarsim.language.translate import tr, translate_names
 from radarsim.report import atomic_files, csv_text, provenance
 from radarsim.report import tables as common
 from radarsim.report.comparison import figures as comparison_figures
 from radarsim.report.comparison import pairs as comparison_pairs
 from radarsim.report.comparison import sentences as comparison_sentences
-from radarsim.report.comparison import table
+from radarsim.report.comparison import summary, table
 from radarsim.report.comparison.pairs import Side
+from radarsim.report.comparison.summary import SummaryTable
 from radarsim.report.drawing.model import Figure, reworded
 from radarsim.report.drawing.page_figure import DrawnFigure
 from radarsim.report.quantities import COMMON, FLOORS, Quantity
@@ -65,7 +66,8 @@ class ComparedRun:
 class Comparison(Displayable):
     """A comparison: sentences, notes and warnings, the rows of comparison.csv; the folder and files, if any.
 
-    last: the rows at the last common time; shown_quantities: those that the terminal shows, with their wording."""
+    last: the rows at the last common time; shown_quantities: those of the summary, with their wording; summary_tables:
+    what the terminal shows of them, of `components`."""
 
     folder: Path | None
     files: tuple[str, ...]
@@ -75,6 +77,8 @@ class Comparison(Displayable):
     rows: tuple[dict[Hashable, Any], ...]
     last: tuple[dict[Hashable, Any], ...]
     shown_quantities: tuple[tuple[str, str], ...]
+    summary_tables: tuple[SummaryTable, ...] = ()
+    components: tuple[str, ...] = ()
     figures_by_name: Mapping[str, Figure] = field(default_factory=dict)
 
     @property
@@ -98,12 +102,14 @@ def compare(
     out: str | os.PathLike[str] | None = None,
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
+    component: str | None = None,
 ) -> Comparison:
     """Compare results with the first one: differences with 95 % intervals, on common axes.
 
     Each source is a result of `run` or `load`, a config with a stored result in results/ or `out`, or the folder of a
-    result; a single mapping gives them by name. out: directory for table, page and figures. If two results use the same
-    measurements and the same baseline filter, the difference is paired.
+    result; a single mapping gives them by name. out: directory for table, page and figures. component: the one that
+    sentences and summary are about, by default the first. If two results use the same measurements and the same
+    baseline filter, the difference is paired.
 
     `table` is comparison.csv: a row for each quantity, filter, component and common time. Raises ConfigError where
     results are missing or have nothing in common, StoreError where a stored one is damaged.
@@ -116,7 +122,7 @@ def compare(
     arguments.check_arguments(out=out, figures=figures, width_mm=width_mm)
     formats = arguments.figure_formats(figures)
     runs = _runs_to_compare(sources, Path(RESULTS if out is None else out))
-    comparison_table, comparison = _compare_runs(runs)
+    comparison_table, comparison = _compare_runs(runs, component)
     if out is None:
         return comparison
     return _write_comparison(Path(out) / FOLDER, runs, comparison, comparison_table, formats, width_mm)
@@ -139,7 +145,7 @@ def _runs_to_compare(sources: Sequence[Source | Mapping[str, Source]], out: Path
     return _with_distinct_names(runs)
 
 
-def _compare_runs(runs: Sequence[ComparedRun]) -> "tuple[pd.DataFrame, Comparison]":
+def _compare_runs(runs: Sequence[ComparedRun], component: str | None) -> "tuple[pd.DataFrame, Comparison]":
     """The table of a comparison, and the comparison as it is before anything is written."""
     sides_of_runs = [_sides(run) for run in runs]
     pairs, pairing_notes = comparison_pairs.pairs(_label_sides(sides_of_runs))
@@ -148,7 +154,8 @@ def _compare_runs(runs: Sequence[ComparedRun]) -> "tuple[pd.DataFrame, Compariso
         raise ConfigError(f"{' and '.join(run.label for run in runs)} share no filter and component to compare")
     shared = table.shared_quantities(side for sides in sides_of_runs for side in sides)
     translate = partial(translate_names, names=config_names(case for run in runs for case in _cases(run)))
-    sentences = map(translate, comparison_sentences.sentences(comparison_table, shared))
+    quantities = comparison_sentences.summary_quantities(comparison_table, shared)
+    summaries = summary.summaries(comparison_table, quantities, component)
     notes = [*comparison_sentences.pairing_lines(comparison_table), *pairing_notes]
     warnings = [line for run in runs for line in (*([run.note] if run.note else []), *_stale_tables(run))]
     labelled_sides = [side for sides in _label_sides(sides_of_runs) for side in sides]
@@ -156,15 +163,14 @@ def _compare_runs(runs: Sequence[ComparedRun]) -> "tuple[pd.DataFrame, Compariso
     comparison = Comparison(
         folder=None,
         files=(),
-        sentences=tuple(sentences),
+        sentences=tuple(translate(part.sentence) for part in summaries),
         notes=tuple(notes),
         warnings=tuple(warnings),
         rows=tuple(comparison_table.to_dict("records")),
         last=tuple(comparison_sentences.final_rows(comparison_table).to_dict("records")),
-        shown_quantities=tuple(
-            (quantity.value, quantity.words)
-            for quantity in comparison_sentences.summary_quantities(comparison_table, shared)
-        ),
+        shown_quantities=tuple((quantity.value, quantity.words) for quantity in quantities),
+        summary_tables=tuple(part.table for part in summaries),
+        components=tuple(dict.fromkeys(comparison_table["component"][comparison_table["component"] != ""])),
         figures_by_name={name: reworded(figure, translate) for name, figure in figures.items()},
     )
     return comparison_table, comparison
@@ -190,7 +196,7 @@ def _write_comparison(
             contents |= {f"figures/{name}.{kind}": data for kind, data in drawing.files.items()}
         if comparison.figures_by_name:
             contents["figures/captions.md"] = captions(comparison.figures_by_name).encode()
-    page = _page(runs, comparison.sentences, comparison.notes, warnings, drawings, comparison_table, contents)
+    page = _page(runs, comparison, warnings, drawings, comparison_table, contents)
     contents["compare.html"] = page.encode()
     contents["compare.json"] = provenance.to_json(_record(runs, contents))
     atomic_files.replace_all(folder, contents, stale=partial(provenance.outputs, name="compare.json"))
@@ -357,21 +363,33 @@ def _record(runs: Sequence[ComparedRun], contents: "dict[str, bytes]") -> dict[s
 
 def _page(
     runs: Sequence[ComparedRun],
-    sentences: Sequence[str],
-    notes: Sequence[str],
+    comparison: Comparison,
     warnings: Sequence[str],
     drawings: Sequence[DrawnFigure],
     comparison_table: "pd.DataFrame",
     outputs: Collection[str],
 ) -> str:
-    from radarsim.report import page, settings_tables
+    from radarsim.report import page, page_tables, settings_tables
 
     cases = [case for run in runs for case in _cases(run)]
     names = [case.name for case in cases]
     comparable = len(set(names)) == len(names) and len({case.study for case in cases}) == 1
     settings = settings_tables.settings_tables(cases) if comparable else {}
-    labels = [run.label for run in runs]
-    return page.comparison_page(labels, sentences, notes, warnings, drawings, comparison_table, settings, outputs)
+    summaries = [
+        page_tables.text_table(part.title, [tr(name) for name in part.columns], part.rows)
+        for part in comparison.summary_tables
+    ]
+    return page.comparison_page(
+        [run.label for run in runs],
+        comparison.sentences,
+        summaries,
+        comparison.notes,
+        warnings,
+        drawings,
+        comparison_table,
+        settings,
+        outputs,
+    )
 
 
 def _cases(run: ComparedRun) -> list[Case]:

@@ -135,34 +135,14 @@ def print_varying_columns(
 
 
 def print_comparison(compared: "Comparison") -> None:
-    """Differences of stored results at the last common time, and the files."""
-    from radarsim.report.comparison import sentences
-
-    compared_rows = [row for row in compared.last if row["quantity"] in dict(compared.shown_quantities)]
-    against = {row["against_label"] for row in compared.last}
-    for quantity, words in compared.shown_quantities if len(compared_rows) <= MAX_ROWS else ():
-        rows = [
-            (
-                f"{row['label']}, {row['filter']}",
-                *(
-                    row["component"] or str(row["model"]),
-                    "" if row["t_s"] != row["t_s"] else f"{row['t_s']:g} {tr('s')}",
-                ),
-                *(
-                    f"{sentences.value_text(row[key])} {tr(unit_of(row['unit']))}".rstrip()
-                    for key in ("value", "against")
-                ),
-                *sentences.change_texts(row),
-            )
-            for row in compared_rows
-            if row["quantity"] == quantity
-        ]
-        baseline_heading = tr("{quantity} of {symbol}", quantity=tr(words), symbol=next(iter(against)))
-        against_heading = baseline_heading if len(against) == 1 else tr("{quantity} against", quantity=tr(words))
-        columns = ("", "of", "at", words, against_heading, "change", "exact")
-        print_varying_columns("", ("at",), columns, rows, (*columns[2:5], "exact"), ("exact", "at"))
-    for line in compared.sentences if len(compared_rows) > MAX_ROWS else ():
-        print_line(line)
+    """For each quantity a sentence and a table of differences at the last common time, and the files."""
+    for sentence, table in zip(compared.sentences, compared.summary_tables, strict=True):
+        print_line(sentence)
+        print_table(table.title, table.columns, table.rows[:MAX_ROWS], table.columns[1:], table.spare)
+        if (omitted := len(table.rows) - MAX_ROWS) > 0:
+            print_field("", plural("{count} further row", "{count} further rows", omitted))
+    if len(compared.components) > 1:
+        print_field("more", tr("of one component: --component {names}", names=" | ".join(compared.components)))
     for line in compared.notes:
         print_field("note", line)
     folder = compared.folder

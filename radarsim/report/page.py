@@ -110,6 +110,7 @@ def _count_visible_figures(figures: Sequence[DrawnFigure]) -> int:
 def comparison_page(
     labels: Sequence[str],
     sentences: Sequence[str],
+    summaries: Sequence[Mapping[str, Any]],
     notes: Sequence[str],
     warnings: Sequence[str],
     figures: Sequence[DrawnFigure],
@@ -117,14 +118,15 @@ def comparison_page(
     differing: "Mapping[str, pd.DataFrame]",
     outputs: Collection[str],
 ) -> str:
-    """The page of a comparison: sentences, figures, differing keys, the table.
+    """The page of a comparison: sentences, summaries, figures, differing keys, the table.
 
-    differing: tables of keys by their title, empty for configs of several studies; outputs: the files beside
-    the page."""
+    summaries: of `text_table`; differing: tables of keys by their title, empty for configs of several studies; outputs:
+    the files beside the page."""
     return render_page(
         "compare.html.j2",
         labels=labels,
         sentences=sentences,
+        summaries=summaries,
         notes=notes,
         warnings=warnings,
         figures=_page_figures(figures),

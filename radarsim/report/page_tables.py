@@ -27,6 +27,12 @@ def row_table(name: str, rows: Sequence[Mapping[str, object]]) -> dict[str, Any]
     return {"name": name, "columns": columns, "rows": cells, "count": len(rows), "cut": len(rows) > len(cells)}
 
 
+def text_table(name: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str, Any]:
+    """The part of a table of texts that a page shows."""
+    headings = [{"name": column, "numeric": False} for column in columns]
+    return {"name": name, "columns": headings, "rows": rows[:MAX_ROWS], "count": len(rows), "cut": len(rows) > MAX_ROWS}
+
+
 def _column_cell(column: str, value: object) -> str:
     """The text of a cell; an infinite settling time in words."""
     is_endless = column.startswith("settling") and isinstance(value, float) and math.isinf(value)

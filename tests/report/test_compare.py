@@ -1,12 +1,14 @@
 """Comparisons of stored results: which cases answer to one another, and what the intervals of differences are worth."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from radarsim.errors import ConfigError
 from radarsim.report import csv_text, statistics, tables
-from radarsim.report.comparison import figures, pairs, sentences, table
+from radarsim.report.comparison import figures, pairs, sentences, summary, table
 from radarsim.report.comparison.pairs import Side
 from radarsim.report.drawing.model import Line
 from radarsim.report.quantities import SIGMA, Quantity
@@ -120,7 +122,7 @@ def test_cases_answer_to_one_another_by_their_swept_values():
     assert not alone
 
 
-def test_figures_have_all_sides_on_common_axes_and_sentences_the_exact_change(errors):
+def test_figures_have_all_sides_on_common_axes(errors):
     pair = pairs.Pair(side("b", errors, ["base", "one"], noise="m"), side("a", errors, ["base", "one"]))
     made = table.comparison_table([pair])
     drawn = figures.figures([pair.reference, pair.side], made)
@@ -129,7 +131,6 @@ def test_figures_have_all_sides_on_common_axes_and_sentences_the_exact_change(er
     assert len([mark for mark in apart.marks if isinstance(mark, Line)]) == 2
     looks = {(m.style.colour, m.style.dash) for m in values.marks}
     assert len(looks) == 4
-    assert sentences.sentences(made)[1].endswith(": 0 % (exact).")
     assert sentences.percent_text(2886.76) == "29.9 times"
 
 
@@ -163,3 +164,31 @@ def test_an_interval_without_an_upper_end_has_none_in_a_difference_either():
     apart = statistics.difference(statistics.Estimate(5.0, 4.0, 6.0), open_end)
     assert (apart.value, apart.lo) == (3.0, -np.inf)
     assert_rounded(apart.hi, 3 + np.sqrt(2), operations=4)
+
+
+def summary_of(errors, names, filters=("base", "one"), component=None):
+    sides = [side(name, errors, list(filters), noise=name) for name in names]
+    made = table.comparison_table([pairs.Pair(other, sides[0]) for other in sides[1:]])
+    return summary.summaries(made, [SIGMA], component)[0]
+
+
+def test_a_summary_is_one_sentence_and_one_table_without_the_case_compared_with_itself(errors):
+    single = summary_of(errors, "ab")
+    assert re.fullmatch(r"b against a, σ of r at \d+ s: base 0 % \(exact\) and one 0 % \(exact\)\.", single.sentence)
+    assert single.table.columns[:4] == ("filter", "of", "b", "a")
+    several = summary_of(errors, "abc")
+    assert re.fullmatch(r"Against a, σ of r at \d+ s: undecided in 4 of 4 pairs of case and filter\.", several.sentence)
+    assert several.table.columns == ("case", "base", "one")
+    assert [row[0] for row in several.table.rows] == ["b", "c"]
+    itself = [side("a", errors, ["base", "one"], noise="a"), side("b", errors, ["base", "one"], noise="b")]
+    made = table.comparison_table(
+        [pairs.Pair(replace(itself[0], label="mirror"), itself[0]), pairs.Pair(*itself[::-1])]
+    )
+    assert {row[0] for row in summary.summaries(made, [SIGMA])[0].table.rows} == {"base", "one"}
+    assert "mirror" not in summary.summaries(made, [SIGMA])[0].sentence
+
+
+def test_a_summary_is_about_the_component_asked_for(errors):
+    assert "σ of r at" in summary_of(errors, "ab", component="r").sentence
+    with pytest.raises(ConfigError, match="must be one of r, got 'q'"):
+        summary_of(errors, "ab", component="q")

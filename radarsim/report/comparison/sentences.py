@@ -1,12 +1,11 @@
-"""Sentences on a comparison: both values at the end, their change, and how they are paired."""
+"""Words for a comparison: the change of a value, and how values are paired; which quantities its summary has."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from radarsim.language.translate import plural, tr
-from radarsim.report import tables
+from radarsim.language.translate import tr
 from radarsim.report.comparison.table import MEANING
-from radarsim.report.quantities import COMMON, Quantity
+from radarsim.report.quantities import Quantity
 from radarsim.report.wording import interval, significant_digits
 from radarsim.report.wording import unit as unit_of
 
@@ -14,32 +13,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-MAX_SENTENCES = 12  # the table has all
-
-
-def sentences(comparison: "pd.DataFrame", measured: Iterable[Quantity] = COMMON) -> list[str]:
-    """Both values and their difference at the last common time, for the first component of `summary_quantities`."""
-    last = final_rows(comparison)
-    lines: list[str] = []
-    for quantity in summary_quantities(comparison, measured):
-        rows = last[last["quantity"] == quantity.value]
-        if not len(rows):
-            continue
-        first = tables.select_rows(rows, component=rows["component"].iloc[0], model=rows["model"].iloc[0])
-        lines += [_sentence(quantity.words, row) for row in first.to_dict("records")]
-    omitted_count = len(lines) - MAX_SENTENCES
-    if omitted_count <= 0:
-        return lines
-    remark = plural(
-        "{count} further comparison: in comparison.csv.",
-        "{count} further comparisons: in comparison.csv.",
-        omitted_count,
-    )
-    return [*lines[:MAX_SENTENCES], remark]
-
-
 def summary_quantities(comparison: "pd.DataFrame", measured: Iterable[Quantity]) -> list[Quantity]:
-    """The quantities in sentences: the first, and those that neither follow from it (gains) nor list many shares."""
+    """The quantities in the summary: the first, and those that neither follow from it (gains) nor list many shares."""
     compared_quantities = [quantity for quantity in measured if (comparison["quantity"] == quantity.value).any()]
     return [
         quantity
@@ -53,35 +28,6 @@ def final_rows(comparison: "pd.DataFrame") -> "pd.DataFrame":
     keys = ["quantity", "label", "against_label", "filter", "component", "model"]
     last = comparison.groupby(keys, sort=False).tail(1)
     return last[last["value"].notna() & last["against"].notna()]
-
-
-def _sentence(words: str, row: dict[Any, Any]) -> str:
-    symbol = str(row["component"] or row["model"])
-    unit = tr(unit_of(row["unit"]))
-    partner = f"{row['against_label']}" + (
-        "" if row["against_filter"] == row["filter"] else f", {row['against_filter']}"
-    )
-    subject = tr("{quantity} of {symbol}", quantity=tr(words), symbol=symbol) if symbol else tr(words)
-    change, exact = change_texts(row)
-    if row["t_s"] == row["t_s"]:
-        subject = tr("{what} at {t_s:g} s", what=subject, t_s=row["t_s"])
-    return tr(
-        "{label}, {filter}: {what} {value} against {against} of {other}: {change}.",
-        label=row["label"],
-        filter=row["filter"],
-        what=subject,
-        value=_value(row, "value", "exact", unit),
-        against=_value(row, "against", "against_exact", unit),
-        other=partner,
-        change=tr("{value} (exact)", value=exact) if exact else change,
-    )
-
-
-def _value(row: dict[Any, Any], measured: str, exact: str, unit: str) -> str:
-    """The exact value of a side where both have one, as their difference then is; else the measured one."""
-    if row["exact"] == row["exact"] and row["against_exact"] == row["against_exact"]:
-        return tr("{value} (exact)", value=f"{value_text(row[exact])} {unit}".rstrip())
-    return f"{value_text(row[measured])} {unit}".rstrip()
 
 
 def change_texts(row: dict[Any, Any]) -> tuple[str, str]:
