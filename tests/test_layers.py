@@ -57,9 +57,10 @@ ROOMS = {
     "studies.plot_arrays": ("studies.random_numbers",),
     "studies.recording_interface": ("config.experiment", "studies.error_law", "studies.plot_arrays"),
     "studies.floors": ("engine.results", "report", "studies.interface"),
+    "studies.counted_scans": ("config.experiment", "engine.results", "studies.interface"),
     "studies.interface": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "report", "report.drawing"),
-        *("studies.floors", "studies.recording_interface"),
+        *("studies.counted_scans", "studies.floors", "studies.recording_interface"),
     ),
     "studies.onefile": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "language", "report", "report.drawing"),
@@ -154,9 +155,9 @@ ROOMS = {
 # Inside a study: what each role may import of the rooms, and of its own study's roles.
 NUMBERS = (
     *("errors", "user_code.errors", "system.threads", "constants", "kernels", "physics", "bursts", "bursts.kernels"),
-    *(*CASE, *SUMS),
+    *(*CASE, *SUMS, "studies.counted_scans"),
 )
-DISPLAY = ("config.experiment", "engine.results", "kernels", "report")
+DISPLAY = ("config.experiment", "engine.results", "kernels", "report", "studies.counted_scans")
 DESIGN = ("kernels", "config", "design")
 COMPUTED = (*DESIGN, "study")
 DISPLAYED = (*COMPUTED, "cost", "tables", "figures")
@@ -186,7 +187,7 @@ ROLES = {
     "__init__": (
         (
             *("config.experiment", "engine.results", "language", "report", "report.drawing", "studies.floors"),
-            *("studies.interface", "studies.plot_arrays", "studies.recording_interface"),
+            *("studies.counted_scans", "studies.interface", "studies.plot_arrays", "studies.recording_interface"),
         ),
         (*DISPLAYED, "answer", "chart", "floor", "recorded_plots", "tracking"),
     ),

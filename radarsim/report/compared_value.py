@@ -19,6 +19,7 @@ from radarsim.report.statistics import Estimate
 if TYPE_CHECKING:
     import pandas as pd
 
+EQUAL = 0.01  # relative difference by which nobody would choose
 Row = Any  # a row of a table: a Series, or a mapping by column
 WIDEN = {
     "size": statistics.simultaneous_sizes,
@@ -160,6 +161,11 @@ def extreme(rows: "pd.DataFrame", quantity: Quantity, largest: bool = True) -> "
     decides = np.where(np.isnan(exact), rows[quantity.value].to_numpy(dtype=float), exact)
     row = rows.iloc[int(np.nanargmax(decides) if largest else np.nanargmin(decides))]
     return row, row_value(row, quantity).chosen_among(int(np.isnan(exact).sum()))
+
+
+def is_equal(worst: ComparedValue, least: ComparedValue) -> bool:
+    """Whether nobody would choose by the difference of two values: it is under 1 %, or within their noise."""
+    return worst.value <= least.value * (1 + EQUAL) or not are_distinguished(worst, least)
 
 
 def are_distinguished(first: ComparedValue, second: ComparedValue) -> bool:

@@ -156,3 +156,15 @@ def with_unit(value: float, name: str) -> str:
 def format_if_known(value: float, form: str = "#.4g", after: str = "") -> str:
     """`figures` of a number and its suffix, or nothing for NaN."""
     return significant_digits(value, form) + after if value == value else ""
+
+
+SINCE_TEXTS = {
+    "manoeuvre": term("from the manoeuvre on ({t_s:g} s)"),
+    "settled": term("once settled ({t_s:g} s)"),
+    "last": term("at the last scan, not settled before"),
+}
+
+
+def since(k: int, t_s: float, reason: str) -> str:
+    """From which scan on errors count, in words: the fields of `studies.counted_scans.CountedScans`."""
+    return tr("from the first scan on") if k == 1 else tr(SINCE_TEXTS[reason], t_s=t_s)

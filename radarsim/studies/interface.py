@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from radarsim.report.drawing.model import Chart, Figure
     from radarsim.report.quantities import Component, Quantity
     from radarsim.report.sentences import Sentence
+    from radarsim.studies.counted_scans import CountedScans
     from radarsim.studies.floors.bound import Floor
     from radarsim.studies.recording_interface import RecordingInterface
 
@@ -115,10 +116,21 @@ class Study(ABC):
         Raises ConfigError where the whole case is impossible."""
         return case
 
-    def counted_from_s(self, case: "Case", component: str | None) -> float | None:
-        """The time, s, from which on a worst or a mean error counts: that of a manoeuvre, or at which filters have
-        settled. Default: None, from the first estimate on."""
-        return None
+    def manoeuvre_start_s(self, spec: Any) -> float | None:
+        """The time, s, at which a case's target begins to manoeuvre. Default: the key `start_s` of its target, unless
+        its acceleration is zero."""
+        from radarsim.studies.counted_scans import target_start_s
+
+        return target_start_s(getattr(spec, "target", None))
+
+    def counted_scans(
+        self, case: "Case", component: str | None = None, axes: "Axes | None" = None
+    ) -> "CountedScans | None":
+        """The scans from which on a worst or a mean error counts: from the manoeuvre on, else once all filters have
+        settled. axes: of the case's plan, if known. Default: settled by exact σ, else by that of a few realisations."""
+        from radarsim.studies.counted_scans import study_scans
+
+        return study_scans(self, case, component, axes)
 
     def in_the_long_run(self, case: "Case") -> "Case | None":
         """A case whose last scan is that of the same filters once settled, without a manoeuvre. Default: None."""

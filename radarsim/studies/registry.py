@@ -203,7 +203,8 @@ def quantity(name: str, case: Case) -> Quantity:
 def counted_from_s(case: Case, component: str | None, over: Over, from_s: float | None) -> float | None:
     """The time, s, from which on the scans of a quantity over several count: the one asked for, else the study's."""
     if over in OVER_SCANS and from_s is None:
-        return study(case.study).counted_from_s(case, component)
+        scans = study(case.study).counted_scans(case, component)
+        return None if scans is None else scans.t_s
     return from_s
 
 

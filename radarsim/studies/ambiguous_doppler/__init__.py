@@ -104,8 +104,10 @@ class AmbiguousDoppler(Study):
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.ambiguous_doppler import answer
+        from radarsim.studies.counted_scans import result_scans
 
-        return answer.answer(results, tables)
+        scans = {result.name: result_scans(self, result) for result in results if result.axes.combines.any()}
+        return answer.answer(results, tables, scans)
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
         from radarsim.studies.ambiguous_doppler import answer

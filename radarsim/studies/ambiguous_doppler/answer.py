@@ -9,11 +9,12 @@ from radarsim.config.experiment import Experiment
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, plural, tr
 from radarsim.report import case_selection, compared_value, key_labels, rare_events, sentences, tables, wording
-from radarsim.report.compared_value import ComparedValue
+from radarsim.report.compared_value import ComparedValue, is_equal
 from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import Estimate
 from radarsim.studies.ambiguous_doppler import remedy_answer
 from radarsim.studies.ambiguous_doppler.tables import Result
+from radarsim.studies.counted_scans import CountedScans
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,14 +49,17 @@ def question(experiment: Experiment) -> str:
     return tr("Which filter order follows the target of {radars}, and how should several be combined?", radars=names)
 
 
-def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+def answer(
+    results: Sequence[Result], tables_by_name: TablesByName, scans: Mapping[str, CountedScans]
+) -> list[Sentence]:
     """For each case: from which scan on folded velocity is as good as unfolded, within 5 %; how often it is right.
 
     Of filters of several orders: the largest error of each over the scans, beside that of the best single order.
-    First, of all cases: the filter of the least error, or in how many folded velocity is as good."""
+    First, of all cases: the filter of the least error, or in how many folded velocity is as good. scans: those that
+    count, of each case that combines orders."""
     reported, remark = case_selection.select_reported(results, 6)
-    of_all_cases = [*_least_error_of_all(results, tables_by_name), *_as_good_in_cases(results, tables_by_name)]
-    of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name)]
+    of_all_cases = [*_least_error_of_all(results, tables_by_name, scans), *_as_good_in_cases(results, tables_by_name)]
+    of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name, scans)]
     filters = [(result, name) for result in reported for name in _reported_filters(result)]
     remedies = remedy_answer.remedy_sentence(filters, tables_by_name)
     return [*of_all_cases[:1], *of_cases, *remedies, _prior_sentence(results), *map(Sentence, remark)]
@@ -81,7 +85,7 @@ def _span_text(values: Sequence[float]) -> str:
     return low if low == high else tr("{low} to {high}", low=low, high=high)
 
 
-def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Sentence]:
+def _case_sentences(result: Result, tables_by_name: TablesByName, scans: Mapping[str, CountedScans]) -> list[Sentence]:
     case_sentences = []
     spans = wording.list_numbers(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _reported_filters(result):
@@ -93,7 +97,9 @@ def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Senten
         if clauses:
             sentence = sentences.join("; ", clauses)
             case_sentences.append(sentence.with_text(f"{subject}: {sentence.text}."))
-    return [*case_sentences, *(_orders_sentence(result, tables_by_name) if result.axes.combines.any() else [])]
+    if result.name not in scans:
+        return case_sentences
+    return [*case_sentences, *_orders_sentence(result, tables_by_name, scans[result.name])]
 
 
 def _reported_filters(result: Result) -> list[str]:
@@ -103,12 +109,12 @@ def _reported_filters(result: Result) -> list[str]:
     return [f.name for f in means or unfolding]
 
 
-def _largest_errors(result: Result, tables_by_name: TablesByName) -> "pd.DataFrame":
-    """The row of each filter's largest σ of range over the scans; the first plot is common.
+def _largest_errors(result: Result, tables_by_name: TablesByName, scans: CountedScans) -> "pd.DataFrame":
+    """The row of each filter's largest σ of range over the scans that count.
 
     decides: σ, exact where it is known exactly; looks: measured values among which it was chosen"""
     curves = tables.select_rows(tables_by_name["curves"], case=result.name, component="r")
-    curves = curves[(curves["k"] > 1) & (curves["n"] > 0)]
+    curves = curves[(curves["k"] >= scans.k) & (curves["n"] > 0)]
     looks = curves["exact_sigma"].isna().groupby(curves["filter"]).transform("sum")
     curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"), looks=looks)
     return curves.loc[curves.groupby("filter", sort=False)["decides"].idxmax()]
@@ -128,15 +134,17 @@ def _scans_remark(rows: "Iterable[pd.Series[Any]]") -> str:
     return " " + tr("(intervals for all scans at once)") if any(_largest_sigma(row).looks > 1 for row in rows) else ""
 
 
-def _least_error_of_all(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """The filter whose largest σ of range in any case is least, and the best of the other kind: one order, or several.
+def _least_error_of_all(
+    results: Sequence[Result], tables_by_name: TablesByName, scans: Mapping[str, CountedScans]
+) -> list[Sentence]:
+    """The filters whose largest σ of range in any case is least, and the best of the other kind: one order, or several.
 
     None where no filter combines orders, or none had a plot."""
     combining = [result for result in results if result.axes.combines.any()]
     combinations = {f.name for result in combining for f in result.spec.filters if f.combine is not None}
     worst_rows: dict[str, tuple[pd.Series[Any], Result]] = {}
     for result in combining:
-        for _, row in _largest_errors(result, tables_by_name).iterrows():
+        for _, row in _largest_errors(result, tables_by_name, scans[result.name]).iterrows():
             name = row["filter"]
             if name not in worst_rows or row["decides"] > worst_rows[name][0]["decides"]:
                 worst_rows[name] = row, result
@@ -148,13 +156,17 @@ def _least_error_of_all(results: Sequence[Result], tables_by_name: TablesByName)
     other_row, other_case = worst_rows[other_kind[0]]
     if not compared_value.are_distinguished(_largest_sigma(best_row), _largest_sigma(other_row)):
         return []
+    best_value = _largest_sigma(best_row)
+    same_kind = [name for name in ranked if name not in other_kind]
+    equal = [name for name in same_kind if is_equal(_largest_sigma(worst_rows[name][0]), best_value)]
+    since_texts = {wording.since(*scans[result.name]) for result in combining}
     text = plural(
-        "{best} keeps σ of the range after the first plot within {least}; {kind}, {other}, comes to {most} "
+        "Least σ of the range at worst, {since}: {best}, {least}; {kind}, {other}, comes to {most} ({where}){scans}.",
+        "Least σ of the range at worst, {since}, in {count} cases: {best}, {least}; {kind}, {other}, comes to {most} "
         "({where}){scans}.",
-        "{best} keeps σ of the range after the first plot within {least} in all {count} cases; {kind}, {other}, "
-        "comes to {most} ({where}){scans}.",
         len(combining),
-        best=ranked[0],
+        since=since_texts.pop() if len(since_texts) == 1 else tr("after the start of the track"),
+        best=join_names(equal),
         least=_sigma_m(best_row),
         kind=tr("the best combination") if other_kind[0] in combinations else tr("the best single order"),
         other=other_kind[0],
@@ -165,22 +177,24 @@ def _least_error_of_all(results: Sequence[Result], tables_by_name: TablesByName)
     return [Sentence(text, (*_largest_sigma(best_row).intervals, *_largest_sigma(other_row).intervals))]
 
 
-def _orders_sentence(result: Result, tables_by_name: TablesByName) -> list[Sentence]:
-    """The largest σ of range over the scans of every filter, and what remains to be gained.
+def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: CountedScans) -> list[Sentence]:
+    """The largest σ of range of every filter over the scans that count, and what remains to be gained.
 
     None where no realisation had a plot."""
-    worst = _largest_errors(result, tables_by_name)
+    worst = _largest_errors(result, tables_by_name, counted)
     if not len(worst):
         return []
     errors = [
         tr("{filter}, {sigma} at scan {k}", filter=row["filter"], sigma=_sigma_m(row), k=row["k"])
         for _, row in worst.iterrows()
     ]
-    scans = _scans_remark(row for _, row in worst.iterrows())
-    clauses = [tr("largest σ of the range after the first plot: {filters}", filters="; ".join(errors)) + scans]
+    remark = _scans_remark(row for _, row in worst.iterrows())
+    text = tr("largest σ of the range {since}: {filters}", since=wording.since(*counted), filters="; ".join(errors))
+    clauses = [text + remark]
     axes = result.axes
     best_order, best_combination = (
-        float(np.min(np.max(sigma[axes.combines, 1:, 0], axis=1))) for sigma in (axes.best_order, axes.best_combination)
+        float(np.min(np.max(sigma[axes.combines, counted.k - 1 :, 0], axis=1)))
+        for sigma in (axes.best_order, axes.best_combination)
     )
     if np.isfinite(best_order) and np.isfinite(best_combination):
         clauses.append(

@@ -150,6 +150,12 @@ class Flight(Target):
         "phases tried in the first window", "phases, in order"
     )
 
+    @property
+    def start_s(self) -> float | None:
+        """When the first acceleration is commanded, s from the first plot; None where none is."""
+        commands = ((p.lateral_mps2, p.normal_mps2, p.axial_mps2) for p in self.phases)
+        return next((p.start_s for p, command in zip(self.phases, commands, strict=True) if any(command)), None)
+
     @cross_check
     def _phases_in_order(self) -> Iterator[CheckError]:
         starts = [phase.start_s for phase in self.phases]

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from radarsim.engine.results import Axes, CaseResult
     from radarsim.report.drawing.model import Chart, Figure
     from radarsim.report.sentences import Sentence
+    from radarsim.studies.counted_scans import CountedScans
     from radarsim.studies.floors.bound import Floor
     from radarsim.studies.range_doppler.config import Keys
     from radarsim.studies.range_doppler.package_filters import GivenGains
@@ -69,10 +70,10 @@ class RangeDoppler(Study):
 
         return study.shorten_case(case, at_s, at_k)
 
-    def counted_from_s(self, case: "Case", component: str | None) -> float | None:
+    def counted_scans(self, case: "Case", component: str | None = None, axes: "Axes | None" = None) -> "CountedScans":
         from radarsim.studies.range_doppler import long_run
 
-        return long_run.counted_from_s(case, component)
+        return long_run.counted_scans(case, component)
 
     def in_the_long_run(self, case: "Case") -> "Case | None":
         from radarsim.studies.range_doppler import long_run

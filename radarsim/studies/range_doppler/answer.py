@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 from radarsim.config.experiment import Experiment
 from radarsim.language.translate import join_names, plural, tr
-from radarsim.report import compared_value, key_labels, sentences, tables
+from radarsim.report import compared_value, key_labels, sentences, tables, wording
 from radarsim.report.quantities import SIGMA
 from radarsim.report.sentences import Sentence
-from radarsim.studies.range_doppler import counted_scans, gain_answer, variance_answer
+from radarsim.studies.range_doppler import gain_answer, settling, variance_answer
 from radarsim.studies.range_doppler.config import FOLDED_STUDY, can_fold
 from radarsim.studies.range_doppler.tables import Result, follows_the_model, span_mps
 
@@ -55,7 +55,7 @@ def _broken_model_sentences(results: Sequence[Result], tables_by_name: TablesByN
     rows = tables.group_by(tables.select_rows(tables_by_name["curves"], component="r"), "case", "filter")
     broken_sentences = []
     for result in broken[:MAX_CASES]:
-        counted = counted_scans.case_scans(result.spec, result.axes.manoeuvre_variance, component=0)
+        counted = settling.case_scans(result.spec, result.axes.manoeuvre_variance, component=0)
         clauses = [
             _worst_errors(filter_rows[filter_rows["k"] >= counted.k], name)
             for name in result.axes.filters
@@ -64,7 +64,7 @@ def _broken_model_sentences(results: Sequence[Result], tables_by_name: TablesByN
         text = tr(
             "{case}, a target that breaks the filters' model, {since}: {filters}.",
             case=key_labels.plain_case_label(result),
-            since=gain_answer.since_text(counted),
+            since=wording.since(*counted),
             filters=sentences.join("; ", clauses).text,
         )
         broken_sentences.append(sentences.compose(text, clauses))

@@ -11,7 +11,8 @@ import numpy as np
 
 from radarsim.kernels.kalman_algebra import pack
 from radarsim.physics.motion import process_noise
-from radarsim.studies.range_doppler import counted_scans
+from radarsim.studies import counted_scans
+from radarsim.studies.range_doppler import settling
 from radarsim.studies.range_doppler.config import Best, Filter, Target, configured_variance
 from radarsim.studies.range_doppler.error_recursion import Plots, defects, scans, start_errors
 from radarsim.studies.range_doppler.filter_design import least_squares_start
@@ -65,15 +66,15 @@ def complete_criteria(
     if not undecided:
         return tuple(criteria)
     scans, plots, dt = len(filter_inputs.x), filter_inputs.plots, filter_inputs.dt
-    started, settled = counted_scans.started_scan([f for f, _ in undecided], plots.detection, scans), []
-    t = dt * np.arange(scans)
-    if counted_scans.manoeuvre_scan(target, t) is None:
+    started, settled = settling.started_scan([f for f, _ in undecided], plots.detection, scans), []
+    t, start_s = dt * np.arange(scans), counted_scans.target_start_s(target)
+    if counted_scans.manoeuvre_scan(start_s, t) is None:
         for filter_, criterion in undecided:
             early = with_first_scan(criterion, min(started, scans))
             variance = best_variance(filter_, early, filter_inputs.without_misses)
             options = variance, tuple(map(float, plots.sigma)), dt, plots.detection, scans
-            settled.append(counted_scans.settled_scans(filter_, *options)[COMPONENTS[early.minimise]])
-    k = counted_scans.counted_scans(target, t, started, settled, every=False).k
+            settled.append(settling.settled_scans(filter_, *options)[COMPONENTS[early.minimise]])
+    k = counted_scans.counted_scans(start_s, t, started, settled, every=False).k
     return tuple(criterion and with_first_scan(criterion, criterion.from_k or k) for criterion in criteria)
 
 

@@ -7,13 +7,14 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, term, tr
-from radarsim.report import case_selection, compared_value, gain_sentences, key_labels, sentences, tables
+from radarsim.language.translate import join_names, tr
+from radarsim.report import case_selection, compared_value, gain_sentences, key_labels, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import GAIN, RADIAL
 from radarsim.report.sentences import Sentence
+from radarsim.studies.counted_scans import CountedScans
 from radarsim.studies.range_doppler.config import configured_variance
-from radarsim.studies.range_doppler.counted_scans import CountedScans, case_scans
+from radarsim.studies.range_doppler.settling import case_scans
 from radarsim.studies.range_doppler.study import prepare
 from radarsim.studies.range_doppler.tables import Result, follows_the_model, steady_sigma
 
@@ -23,12 +24,6 @@ if TYPE_CHECKING:
 TablesByName = Mapping[str, "pd.DataFrame"]
 LONG_RUN_MARGIN = 1.0  # per cent: a gain further than this from that of the long run has not settled
 MIN_LOSS = 1.0  # per cent: from this loss on a case's worst gain is in the answer
-
-SINCE_TEXTS = {
-    "manoeuvre": term("from the manoeuvre on ({t_s:g} s)"),
-    "settled": term("once settled ({t_s:g} s)"),
-    "last": term("at the last scan, not settled before"),
-}
 
 
 def answer_gains(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
@@ -214,7 +209,7 @@ def _best_gain(
     if best["k"] == sentence_row["k"]:
         return []
     text = tr(
-        "{since} at best {gain}, at {t_s:g} s", since=since_text(counted), gain=_extreme_text(gain), t_s=best["t_s"]
+        "{since} at best {gain}, at {t_s:g} s", since=wording.since(*counted), gain=_extreme_text(gain), t_s=best["t_s"]
     )
     return [Sentence(text, gain.intervals)]
 
@@ -241,13 +236,8 @@ def _worst_loss(
         text = tr("at worst {gain}, at {t_s:g} s", **fields)
     counted = scans[worst["case"]]
     if says_since and counted.reason != "last":
-        text = f"{since_text(counted)} {text}"
+        text = f"{wording.since(*counted)} {text}"
     return [Sentence(text, loss.intervals)]
-
-
-def since_text(counted: CountedScans) -> str:
-    """From when errors count, in words."""
-    return tr(SINCE_TEXTS[counted.reason], t_s=counted.t_s)
 
 
 def _than_baseline(results: Sequence[Result]) -> str:

@@ -6,7 +6,8 @@ import numpy as np
 
 from radarsim.config import radial_keys
 from radarsim.config.experiment import Case
-from radarsim.studies.range_doppler import counted_scans, scenario, steady_state
+from radarsim.studies.counted_scans import CountedScans, scan_with_plots
+from radarsim.studies.range_doppler import scenario, settling, steady_state
 from radarsim.studies.range_doppler.config import MAX_SCANS, Best, Filter, Keys, configured_variance
 from radarsim.studies.range_doppler.designed_case import design_case
 
@@ -18,11 +19,11 @@ MIN_SCANS = 32
 COMPONENTS = ("r", "Vr", "ar")
 
 
-def counted_from_s(case: Case, component: str | None) -> float:
-    """The time, s, from which on the errors of a case's filters in a component count, by default the range."""
+def counted_scans(case: Case, component: str | None) -> CountedScans:
+    """The scans that count for the errors of a case's filters in a component, by default the range."""
     variances = np.array(_variances(case))
     index = COMPONENTS.index(component) if component in COMPONENTS else 0
-    return counted_scans.case_scans(case.spec, variances, index).t_s
+    return settling.case_scans(case.spec, variances, index)
 
 
 def steady_sigma(case: Case) -> np.ndarray | None:
@@ -71,7 +72,7 @@ def _scans_to_settle(spec: Keys, variances: tuple[float, ...]) -> int | None:
     sigma, dt = (radar.sigma_range_m, radar.sigma_velocity_mps), radar.scan_period_s
     while scans < MAX_SCANS:
         plots = max(
-            max(counted_scans.settled_scans(filter_, variance, sigma, dt, 1.0, scans))
+            max(settling.settled_scans(filter_, variance, sigma, dt, 1.0, scans))
             for filter_, variance in zip(spec.filters, variances, strict=True)
         )
         if plots <= scans:
@@ -81,8 +82,8 @@ def _scans_to_settle(spec: Keys, variances: tuple[float, ...]) -> int | None:
         return None
     if radar.detection_probability == 1:
         return min(max(SETTLING_TIMES * plots, MIN_SCANS), MAX_SCANS)
-    enough = counted_scans.scan_with_plots(SETTLING_TIMES_MISSED * plots, radar.detection_probability, MAX_SCANS)
-    settled = counted_scans.scan_with_plots(plots, radar.detection_probability, MAX_SCANS)
+    enough = scan_with_plots(SETTLING_TIMES_MISSED * plots, radar.detection_probability, MAX_SCANS)
+    settled = scan_with_plots(plots, radar.detection_probability, MAX_SCANS)
     if enough <= MAX_EXACT_SCANS or settled > MAX_EXACT_SCANS:
         return max(enough, MIN_SCANS) if enough <= MAX_ROUGH_SCANS else None
     return MAX_EXACT_SCANS

@@ -13,8 +13,8 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import case_selection, consistency_tables, interval_notes, key_labels, statistics
 from radarsim.report import tables as common
+from radarsim.studies.counted_scans import SETTLED, first_for_good
 from radarsim.studies.range_doppler import package_filters, steady_state
-from radarsim.studies.range_doppler.counted_scans import SETTLED, first_for_good
 from radarsim.studies.range_doppler.study import RangeDopplerAxes
 
 if TYPE_CHECKING:

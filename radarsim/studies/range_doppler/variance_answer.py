@@ -7,22 +7,22 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.language.translate import join_names, plural, term, tr
-from radarsim.report import case_selection, compared_value, key_labels, tables
+from radarsim.report import case_selection, compared_value, key_labels, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import SIGMA
 from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import Estimate, simultaneous_sizes
-from radarsim.studies.range_doppler import best_gain_answer, best_variance, counted_scans
+from radarsim.studies.counted_scans import CountedScans
+from radarsim.studies.range_doppler import best_gain_answer, best_variance, settling
 from radarsim.studies.range_doppler.best_gain_answer import FilterChoices
 from radarsim.studies.range_doppler.config import Best, Filter
 from radarsim.studies.range_doppler.designed_case import design_case
-from radarsim.studies.range_doppler.gain_answer import TablesByName, since_text
+from radarsim.studies.range_doppler.gain_answer import TablesByName
 from radarsim.studies.range_doppler.tables import PERIODS, Result, follows_the_model
 
 if TYPE_CHECKING:
     import pandas as pd
 
-EQUAL = 0.01  # relative difference of two worst errors that nobody would choose a D_M by
 MAX_COMPUTED_SCANS = 1000  # of a run: 0.3 s for each D_M
 MIN_RANGE = 3  # values next to each other that are named as a range
 CRITERION_TEXTS = {
@@ -146,7 +146,7 @@ def _best_variances_by_worst(results: Sequence[Result], tables_by_name: TablesBy
             if not np.isnan(members[0].axes.manoeuvre_variance[f])
         }
         best = [_least_worst_error(filter_name, worst) for filter_name, worst in by_filter.items()]
-        lines.append(f"{name}, {since_text(scans)}: {'; '.join(best)}.")
+        lines.append(f"{name}, {wording.since(*scans)}: {'; '.join(best)}.")
         choices = [
             FilterChoices(filter_name, {v: error.bounds for v, error in worst.items()}, _equally_good(worst))
             for filter_name, worst in by_filter.items()
@@ -156,9 +156,9 @@ def _best_variances_by_worst(results: Sequence[Result], tables_by_name: TablesBy
     return [*_with_rule(rule, lines), *gains]
 
 
-def _member_scans(members: Sequence[Result]) -> counted_scans.CountedScans:
+def _member_scans(members: Sequence[Result]) -> CountedScans:
     """The scans that count for cases that differ in D_M: those at which all have settled that settle in the run."""
-    counted = [counted_scans.case_scans(member.spec, member.axes.manoeuvre_variance, component=0) for member in members]
+    counted = [settling.case_scans(member.spec, member.axes.manoeuvre_variance, component=0) for member in members]
     return max([scans for scans in counted if scans.reason != "last"] or counted)
 
 
@@ -179,7 +179,7 @@ def _worst_bounds(rows: "pd.DataFrame", looks: int) -> Estimate:
 
 
 def _worst_errors(
-    f: int, members: Sequence[Result], rows: "Mapping[tuple[str, str], pd.DataFrame]", scans: counted_scans.CountedScans
+    f: int, members: Sequence[Result], rows: "Mapping[tuple[str, str], pd.DataFrame]", scans: CountedScans
 ) -> dict[float, _WorstError]:
     """The worst error of filter f by its D_M; computed where the tables have it measured alone, so that noise does not
     decide."""
@@ -244,11 +244,11 @@ def _least_worst_error(filter_name: str, worst_by_variance: Mapping[float, _Wors
 def _equally_good(worst_by_variance: Mapping[float, _WorstError]) -> list[float]:
     """The D_M with the least worst σ, and those that differ from it by no more than their noise."""
     least = min((worst.sigma for worst in worst_by_variance.values()), key=lambda sigma: sigma.value)
-    return [variance for variance in sorted(worst_by_variance) if _is_equal(worst_by_variance[variance].sigma, least)]
-
-
-def _is_equal(worst: ComparedValue, least: ComparedValue) -> bool:
-    return worst.value <= least.value * (1 + EQUAL) or not compared_value.are_distinguished(worst, least)
+    return [
+        variance
+        for variance in sorted(worst_by_variance)
+        if compared_value.is_equal(worst_by_variance[variance].sigma, least)
+    ]
 
 
 def _value_range(values: Sequence[float], ranked: Sequence[float]) -> str:

@@ -107,9 +107,10 @@ class Smoothing(Part):
         return answer.question(specs)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+        from radarsim.studies.counted_scans import result_scans
         from radarsim.studies.sonar import answer
 
-        return answer.answer(results, tables)
+        return answer.answer(results, tables, {result.name: result_scans(STUDY, result) for result in results})
 
     def drawing(self, case: "Case") -> "DrawPlots":
         from radarsim.studies.sonar import tracking
@@ -251,6 +252,12 @@ class Sonar(Study):
         if spec is None:
             return COMMON + TRACKING + FLOORS
         return COMMON + (TRACKING if "clutter" in spec.parts else FLOORS)
+
+    def manoeuvre_start_s(self, spec: "Keys") -> float | None:
+        from radarsim.studies.sonar.manoeuvre.phases import manoeuvre_times
+
+        times = manoeuvre_times(spec.target)
+        return None if times is None else times[0]
 
     def prepare(self, case: "Case") -> "Plan":
         return last_part(case.spec).prepare(case)

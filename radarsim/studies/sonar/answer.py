@@ -10,6 +10,7 @@ from radarsim.language.translate import shorten_names, tr
 from radarsim.report import case_selection, compared_value, key_labels, statistics, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
+from radarsim.studies.counted_scans import CountedScans
 from radarsim.studies.sonar.axes import SonarAxes
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 from radarsim.studies.sonar.config import Keys
@@ -41,13 +42,18 @@ def _has_correlated_errors(specs: Sequence[Keys]) -> bool:
     return any(coordinate_correlation(spec.sensor.error_correlation, c) for spec in specs for c in range(3))
 
 
-def answer(results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]") -> list[Sentence]:
-    """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter.
+def answer(
+    results: Sequence[CaseResult[SonarAxes]],
+    tables_by_name: "Mapping[str, pd.DataFrame]",
+    scans: Mapping[str, CountedScans],
+) -> list[Sentence]:
+    """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter at the scans
+    that count, which are given by case.
 
     First what the question is about: the bias of the conversion, or what correlated errors do to a filter's own σ."""
     reported, remark = case_selection.select_reported(results)
     sigma = [_final_sigma(result, tables_by_name) for result in reported]
-    optimistic = _most_optimistic(results, tables_by_name)
+    optimistic = _most_optimistic(results, tables_by_name, scans)
     if _has_correlated_errors([result.spec for result in results]):
         return [*optimistic, *sigma, *map(Sentence, remark)]
     return [*map(Sentence, _bias_of_conversion(results, tables_by_name)), *sigma, *optimistic, *map(Sentence, remark)]
@@ -123,11 +129,15 @@ def _filters_and_sigma(rows: "pd.DataFrame", sigma: ComparedValue) -> str:
 
 
 def _most_optimistic(
-    results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
+    results: Sequence[CaseResult[SonarAxes]],
+    tables_by_name: "Mapping[str, pd.DataFrame]",
+    scans: Mapping[str, CountedScans],
 ) -> list[Sentence]:
-    """The filters, of complete state, that overestimate their accuracy the most; none if no filter does."""
+    """The filters, of complete state, that overestimate their accuracy the most at the scans that count; none if no
+    filter does."""
     curves = tables_by_name["curves"]
     curves = curves[curves["case"].isin([result.name for result in results])]
+    curves = curves[curves["k"] >= curves["case"].map({name: counted.k for name, counted in scans.items()})]
     complete = set(tables_by_name["consistency"][["case", "filter", "k"]].itertuples(index=False, name=None))
     curves = curves[[key in complete for key in curves[["case", "filter", "k"]].itertuples(index=False, name=None)]]
     believed = curves["believed_sigma"].to_numpy(dtype=float)
@@ -145,7 +155,9 @@ def _most_optimistic(
     equal = shorten_names(list(filters["filter"][(filters["ratio"] - worst["ratio"]).abs() < EQUAL_RATIOS]))
     swept = key_labels.without_markup(key_labels.swept_description(result))
     text = tr(
-        "Most optimistic: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan {k}).",
+        "Most optimistic {since}: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan "
+        "{k}).",
+        since=wording.since(*scans[worst["case"]]),
         filter=f"{equal} ({swept})" if swept else equal,
         ratio=ratio.text(form=".2f"),
         quantity=COMPONENTS_BY_NAME[worst["component"]].words,

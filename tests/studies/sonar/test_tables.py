@@ -44,9 +44,10 @@ def test_filters_of_equal_accuracy_are_named_together(results):
     """Without process noise the Kalman filter is growing memory; and what is asked is answered first."""
     first, *_, optimistic = results["sonar_fluctuating"].answer
     assert "least with growing and kalman, " in first
-    assert optimistic.startswith("Most optimistic: growing and kalman (target = sonar turning); the true σ is ")
+    start = "Most optimistic from the manoeuvre on (120 s): growing and kalman (target = sonar turning); the true σ is "
+    assert optimistic.startswith(start)
     first, second, *_ = results["sonar_correlated"].answer
-    assert first.startswith("Most optimistic: naive (ρ = 0.9")
+    assert first.startswith("Most optimistic from the first scan on: naive (ρ = 0.9")
     curves = results["sonar_correlated"].tables["curves"]
     assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.2f} (exact) times" in first
     assert "least with augmented and differenced, " in second

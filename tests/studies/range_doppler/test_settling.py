@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 import radarsim
-from radarsim.studies.range_doppler import counted_scans
+from radarsim.studies.range_doppler import settling
 from radarsim.studies.range_doppler.config import Filter
 
 SIGMA, DT, SCANS = (15.0, 0.8), 2.5, 60
@@ -35,7 +35,7 @@ def sigma_by_scan(observes, variance, scans):
 def test_a_filter_has_settled_from_the_scan_of_its_own_recursion_on(observes, variance, detection):
     keys = {"name": "a", "observes": ("range", "velocity")[:observes], "manoeuvre_variance": variance}
     filter_ = Filter.model_validate(keys)
-    found = counted_scans.settled_scans(filter_, variance, SIGMA, DT, detection, SCANS)
+    found = settling.settled_scans(filter_, variance, SIGMA, DT, detection, SCANS)
     sigma = sigma_by_scan(observes, variance, 2000)
     for c, k in enumerate(found):
         wrong = np.flatnonzero(~(np.abs(sigma[:, c] / sigma[-1, c] - 1) <= 0.05))
