@@ -4,8 +4,8 @@
 
 Recordings are of the config's own target, in one track, with a σ of 60 m in range_doppler. Each range is an outlier
 with the stated probability: off by the size, to either side, besides its error. A size is in σ: 5 is 300 m, 1e5 is
-6000 km. Printed are the intervals that hold σ of range, per cent, those of the other σ together, and how many fits say
-that outliers look like sound plots.
+6000 km. Each cell has recordings of its own: the chance of common ones would show in all. Printed are the intervals
+that hold σ of range, per cent, those of the other σ together, and how many fits say that outliers look sound.
 """
 
 import argparse
@@ -28,8 +28,8 @@ CONFIGS = {  # config, overrides, filter
     "multimodel": ("multimodel_1hz", (), None),
     "ambiguous_doppler": ("ambiguous_rls2", (), None),
 }
-SHARES = 0.001, 0.005, 0.01, 0.02, 0.05, 0.1
-SIZES = 3.0, 5.0, 10.0, 100.0, 1e3, 1e4, 1e5
+SHARES = 0.001, 0.01, 0.1
+SIZES = 3.0, 10.0, 100.0, 1e5
 
 
 def main() -> None:
@@ -45,9 +45,10 @@ def main() -> None:
     case = experiment.cases[0]
     print(f"{options.study}, {options.rows} rows, {options.recordings} recordings a cell", flush=True)
     print("share of outliers  size, σ  range, %  other σ, %  warned, %  refused  CPU s a fit", flush=True)
-    for share, size in [(0.0, 0.0), *((share, size) for share in options.shares for size in options.sizes)]:
+    cells = [(0.0, 0.0), *((share, size) for share in options.shares for size in options.sizes)]
+    for cell, (share, size) in enumerate(cells):
         started, results = time.process_time(), []
-        for number in range(options.recordings):
+        for number in range(cell * options.recordings, (cell + 1) * options.recordings):
             likelihood = recording_interface(case).likelihood(
                 case, filter_name, [recording(experiment, number, share, size)]
             )

@@ -12,7 +12,7 @@ from radarsim.report.wording import format_if_known, interval, printable, signif
 if TYPE_CHECKING:
     from radarsim.recordings.fit.advice import Advice
     from radarsim.recordings.fit.fit import Fit
-    from radarsim.recordings.fit.profile_search import FittedKey
+    from radarsim.recordings.fit.profile_intervals import FittedKey
     from radarsim.recordings.registration.result import Registration
     from radarsim.recordings.report.innovation_tests import InnovationTest
     from radarsim.recordings.tracking_result import TrackingResult

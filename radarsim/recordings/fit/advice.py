@@ -23,6 +23,7 @@ from radarsim.recordings.fit.likelihood_slice import (
     Progress,
     Rival,
     climb,
+    half_chi2,
     log_likelihood,
     maximise,
     no_progress,
@@ -136,10 +137,8 @@ def _with_turn_error(case: Case, likelihood: Likelihood, finding: Finding) -> Fi
 
 def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> list[Finding]:
     """Errors in the configured numbers, the one with most weight first; empty if nothing is wrong."""
-    from scipy.stats import chi2
-
     counted, names = CountedLikelihood(likelihood, progress), [*likelihood.keys, *single_explanations(likelihood)]
-    needed = 0.5 * float(chi2.ppf(1 - FALSE_FINDING_LEVEL / len(names), 1))
+    needed = half_chi2(1 - FALSE_FINDING_LEVEL / len(names))
     chosen_names: list[str] = []
     start: dict[str, float] = {}
     value_so_far, results = log_likelihood(counted, {}), []

@@ -1,7 +1,7 @@
 """Fit the numbers of a config to recorded plots by maximum likelihood.
 
 The filter's predictions give each plot a density; their product is the likelihood of the filter's parameters (Schweppe
-1965). Estimates maximise it; intervals are those of `profile_search`. Besides the keys, outliers, a bias, or errors
+1965). Estimates maximise it; intervals are those of `profile_intervals`. Besides the keys, outliers, a bias, or errors
 correlated from plot to plot may explain the plots. Clear outliers and clear correlation are fitted too."""
 
 import math
@@ -25,16 +25,17 @@ from radarsim.recordings.fit.likelihood_slice import (
     Progress,
     Rival,
     climb,
+    half_chi2,
     maximise,
     no_progress,
     rival_of_outliers,
     single_explanations,
 )
+from radarsim.recordings.fit.profile_intervals import FittedKey, ProfileIntervals
 from radarsim.recordings.fit.profile_search import (
     EXPLANATION_EVALUATIONS,
     MAX_NEAR_SHARE,
     MAX_NEAR_WIDTH,
-    FittedKey,
     LikelihoodSearch,
 )
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
@@ -348,7 +349,8 @@ def fit_keys(
             f"robust: {100 * max(shares):.0f} % of the plots would have to be outliers: their errors follow another "
             "law (few different values?); fit without it"
         )
-    keys = tuple(search.interval(i) for i in range(len(likelihood.keys)))
+    intervals = ProfileIntervals(search)
+    keys = tuple(intervals.interval(i) for i in range(len(likelihood.keys)))
     gain = likelihood(search.to_values(search.best), law) - likelihood(np.array(likelihood.stated))
     return Fit(
         likelihood.filter,
@@ -395,8 +397,6 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
     """The explanation that raises the maximum most in addition to the fitted keys.
 
     None if it raises it by less than chance does in one recording of twenty."""
-    from scipy.stats import chi2
-
     fitted_values = search.to_values(search.best).tolist()
     fixed = dict(zip(likelihood.keys, fitted_values, strict=True))
     names = [name for name in single_explanations(likelihood) if name != OUTLIERS or not search.robust]
@@ -417,7 +417,7 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
     if not maxima:
         return None
     values, maximum = max(maxima, key=lambda maximum: maximum[1])
-    needed_gain = 0.5 * float(chi2.ppf(0.95 ** (1 / len(maxima)), 1))
+    needed_gain = half_chi2(0.95 ** (1 / len(maxima)))
     if maximum <= search.top + needed_gain:
         return None
     ((name, value),) = values.items()

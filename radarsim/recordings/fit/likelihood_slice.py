@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 from types import MappingProxyType
 from typing import Any
 
@@ -25,6 +26,11 @@ RIVAL_STARTS = (0.03, 0.2)  # of the share of hard manoeuvres
 CLEAR_RIVAL_GAIN = 3.0  # of the log-likelihood, a factor of twenty, from which one of two explanations is clear
 SEARCH_STARTS = (-2.0, 0.0, 2.0)  # of a search
 Progress = Callable[[int, int | None], None]  # likelihoods computed, and their expected number where known
+
+
+def half_chi2(probability: float) -> float:
+    """Half a point of chi-square with one degree of freedom. SciPy's statistics would take a second to import."""
+    return 0.5 * NormalDist().inv_cdf((1 + probability) / 2) ** 2
 
 
 def no_progress(evaluations: int, expected: int | None = None) -> None:

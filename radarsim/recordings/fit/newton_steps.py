@@ -21,25 +21,23 @@ MAX_NEWTON_STEP = 1.5
 MAX_CORRELATION = 0.999  # of the correlation of two keys
 
 
-def polish_maximum(log_likelihood_at: Callable[[np.ndarray], float], point: np.ndarray) -> np.ndarray:
-    """The maximum of a likelihood near the result of a search, by two Newton steps.
+def polish_maximum(
+    log_likelihood_at: Callable[[np.ndarray], float], point: np.ndarray, moving: np.ndarray | None = None
+) -> np.ndarray:
+    """The maximum of a likelihood near the result of a search, by two Newton steps of its moving coordinates; default:
+    of all.
 
     A search by comparison stalls at the root of the last digits. They make a difference over SLOPE_STEP wrong by 10⁻⁷,
     and the maximum as well."""
     curvature, start = Curvature(log_likelihood_at), point
-    start_value = log_likelihood_at(point)
-    if not math.isfinite(curvature.step(point, start_value, np.arange(point.size))[1]):
+    start_value, moving = log_likelihood_at(point), np.arange(point.size) if moving is None else moving
+    if not moving.size or not math.isfinite(curvature.step(point, start_value, moving)[1]):
         return start
+    moves = SLOPE_STEP * np.eye(point.size)[moving]
     for _ in range(2):
-        moves = SLOPE_STEP * np.eye(point.size)
-        point = point + curvature.newton_step(
-            np.array(
-                [
-                    (log_likelihood_at(point + move) - log_likelihood_at(point - move)) / (2 * SLOPE_STEP)
-                    for move in moves
-                ]
-            )
-        )
+        rises = [log_likelihood_at(point + move) - log_likelihood_at(point - move) for move in moves]
+        point = point.copy()
+        point[moving] += curvature.newton_step(np.array(rises) / (2 * SLOPE_STEP))
     return (
         point
         if log_likelihood_at(point) >= start_value - TOLERANCE and np.abs(point - start).max() < FIRST_STEP

@@ -1,12 +1,8 @@
-"""The maximum of a likelihood over all its keys, and the profile interval of each.
-
-An interval consists of the values of a key at which the largest log-likelihood over all other keys is within half the
-95 % point of chi-square of the maximum (profile likelihood)."""
+"""The maximum of a likelihood over all its keys and, where asked for, the laws of outliers."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +18,8 @@ from radarsim.studies.error_law import ErrorLaw, OutlierLaw
 from radarsim.studies.recording_interface import ALL_KINDS, Likelihood
 
 # likelihood evaluations of a key to the maximum and to an end; of an explanation
-MAXIMUM_EVALUATIONS = 130
-END_EVALUATIONS = 15
+MAXIMUM_EVALUATIONS = 70
+END_EVALUATIONS = 10
 EXPLANATION_EVALUATIONS = 60
 
 HALF_CHI2_95 = 1.9207294103470  # half the 95 % point of chi-square with one degree of freedom
@@ -31,7 +27,6 @@ ROUGH_TOLERANCE = 1e-4
 INTERVAL_REACH = 1e4  # ratio to the estimate up to which an end of an interval is searched
 MAX_NEWTON_STEPS = 40
 SIMPLEX_EVALUATIONS = (50, 100, 200)  # evaluations of a simplex before Newton steps are tried again
-TRIAL_FALLS = np.array([2.0, 4.0, 6.0])  # below these a key that may be zero is clearly not zero, in that logarithm
 TRIAL_RISES = np.arange(1.0, 16.0)  # above what counts as zero: where a key at zero is tried
 NEAR_ZERO_LOG = 7.0  # above the value that counts as zero, in that logarithm: zero is tried
 NEAR_WIDTH_LOG = 1.0  # the same of offset and spread of near outliers
@@ -51,39 +46,19 @@ NEAR_STARTS = ((0.1, 0.0, 3.0), (0.03, 0.0, 10.0), (0.1, 3.0, 0.0), (0.1, 5.0, 0
 NEAR_START_FACTOR = 0.65  # on a key that may have been too large without them
 CLEAR_NEAR_GAIN = 3.9074  # half the 95 % point of chi-square of their three numbers: less gain may be chance
 NEAR_CLIMBS = 2  # searches from the likeliest of these
-OUTSIDE_STEP = 0.05  # beyond an end, in the logarithm of a key: where other near outliers are tried
+END_STARTS = 2  # of these that are tried with smaller keys, where an end is
 LAW_SIZE = 4  # coordinates of an outlier law: the logits of its shares, the logarithms of offset and spread
+# distance of an end from the maximum where curvature tells none, and the greatest that is tried first
+UNKNOWN_END_DISTANCE, MAX_FIRST_DISTANCE = 0.1, 1.0
 NEAR_MAXIMUM_EVALUATIONS = 30  # as MAXIMUM_EVALUATIONS, from near the maximum
 # factor on the value that counts as zero where the likelihood jumps by more there
 ZERO_REFINEMENT = 1e-3
 LIKELIHOOD_LEAP = 0.01
 
 
-@dataclass(frozen=True)
-class FittedKey:
-    """One key: the best value, its 95 % interval, and whether the plots distinguish it from all other values.
-
-    lo is 0 where the key may be zero, hi infinite where it has no upper end."""
-
-    key: str
-    stated: float
-    value: float
-    lo: float
-    hi: float
-    identifiable: bool
-
-
-class _ProfilePoint(NamedTuple):
-    """A point of a profile: the logarithm of the key held, the largest likelihood there, and its coordinates."""
-
-    log_key: float
-    value: float
-    point: np.ndarray
-
-
 class LikelihoodSearch:
-    """The maximum of a likelihood, and its profile along each key. Coordinates are logarithms of the keys, and for each
-    kind of numbers LAW_SIZE of an outlier law. What is at its lowest is zero."""
+    """The maximum of a likelihood. Coordinates are logarithms of the keys, and for each kind of numbers LAW_SIZE of an
+    outlier law. What is at its lowest is zero."""
 
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, start_point: np.ndarray | None = None):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
@@ -100,17 +75,17 @@ class LikelihoodSearch:
             self.highest = np.append(self.highest, most)
             self.zero_reach = np.append(self.zero_reach, [NEAR_ZERO_LOG] * 2 + [NEAR_WIDTH_LOG] * 2)
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
-        self.curvature_model = Curvature(self._log_likelihood)
-        self.rival, self.rival_top = np.zeros(0), -math.inf
-        self.best, self.top = self._climb(start if start_point is None else start_point, None, ROUGH_TOLERANCE)
+        self.curvature_model = Curvature(self.log_likelihood)
+        self.rival, self.rival_top, self.near_points = np.zeros(0), -math.inf, dict[int, np.ndarray]()
+        self.best, self.top = self.climb(start if start_point is None else start_point, None, ROUGH_TOLERANCE)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
         for climb_count, factor in enumerate((0.1, 10.0) if start_point is None else (), 1):
             self.maximum_cost = max(self.maximum_cost, self.evaluations * 3 // climb_count)
             shifted = np.where(self.best > self.lowest, self.best, start)
             shifted[: len(likelihood.stated)] += math.log(factor)
-            candidate, value = self._climb(shifted, None, ROUGH_ACCURACY, SIMPLEX_EVALUATIONS[:1])
+            candidate, value = self.climb(shifted, None, ROUGH_ACCURACY, SIMPLEX_EVALUATIONS[:1])
             if value > self.top - ROUGH_ACCURACY and np.abs(candidate - self.best).max() > FIRST_STEP:
-                candidate, value = self._climb(candidate, None, ROUGH_TOLERANCE)
+                candidate, value = self.climb(candidate, None, ROUGH_TOLERANCE)
             if value > self.top + 1e-6:
                 self.best, self.top = candidate, value
         if robust and start_point is None:
@@ -123,15 +98,18 @@ class LikelihoodSearch:
         """Take near outliers into the best point if they clearly raise the likelihood; else, as sound errors may have
         that shape by chance, keep the point as a rival, whose keys the intervals hold too."""
         for i in self.law_starts:
-            candidate, value = self._climb_to_near_outliers(self.best, i, None)
+            candidate, value = self.climb_to_near_outliers(self.best, i, None)
+            self.near_points[i] = candidate
             if value > self.top + CLEAR_NEAR_GAIN:
-                self.best, self.top = self._climb(candidate, None, ROUGH_TOLERANCE)
+                self.best, self.top = self.climb(candidate, None, ROUGH_TOLERANCE)
             elif value > max(self.top, self.rival_top):
                 self.rival, self.rival_top = candidate, value
 
-    def _climb_to_near_outliers(self, point: np.ndarray, i: int, fixed_index: int | None) -> tuple[np.ndarray, float]:
+    def climb_to_near_outliers(
+        self, point: np.ndarray, i: int, fixed_index: int | None, min_value: float = -math.inf
+    ) -> tuple[np.ndarray, float]:
         """The likeliest point reached from a point with near outliers of several kinds in the law that begins at
-        coordinate i, one coordinate held or none, and its log-likelihood."""
+        coordinate i, one coordinate held or none, and its log-likelihood. Starts below min_value are not climbed."""
         starts = []
         for share, *sizes in NEAR_STARTS:
             if sizes[0] and self.likelihood.outlier_kinds == ALL_KINDS:
@@ -142,20 +120,34 @@ class LikelihoodSearch:
                 math.log(size) if size else lowest - FIRST_STEP
                 for size, lowest in zip(sizes, self.lowest[i + 2 : i + 4].tolist(), strict=True)
             ]
-            value = self._log_likelihood(start)
-            for key in range(len(self.likelihood.keys)):
-                trial = start.copy()
-                trial[key] += math.log(NEAR_START_FACTOR)
-                if key != fixed_index and (trial_value := self._log_likelihood(trial)) > value:
-                    start, value = trial, trial_value
-            starts.append((value, start))
+            starts.append((self.log_likelihood(start), start))
+        starts.sort(key=lambda start: -start[0])
+        start_count, climb_count = (len(starts), NEAR_CLIMBS) if fixed_index is None else (END_STARTS, 1)
+        starts = [self._with_smaller_keys(*start, fixed_index) for start in starts[:start_count]]
+        if fixed_index is not None and i in self.near_points:
+            start = self.near_points[i].copy()
+            start[fixed_index] = point[fixed_index]
+            for j in self.law_starts:
+                if j != i:
+                    start[j : j + LAW_SIZE] = point[j : j + LAW_SIZE]
+            starts.append((self.log_likelihood(start), start))
         starts.sort(key=lambda start: -start[0])
         free = np.array([j for j in range(point.size) if j != fixed_index])
         candidates = [
-            self._climb_by_newton(start, value, free, ROUGH_ACCURACY, Curvature(self._log_likelihood))[:2]
-            for value, start in starts[: NEAR_CLIMBS if fixed_index is None else 1]
+            self._climb_by_newton(start, value, free, ROUGH_ACCURACY, Curvature(self.log_likelihood))[:2]
+            for value, start in starts[:climb_count]
+            if value > min_value
         ]
-        return max(candidates, key=lambda candidate: candidate[1])
+        return max(candidates, key=lambda candidate: candidate[1], default=(point, -math.inf))
+
+    def _with_smaller_keys(self, value: float, point: np.ndarray, fixed_index: int | None) -> tuple[float, np.ndarray]:
+        """A point with those keys smaller that make the plots likelier so, and its log-likelihood before it."""
+        for key in range(len(self.likelihood.keys)):
+            trial = point.copy()
+            trial[key] += math.log(NEAR_START_FACTOR)
+            if key != fixed_index and (trial_value := self.log_likelihood(trial)) > value:
+                point, value = trial, trial_value
+        return value, point
 
     def _moving(self, point: np.ndarray, free: np.ndarray) -> np.ndarray:
         """The free coordinates on which the likelihood depends: what is zero stays so, and offset and spread of no near
@@ -167,8 +159,9 @@ class LikelihoodSearch:
 
     def _polish(self, start: np.ndarray) -> bool:
         """Take the maximum near a point as the best if it is higher, and return whether it is."""
-        point = polish_maximum(self._log_likelihood, self._climb(start, None, TOLERANCE)[0])
-        value = self._log_likelihood(point)
+        point, _ = self.climb(start, None, TOLERANCE)
+        point = polish_maximum(self.log_likelihood, point, self._moving(point, np.arange(point.size)))
+        value = self.log_likelihood(point)
         if is_higher := value > self.top:
             self.best, self.top = point, value
         return is_higher
@@ -177,9 +170,10 @@ class LikelihoodSearch:
         """Raise keys from zero where that makes the plots likelier, then compute the curvature at the maximum."""
         while (start := self._raised_point()) is not None and self._polish(start):
             pass
-        self.curvature_model = Curvature(self._log_likelihood)
-        self.curvature_model.step(self.best, self.top, np.arange(self.best.size))
-        self.curvature = self.curvature_model.H
+        self.curvature_model = Curvature(self.log_likelihood)
+        moving = self._moving(self.best, np.arange(self.best.size))
+        self.curvature_model.step(self.best, self.top, moving)
+        self.end_distances = self._expected_end_distances(moving)
         far_shares = [i + 1 for i in self.law_starts]
         may_be_zero = [i for i in (*range(len(self.likelihood.keys)), *far_shares) if self._may_be_zero(i)]
         self.raised_keys = {i: self._raised_log(i) for i in may_be_zero}
@@ -194,7 +188,7 @@ class LikelihoodSearch:
             for i in zero_keys
             for rise in TRIAL_RISES
         ]
-        candidates = [(self._log_likelihood(point), point) for point in trials]
+        candidates = [(self.log_likelihood(point), point) for point in trials]
         value, point = max(candidates, key=lambda candidate: candidate[0], default=(-math.inf, self.best))
         return point if value > self.top + TOLERANCE else None
 
@@ -222,7 +216,7 @@ class LikelihoodSearch:
             spread,
         )
 
-    def _log_likelihood(self, point: np.ndarray) -> float:
+    def log_likelihood(self, point: np.ndarray) -> float:
         values = self.to_values(point)
         self.evaluations += 1
         self.progress(self.evaluations, self._expected_evaluations())
@@ -241,7 +235,7 @@ class LikelihoodSearch:
         )
         return max(round(maximum_cost + end_cost * end_count), self.evaluations) + explanation_cost
 
-    def _climb(
+    def climb(
         self,
         start: np.ndarray,
         fixed_index: int | None,
@@ -252,8 +246,8 @@ class LikelihoodSearch:
         until one gains less than `tolerance`; where they fail, by a simplex for a while. A likelihood over lists of
         hypotheses jumps where one is dropped: a simplex that gains next to nothing shows that no step can."""
         free = np.array([i for i in range(len(start)) if i != fixed_index])
-        point, value = start, self._log_likelihood(start)
-        curvature = self.curvature_model if fixed_index is not None else Curvature(self._log_likelihood)
+        point, value = start, self.log_likelihood(start)
+        curvature = self.curvature_model if fixed_index is not None else Curvature(self.log_likelihood)
         for max_evaluations in simplex_evaluations:
             point, value, is_maximum = self._climb_by_newton(point, value, free, tolerance, curvature)
             if is_maximum:
@@ -262,13 +256,13 @@ class LikelihoodSearch:
             point, value = self._climb_by_simplex(point, free, tolerance, max_evaluations)
             if value - value_before < ROUGH_ACCURACY:
                 return point, value
-            curvature = Curvature(self._log_likelihood)
+            curvature = Curvature(self.log_likelihood)
         return point, value
 
     def _climb_by_newton(
         self, point: np.ndarray, value: float, free: np.ndarray, tolerance: float, curvature: Curvature
     ) -> tuple[np.ndarray, float, bool]:
-        """As `_climb`, by Newton steps alone: where they end, and whether that is the maximum."""
+        """As `climb`, by Newton steps alone: where they end, and whether that is the maximum."""
         for _ in range(MAX_NEWTON_STEPS):
             point, value = self._set_zero(point, value, free)
             moving = self._moving(point, free)
@@ -280,7 +274,7 @@ class LikelihoodSearch:
             if predicted_gain < tolerance / 10:
                 return point, value, True
             for fraction in (1.0, 0.5, 0.1, 0.01):
-                trial_value = self._log_likelihood(point + fraction * step)
+                trial_value = self.log_likelihood(point + fraction * step)
                 if trial_value > value:
                     point, value = point + fraction * step, trial_value
                     break
@@ -291,7 +285,7 @@ class LikelihoodSearch:
             if predicted_gain < SMALL_GAIN_FACTOR * tolerance:
                 return point, value, True
             if fraction < 1 or predicted_gain > ROUGH_ACCURACY:
-                curvature = Curvature(self._log_likelihood)
+                curvature = Curvature(self.log_likelihood)
         return point, value, False
 
     def _set_zero(self, point: np.ndarray, value: float, free: np.ndarray) -> tuple[np.ndarray, float]:
@@ -301,21 +295,21 @@ class LikelihoodSearch:
             if self.lowest[j] < point[j] < self.lowest[j] + self.zero_reach[j]:
                 trial = point.copy()
                 trial[j] = self.lowest[j] - FIRST_STEP
-                if (trial_value := self._log_likelihood(trial)) >= value:
+                if (trial_value := self.log_likelihood(trial)) >= value:
                     point, value = trial, trial_value
         return point, value
 
     def _climb_by_simplex(
         self, start: np.ndarray, free: np.ndarray, tolerance: float, max_evaluations: int
     ) -> tuple[np.ndarray, float]:
-        """As `_climb`, by a simplex, until it stands still within `close` or has taken `most` likelihoods."""
+        """As `climb`, by a simplex, until it stands still within `close` or has taken `most` likelihoods."""
         from scipy.optimize import minimize
 
         point = start.copy()
 
         def cost(free_coordinates: np.ndarray) -> float:
             point[free] = free_coordinates
-            return -self._log_likelihood(point)
+            return -self.log_likelihood(point)
 
         simplex = np.concatenate([start[None, free], start[free] + FIRST_STEP * np.eye(free.size)])
         options: Any = {
@@ -328,22 +322,6 @@ class LikelihoodSearch:
         point[free] = result.x
         return point, -float(result.fun)
 
-    def _profile(self, i: int, log_key: float, neighbour: np.ndarray) -> tuple[float, np.ndarray]:
-        """The largest likelihood with key i held at the logarithm `at`, and its coordinates; others that are zero rise
-        from there if that makes the plots likelier."""
-        start = neighbour.copy()
-        start[i] = log_key
-        point, value = self._climb(start, i, TOLERANCE)
-        for j, raised_log in self.raised_keys.items():
-            if j != i and point[j] <= self.lowest[j]:
-                for trial_log in (raised_log, *(raised_log - TRIAL_FALLS)):
-                    start = point.copy()
-                    start[j] = trial_log
-                    if self._log_likelihood(start) > value:
-                        point, value = self._climb(start, i, TOLERANCE)
-                        break
-        return value, point
-
     def refine_zero(self) -> bool:
         """Lower the values that count as zero where the likelihood leaps there; return whether any was lowered."""
         limits_before = self.likelihood.zero_limits
@@ -353,12 +331,12 @@ class LikelihoodSearch:
             self.likelihood.zero_limits[leaping_keys] *= ZERO_REFINEMENT
             self.lowest[leaping_keys] += math.log(ZERO_REFINEMENT)
             self.best[is_zero] = self.lowest[is_zero] - FIRST_STEP
-            self.top = self._log_likelihood(self.best)
+            self.top = self.log_likelihood(self.best)
         return self.likelihood.zero_limits is not limits_before
 
     def _has_leap_at_zero(self, i: int) -> bool:
         """Whether the likelihood leaps at zero of a key, and is near the top there."""
-        above, zero = (self._value_along(i, self.lowest[i] + sign * TOLERANCE) for sign in (1, -1))
+        above, zero = (self.value_along(i, self.lowest[i] + sign * TOLERANCE) for sign in (1, -1))
         is_relevant = min(above, zero) > IMPOSSIBLE_LOG_LIKELIHOOD and max(above, zero) > self.top - HALF_CHI2_95
         return is_relevant and abs(above - zero) > LIKELIHOOD_LEAP
 
@@ -366,104 +344,35 @@ class LikelihoodSearch:
         """Whether the plots hardly distinguish a key, or the share of outliers, from zero: near zero its logarithm has
         no slope, on which a search stalls, though it must rise where another one is held too low. Tested a little above
         zero, since no filter has σ = 0."""
-        return self._value_along(i, self.lowest[i] + TOLERANCE) > self.top - HALF_CHI2_95
+        return self.value_along(i, self.lowest[i] + TOLERANCE) > self.top - HALF_CHI2_95
 
     def _raised_log(self, i: int) -> float:
         """The logarithm of such a key at which a search has a slope: the likelihood has fallen from the maximum."""
         log = max(float(self.best[i]), float(self.lowest[i]))
-        while self._value_along(i, log) > self.top - HALF_CHI2_95 and log < self.highest[i]:
+        while self.value_along(i, log) > self.top - HALF_CHI2_95 and log < self.highest[i]:
             log += 1.0
         return log
 
-    def _value_along(self, i: int, log: float, point: np.ndarray | None = None) -> float:
+    def value_along(self, i: int, log: float, point: np.ndarray | None = None) -> float:
         """The log-likelihood with one key changed and all others at a point, by default the maximum."""
         point = (self.best if point is None else point).copy()
         point[i] = log
-        return self._log_likelihood(point)
+        return self.log_likelihood(point)
 
-    def interval(self, i: int) -> FittedKey:
-        """The 95 % profile interval of key i."""
-        limit = max(self.top, min(self.rival_top, self.top + HALF_CHI2_95 / 2)) - HALF_CHI2_95
-        lo, hi = (self._interval_end(i, direction, limit) for direction in (-1, 1))
-        value = float(self.to_values(self.best)[i])
-        lowest = self.lowest[i]
-        bounds = (0.0 if lo is None or lo <= lowest else math.exp(lo), math.inf if hi is None else math.exp(hi))
-        stated = float(self.likelihood.stated[i])
-        return FittedKey(self.likelihood.keys[i], stated, value, *bounds, bounds[0] > 0 and math.isfinite(bounds[1]))
-
-    def _interval_end(self, i: int, direction: int, limit: float) -> float | None:
-        """The logarithm of key i at which the profile falls to a limit; None if not within INTERVAL_REACH."""
-        lowest = float(self.lowest[i])
-        point = self.best
-        if self.rival_top >= limit and direction * (self.rival[i] - point[i]) > 0:
-            point = self.rival
-        home = max(float(point[i]), lowest)
-        step = self._end_distance(i)
-        # from zero the end may be farther than INTERVAL_REACH: up to there it is not
-        if direction > 0 and i in self.raised_keys:
-            home, step = max(home, self.raised_keys[i] - 1.0), 0.1
-        inside = _ProfilePoint(home, self._value_along(i, home, point), point)
-        while abs(inside.log_key - home) < math.log(INTERVAL_REACH):
-            log_key = inside.log_key + direction * step
-            outside = _ProfilePoint(log_key, *self._profile(i, log_key, inside.point))
-            if outside.value < limit:
-                end = self._find_crossing(i, inside, outside, limit)
-                farther = self._with_other_outliers(i, end + direction * OUTSIDE_STEP, outside.point, limit)
-                if farther is None:
-                    self.end_count += 1
-                    return end
-                outside = farther
-            if log_key < lowest:
-                return None
-            inside, step = outside, 2 * step
-        return None
-
-    def _with_other_outliers(self, i: int, log_key: float, neighbour: np.ndarray, limit: float) -> _ProfilePoint | None:
-        """A point outside the interval so far, with key i held, where near outliers of another kind make the plots
-        likely enough; None if none do."""
-        start = neighbour.copy()
-        start[i] = log_key
-        for j in self.law_starts:
-            point, value = self._climb_to_near_outliers(start, j, i)
-            if value > limit:
-                return _ProfilePoint(log_key, value, point)
-        return None
-
-    def _find_crossing(self, i: int, inside: "_ProfilePoint", outside: "_ProfilePoint", limit: float) -> float:
-        """The logarithm of key i at which the profile crosses a limit between two points: by secants of the square root
-        of its fall from the maximum, which is nearly a straight line (Illinois method)."""
-
-        def height(point: _ProfilePoint) -> float:
-            fall = self.top - point.value
-            return math.sqrt(2 * (self.top - limit)) - math.copysign(math.sqrt(2 * abs(fall)), fall)
-
-        ends, values, replaced = [inside, outside], [height(inside), height(outside)], None
-        while True:
-            fraction, width = values[0] / (values[0] - values[1]), ends[1].log_key - ends[0].log_key
-            log_key = ends[0].log_key + fraction * width
-            trial = _ProfilePoint(
-                log_key, *self._profile(i, log_key, ends[0].point + fraction * (ends[1].point - ends[0].point))
-            )
-            trial_height = height(trial)
-            side = int(trial_height <= 0)
-            if (
-                abs(trial_height * width) < TOLERANCE * abs(values[0] - values[1])
-                or abs(log_key - ends[side].log_key) < TOLERANCE
-            ):
-                return log_key
-            ends[side], values[side] = trial, trial_height
-            if side == replaced:
-                values[1 - side] /= 2
-            replaced = side
-
-    def _end_distance(self, i: int) -> float:
-        """A little more than the distance of an end from the maximum, if the likelihood were a parabola."""
-        H = -self.curvature
+    def _expected_end_distances(self, moving: np.ndarray) -> np.ndarray:
+        """A little more than the distance of the ends of each coordinate from the maximum, if the likelihood were a
+        parabola of those that move."""
+        distances, H = np.full(self.best.size, MAX_FIRST_DISTANCE), self.curvature_model.H
+        if len(H) != len(moving):  # no curvature, where neighbours are impossible
+            return np.full(self.best.size, UNKNOWN_END_DISTANCE)
         try:
-            spread = float(np.linalg.inv(H)[i, i])
-        except (np.linalg.LinAlgError, IndexError):  # IndexError: no curvature, where neighbours are impossible
-            return 0.1
-        return min(1.2 * math.sqrt(2 * HALF_CHI2_95 * spread), 1.0) if 0 < spread < math.inf else 0.1
+            spreads = np.diag(np.linalg.inv(-H))
+        except np.linalg.LinAlgError:
+            spreads = np.full(len(moving), math.nan)
+        is_known = (spreads > 0) & np.isfinite(spreads)
+        found = 1.2 * np.sqrt(2 * HALF_CHI2_95 * np.where(is_known, spreads, 0.0))
+        distances[moving] = np.where(is_known, np.minimum(found, MAX_FIRST_DISTANCE), UNKNOWN_END_DISTANCE)
+        return distances
 
 
 def _logit(share: float) -> float:
