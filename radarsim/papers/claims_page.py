@@ -26,8 +26,8 @@ INTRODUCTION = """\
 One row for each claim: the paper's statement, the verdict, and the config that shows it (`radarsim run CONFIG`, then
 `radarsim claims CONFIG`). All are judged by [one rule](verdicts.md), written before anything was measured. Where the
 paper leaves a choice open, the verdict covers all interpretations that it allows (`radarsim interpretations`):
-"refuted as shipped; depends on …" is false with the config's choice, and true with another one. Open a claim for its
-original words, their interpretation, and the part furthest from them: its exact value, or the measured one with its
+"refuted as shipped; true only with other choices of …" is false with the config's choice, and true with another one.
+Open a claim for its original words, their interpretation, and the part furthest from them: its exact value, or the measured one with its
 interval, and the expected range. Extensions are ours, or statements that a paper reports from others, and are not
 counted.
 """

@@ -55,7 +55,7 @@ def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
     counted = ", ".join(class_count(kind, classes[kind]) for kind in CLASS_ORDER if classes[kind])
     return Figure(
         name="claims",
-        title=tr("Claims, in margins of what their papers say"),
+        title=tr("Claims against what their papers say"),
         caption=plural(
             "Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged_claims), counted=counted
         )
@@ -86,7 +86,10 @@ def _paper_panel(paper: str, claims: Sequence[tuple[Sequence[Mapping], Mapping]]
         marks += _forest_lines(kind, style, of_class) if of_class else []
     return Panel(
         Axis(
-            tr("distance from the words, margins (cut at ± {furthest:g})", furthest=MAX_DRAWN_MARGINS),
+            tr(
+                "outside the paper's value by (0: agrees, 1: tolerance; cut at ± {furthest:g})",
+                furthest=MAX_DRAWN_MARGINS,
+            ),
             limits=(-RIM, RIM),
         ),
         Axis("", limits=(len(claims) - 0.4, -0.6), ticks=tuple(ticks)),

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 Row = Mapping[str, Any]
 
 MAX_STATEMENT_WORDS = 12  # of a claim in a list
-MIN_SHOWN_MISS = 1e-3  # margins; less is rounding
 MAX_NAMED_CONFIGS = 6  # that would judge claims; of more, one line says what runs them all
 NOTHING_IS_RUN = term(
     "nothing is run here: `make reproduce-figures` runs all configs of the four papers; "
@@ -169,21 +168,20 @@ def _print_claim(parts: Sequence[Row]) -> None:
     print_line(f"{first['claim']:<6} {verdict}: {tr(first['statement'])} [{place}; {first['config']}]")
     if first["original"]:
         print_line(f"       «{first['original']}»")
+    width = max(len(tr(row["verdict"])) for row in parts)
     for row in parts if first["class"] != NOT_RUN else ():
-        print_line(f"       {tr(row['verdict']):<20} {'; '.join(_part_words(row, parts))}")
+        print_line(f"       {tr(row['verdict']):<{width}}  {'; '.join(_part_words(row, parts))}")
 
 
 def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
     """What a line says of a part: case and quantity, the value that decides, what was measured where that is exact,
-    distance, and why there is no verdict."""
+    and why there is no verdict."""
     words = [": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))]
     if cell_number(row["measured"]) is not None:
         words.append(decisive_value_words(row) + tr("; expected {words}", words=expected_words(row["expected"])))
         measured = measured_words(row)
         if cell_number(row["exact"]) is not None and "[" in measured:  # with a sampling error
             words.append(tr("measured {value}", value=measured))
-    if (miss := cell_number(row["miss"])) is not None and miss >= MIN_SHOWN_MISS:
-        words.append(tr("off by {miss:.3g} margins", miss=miss))
     if row["verdict"] == NOT_JUDGED:
         words.append(translate_reason(row["why"]))
     if is_extension([row]) and not is_extension(parts):

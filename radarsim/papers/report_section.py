@@ -12,6 +12,7 @@ from radarsim.papers.claim_rows import (
     classes_in_words,
     expected_words,
     group_by_claim,
+    is_extension,
     shown_interval,
     verdict_sentence,
 )
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from radarsim.extensions import Tables
 
+OF_PAPER, OURS = GROUPS = (term("of the paper"), term("ours"))  # claims of a page
 MAX_LINKED_FIGURES = 3  # from one claim
 HEADING = term("claims")  # of the index's column
 INDEX_TABLE = TableKind("table of claims", ("claim", "paper", "class"))  # of any version
@@ -51,7 +53,8 @@ def claims_section(
     if not claims:
         return None
     rows: Any = tables["claims"].to_dict("records")
-    content = {"claims": claims, "verdicts": classes_in_words(rows), "titles": titles}
+    groups = [(heading, [claim for claim in claims if claim["ours"] == (heading == OURS)]) for heading in GROUPS]
+    content = {"groups": [group for group in groups if group[1]], "verdicts": classes_in_words(rows), "titles": titles}
     links = {
         name: _fragment("links.html.j2", claims=[claim["id"] for claim in claims if name in claim["figures"]])
         for name in sources
@@ -87,6 +90,7 @@ def _claims(
                 "id": parts[0]["claim"],
                 "verdict": verdict_sentence(parts).replace("*", ""),
                 "parts": parts,
+                "ours": is_extension(parts),
                 "figures": linked_figures(read, sources),
                 "tables": list(dict.fromkeys(name for name, _ in read if name in written)),
             }

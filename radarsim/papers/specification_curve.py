@@ -70,7 +70,12 @@ def _distance_panel(verdicts: list[InterpretationVerdict], places: np.ndarray, e
             lines.append(Line(places[of_kind], value, tr(label), style, lo, hi))
     return Panel(
         Axis(tr("interpretation, sorted"), limits=(-LEFT_SPACE * len(verdicts), len(verdicts) + 1)),
-        Axis(tr("distance of the worst part, margins (cut at ± {furthest:g})", furthest=MAX_DRAWN_MARGINS)),
+        Axis(
+            tr(
+                "worst part outside the paper's value by (1: tolerance; cut at ± {furthest:g})",
+                furthest=MAX_DRAWN_MARGINS,
+            )
+        ),
         (
             *lines,
             *_shipped_lines(verdicts, tr("as shipped")),

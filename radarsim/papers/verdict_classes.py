@@ -14,12 +14,13 @@ from radarsim.papers.claim import Claim
 from radarsim.papers.claim_sources import measure_calls, package_sources, plain_data
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN
 from radarsim.papers.interpretations import OpenChoices
-from radarsim.papers.verdict_rule import CLASSES, CONTRADICTORY, DEPENDS, FIXED_CLASSES, UNDECIDED
+from radarsim.papers.verdict_rule import CLASSES, CONTRADICTORY, DEPENDS, FIXED_CLASSES, REFUTED, UNDECIDED
 
 CLASS_FILE_COLUMNS = ("claim", "class", "holds", "of", "depends_on", "needed", "declared")
 CLASS_COLUMNS = ("class", "overall", "holds", "of", "depends_on", "needed")  # columns of claims.csv
 DEPENDS_ON = term("depends on {choices}")
 SHIPPED_AND_OVERALL = term("{own} as shipped; {over}")
+REFUTED_AND_DEPENDS = term("refuted as shipped; true only with other choices of {choices}")
 OVERALL = term("{kind} over all interpretations")
 ONLY_SHIPPED = term("{own} as shipped; other interpretations not judged")
 
@@ -140,6 +141,8 @@ def verdict_words(row: Mapping[str, Any]) -> str:
     """The verdict on a claim of claims.csv, as a phrase in the current language."""
     if is_judged_only_as_shipped(row):
         return tr(ONLY_SHIPPED, own=term(row["as_shipped"]))
+    if (row["class"], row["as_shipped"]) == (DEPENDS, REFUTED) and row["depends_on"]:
+        return tr(REFUTED_AND_DEPENDS, choices=row["depends_on"])
     return class_words(row["class"], row["as_shipped"], row["depends_on"], tr)
 
 

@@ -12,6 +12,7 @@ from radarsim.cli import progress as cli_progress
 from radarsim.config import find_files
 from radarsim.papers.claims_table import CLASS_COLUMNS
 from radarsim.papers.print_claims import print_claims
+from radarsim.papers.verdict_rule import IMMATERIAL, REFUTED
 from radarsim.report import interval_notes, wording
 from radarsim.report.wording import significant_digits
 from radarsim.system.threads import ThreadLimit
@@ -72,9 +73,18 @@ def test_what_decides_a_part_stands_first(capsys):
     """The exact value, then what is expected, then what was measured; without an exact one the measured."""
     sampled = parts(False)[0] | {"measured": 8.8, "lo": -0.3, "hi": 17.1, "judged_lo": -0.3, "judged_hi": 17.1}
     print_claims([sampled | {"exact": 2.213}], {"P9.1"})
-    assert "size; 2.213 m (exact); expected ≤ 5; measured 8.8 [−0.3, 17.1] m; " in capsys.readouterr().out
+    assert "size; 2.213 m (exact); expected ≤ 5; measured 8.8 [−0.3, 17.1] m\n" in capsys.readouterr().out
     print_claims([sampled | {"exact": math.nan}], {"P9.1"})
-    assert "size; 8.8 [−0.3, 17.1] m; expected ≤ 5; " in capsys.readouterr().out
+    assert "size; 8.8 [−0.3, 17.1] m; expected ≤ 5\n" in capsys.readouterr().out
+
+
+def test_values_of_parts_begin_in_one_column(capsys):
+    worded = [
+        one | {"verdict": verdict} for one, verdict in zip(parts(False, False), (IMMATERIAL, REFUTED), strict=True)
+    ]
+    print_claims(worded, {"P9.1"})
+    _, *lines = capsys.readouterr().out.splitlines()
+    assert len({line.index("size") for line in lines if "size" in line}) == 1
 
 
 def test_a_list_of_claims_is_a_line_each(capsys):

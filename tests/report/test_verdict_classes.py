@@ -24,7 +24,7 @@ from radarsim.papers.open_papers import judging_requests, open_papers
 from radarsim.papers.result_claims import claims_by_class
 from radarsim.papers.stored_verdicts import CLASSES, known_classes, shipped_classes, stored_classes
 from radarsim.papers.study_claims import paper_claims
-from radarsim.papers.verdict_classes import add_classes, class_words, rows_in_words, verdict_words
+from radarsim.papers.verdict_classes import add_classes, rows_in_words, verdict_words
 from radarsim.papers.verdict_rule import CONFIRMED, CONTRADICTORY, DEPENDS, IMMATERIAL, REFUTED, UNDECIDED
 from radarsim.report import index_page
 from tests.program import printed
@@ -56,7 +56,7 @@ def as_runs_would_store(out, own):
 
 def told(row):
     """What every rendering has to say of a claim: its class, and the phrase that tells how far it stands."""
-    return row["class"], class_words(row["class"], row["as_shipped"], row["depends_on"])
+    return row["class"], verdict_words(row)
 
 
 def agree(out):
@@ -134,7 +134,7 @@ def test_a_run_says_the_class_of_the_page_and_how_it_came_out_here(tmp_path):
     (document,) = json.loads(printed("report", "rls2", "-n", 500, "--no-figures", "--json", "--out", tmp_path))
     assert document["claims"] == {"confirmed": ["P1.23"], "depends on": ["P1.18", "P1.28"]}
     assert document["claims_as_shipped"] == {"confirmed": ["P1.23", "P1.28"], "refuted": ["P1.18"]}
-    said = "refuted as shipped; depends on D_M of figure 1a in (m/s³)² and how the filter starts"
+    said = "refuted as shipped; true only with other choices of D_M of figure 1a and how the filter starts"
     phrase = f"{said} (true under 1 of 15 interpretations)"
     assert reported(tmp_path / "rls2")["P1.18"] == phrase
     assert "P1.18  depends    RLS 2" in printed("claims", "rls2", "--out", tmp_path)
