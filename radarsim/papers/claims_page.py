@@ -27,10 +27,9 @@ One row for each claim: the paper's statement, the verdict, and the config that 
 `radarsim claims CONFIG`). All are judged by [one rule](verdicts.md), written before anything was measured. Where the
 paper leaves a choice open, the verdict covers all interpretations that it allows (`radarsim interpretations`):
 "refuted as shipped; true only with other choices of …" is false with the config's choice, and true with another one.
-Open a claim for its original words, their interpretation, and the part furthest from them: its exact value, or the measured one with its
-interval, and the expected range. Extensions are ours, or statements that a paper reports from others, and are not
-counted.
-"""
+Open a claim for its original words, their interpretation, and the part furthest from them: its exact value, or the
+measured one with its interval, and the expected range. Extensions are ours, or statements that a paper reports from
+others, and are not counted."""
 CLASS_MEANINGS = {  # of each class, for the headline
     CONFIRMED: "true as stated",
     REFUTED: "false by more than the margin of their words",
