@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
+from radarsim.api import fitted_target
 from radarsim.config import new_config
 from radarsim.config.overrides import Overrides
 from radarsim.errors import ConfigError
@@ -21,14 +22,17 @@ def write_new_config(
     folder: str | os.PathLike[str] = ".",
     values: Mapping[str, float] = MappingProxyType({}),
     overrides: Overrides = (),
+    target: str | None = None,
 ) -> Path:
     """Write folder/NAME.yaml, with or without suffix given, from a known config with some values changed; its path.
 
-    The config is taken with its overrides, which it can have if it has one case.
+    The config is taken with its overrides, which it can have if it has one case. A target by a name of
+    `fitted_target.TARGETS` comes with the scans and D_M that fit it and the radar.
 
     Where the folder holds a schema.json, the first line points editors to it. Raises ConfigError where the config
     exists already, StoreError where it cannot be written."""
-    name, text = new_config.new_config(name, like, registry, values, overrides)
+    fitted = None if target is None else fitted_target.fitted_parts(like, target)
+    name, text = new_config.new_config(name, like, registry, values, overrides, fitted)
     path = Path(folder) / name
     if path.with_name(SCHEMA).is_file():
         text = f"{EDITORS}{SCHEMA}\n{text}"

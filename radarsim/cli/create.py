@@ -16,24 +16,32 @@ from radarsim.language.translate import tr
     shell_complete=complete_config,
     help="The config to start from; `radarsim list` lists them.",
 )
-def new(name: str, like: str) -> None:
+@click.option(
+    "--target",
+    metavar="TARGET",
+    help="A target in place of CONFIG's, with the scans and the manoeuvre variance that fit it and the radar: "
+    "airliner, boat, drone, helicopter, missile or ship.",
+)
+def new(name: str, like: str, target: str | None) -> None:
     """Write a commented config of your own: ./NAME.yaml.
 
     The file repeats CONFIG, with the unit and meaning of every key, and lists the optional keys as comments. An
     existing file is never overwritten.
 
     \b
-    Example
+    Examples
       radarsim new mine --like rls2
+      radarsim new harbour --like rls4 --target boat
     """
-    from radarsim.api import new_configs
+    from radarsim.api import configs, fitted_target, new_configs
     from radarsim.cli import console
 
-    path = new_configs.write_new_config(name, like)
+    path = new_configs.write_new_config(name, like, target=target)
     console.print_field("config", str(path))
     console.print_field(
         "", tr("edit its values, then `radarsim check {path}` and `radarsim run {path}`", path=str(path))
     )
+    console.print_warnings(fitted_target.short_run_warnings(configs.load(path).cases))
 
 
 @main.command(name="new-study")

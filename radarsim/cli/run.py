@@ -312,8 +312,8 @@ def check(
     _refuse_incompatible(arguments["share"], arguments["precision"], None, None)
     arguments["of"] = arguments.pop("phrase") or arguments["of"]
     refuse_quantity_without_precision(arguments["of"], arguments["precision"])
-    from radarsim.api import cost_estimate, json_output, load_experiments
-    from radarsim.cli import print_cost, progress
+    from radarsim.api import cost_estimate, fitted_target, json_output, load_experiments
+    from radarsim.cli import console, print_cost, progress
 
     documents = []
     loaded = load_experiments.load_all(configs, load_experiments.combine_overrides(overrides, realisations, seed))
@@ -324,5 +324,6 @@ def check(
         documents.append(json_output.cost(experiment, outlook))
         if not as_json:
             print_cost.print_cost(experiment, outlook)
+            console.print_warnings(fitted_target.short_run_warnings(experiment.cases))
     if as_json:
         click.echo(json_output.text(documents))

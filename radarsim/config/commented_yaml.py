@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeGuard, get_args
 
 from pydantic_core import PydanticUndefined
@@ -19,10 +19,11 @@ DEGREE_UNITS = {"rad": "degrees", "rad/s": "degrees per second"}
 @dataclass(frozen=True)
 class CommentedYaml:
     """How a config is written. write: a value on one line; adds_optional: whether the optional keys that are missing
-    follow as comments, with their defaults."""
+    follow as comments, with their defaults; reasons: for values, by key as it is indented, after its description."""
 
     write: Callable[[object], str] = one_line_yaml
     adds_optional: bool = False
+    reasons: Mapping[str, str] = field(default_factory=dict)
 
     def mapping_lines(self, data: Mapping[str, Any], model: type[Model] | None, indent: str) -> list[str]:
         """The lines of a mapping."""
@@ -39,7 +40,7 @@ class CommentedYaml:
 
     def key_lines(self, key: str, value: object, model: type[Model] | None, indent: str) -> list[str]:
         """The lines of one key: a short value beside it, a mapping or a list of mappings below."""
-        comment, inner_model = description(model, key), _inner_model(model, key, value)
+        comment, inner_model = self._comment(model, key, indent), _inner_model(model, key, value)
         name = self.write(key)
         if isinstance(value, Mapping) and inner_model is not None and key != "sweep":
             lines = self.mapping_lines(value, inner_model, indent + "  ")
@@ -48,13 +49,14 @@ class CommentedYaml:
             lines = [with_comment(f"{indent}{name}:", comment)]
             if inner_model is not None:
                 used_keys = list(dict.fromkeys(name for member in value for name in member))
-                lines += [
-                    f"{indent}  # {name}: {description(inner_model, name)}"
-                    for name in used_keys
-                    if description(inner_model, name)
-                ]
+                comments = {name: self._comment(inner_model, name, f"{indent}  ") for name in used_keys}
+                lines += [f"{indent}  # {name}: {text}" for name, text in comments.items() if text]
             return [*lines, *(line for member in value for line in self._item_lines(member, indent))]
         return [with_comment(f"{indent}{name}: {self.write(value)}", comment)]
+
+    def _comment(self, model: type[Model] | None, key: str, indent: str) -> str:
+        """The description of a key, and the reason for its value."""
+        return "; ".join(filter(None, (description(model, key), self.reasons.get(f"{indent}{key}", ""))))
 
     def plain_lines(self, key: str, value: object, indent: str) -> list[str]:
         """The lines of one key without its description: on one line if it fits."""

@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from radarsim.config.common_keys import Studies
 from radarsim.config.error_list import ErrorList
@@ -19,17 +19,28 @@ from radarsim.config.yaml_io import read_document
 from radarsim.errors import ConfigError, argument
 
 
+class FittedParts(NamedTuple):
+    """What of a config fits a target: keys as a whole, numbers as `new_config` takes them, and the reason for each
+    value, by key as it is indented in the file."""
+
+    parts: dict[str, Any]
+    values: Mapping[str, float]
+    reasons: Mapping[str, str]
+
+
 def new_config(
     name: str,
     like: str | os.PathLike[str],
     studies: Studies,
     values: Mapping[str, float] = MappingProxyType({}),
     overrides: Overrides = (),
+    fitted: FittedParts | None = None,
 ) -> tuple[str, str]:
     """The file name of a new config, from NAME with or without suffix, and its text, made from a known config.
 
     values by dotted key replace those of the known config with its overrides; a bare key stands for that key in every
-    filter. Raises ConfigError for an impossible name, and for overrides of a config with several cases."""
+    filter; keys that are fitted to a target replace the known ones as a whole. Raises ConfigError for an impossible
+    name, and for overrides of a config with several cases."""
     name = name.removesuffix(".yaml")
     if is_reserved(name):
         raise ConfigError(f"{name}: {RESERVED}")
@@ -44,10 +55,15 @@ def new_config(
         raise ConfigError(
             f"{where}: a config of {len(experiment.cases)} cases is written without: put it into the config"
         )
+    values = {**values, **(fitted.values if fitted else {})}
     data = _data_for_new_config(experiment, Path(experiment.path or like), values, has_overrides=bool(overrides))
+    if fitted is not None:
+        data = {key: value for key, value in data.items() if key != "duration_s"} | fitted.parts
     for key, value in values.items():
         _set_number(data, key, value)
-    return f"{name}.yaml", starter_text(data, studies.keys(experiment.study), name, experiment.stem)
+    return f"{name}.yaml", starter_text(
+        data, studies.keys(experiment.study), name, experiment.stem, fitted.reasons if fitted else {}
+    )
 
 
 def _data_for_new_config(

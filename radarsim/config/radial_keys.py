@@ -172,6 +172,12 @@ class Turn(ManoeuvreStart):
         return min(nearest, straight_leg(x, y, heading, self.speed_mps * (t - turn_end))[0])
 
 
+def turn_variance(acceleration_g: float, period_s: float) -> float:
+    """D_M, (m/s³)², of a filter that follows a turn: with it the acceleration changes in a scan by half that of the
+    turn, the least that Bar-Shalom, Li & Kirubarajan (2001, 6.3.3) advise."""
+    return (acceleration_g * STANDARD_GRAVITY_MPS2 / 2 / period_s) ** 2
+
+
 def straight_leg(x: float, y: float, heading: float, length: float) -> tuple[float, float, float]:
     """The shortest distance to the origin along a straight leg from (x, y), and the end of the leg."""
     along_m = min(max(-(x * math.cos(heading) + y * math.sin(heading)), 0.0), length)

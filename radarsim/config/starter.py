@@ -1,6 +1,7 @@
 """The text of a new config, each key with its description from the schema."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from radarsim.config.commented_yaml import CommentedYaml, description, with_comment
@@ -11,10 +12,17 @@ from radarsim.config.yaml_text import one_line_yaml
 NAMING_KEYS = ("name", "like")  # of the config that it is taken from
 
 
-def starter_text(data: Mapping[str, Any], study_keys: type[StudyKeys], name: str, like: str) -> str:
+def starter_text(
+    data: Mapping[str, Any],
+    study_keys: type[StudyKeys],
+    name: str,
+    like: str,
+    reasons: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """The YAML of a config under a new name, each key with its description from the schema.
 
-    data: as read, with keys as written. Missing optional keys follow as comments, with their defaults."""
+    data: as read, with keys as written; reasons: as CommentedYaml has them. Missing optional keys follow as comments,
+    with their defaults."""
     lines = [
         f"# {name}.yaml — like {like}: change the numbers, then `radarsim run {name}.yaml`",
         "# Units stand in the keys: _m, _s, _mps (m/s), _mps2 (m/s²), _hz, _rad; _deg is taken wherever _rad is.",
@@ -25,7 +33,7 @@ def starter_text(data: Mapping[str, Any], study_keys: type[StudyKeys], name: str
     named_parts = {key: value for key, value in study_data.items() if isinstance(value, Mapping) and "name" in value}
     study_data |= {key: {**value, "name": name} for key, value in named_parts.items()}
     # Keys laid over an included config need not be complete.
-    yaml, study_yaml = CommentedYaml(), CommentedYaml(adds_optional="include" not in data)
+    yaml, study_yaml = CommentedYaml(), CommentedYaml(adds_optional="include" not in data, reasons=reasons)
     for key in ("study", "include"):
         if key in common_data:
             lines += yaml.key_lines(key, common_data.pop(key), CommonKeys, "")

@@ -102,7 +102,7 @@ def _ambiguity_sentences(results: Sequence[Result]) -> list[Sentence]:
             if 2 * speed < span:
                 text = tr("a span of {span:.4g} m/s", span=span)
             else:
-                text = tr("a span of {span:.4g} m/s, exceeded by the target's {speed:.4g} m/s", span=span, speed=speed)
+                text = tr("a span of {span:.4g} m/s, which folds the target's {speed:.4g} m/s", span=span, speed=speed)
             spans.setdefault(key_labels.without_markup(key_labels.config_device(result)), text)
     if not spans:
         return []
