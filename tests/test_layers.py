@@ -146,7 +146,7 @@ ROOMS = {
     ),
     "cli": (
         *("__init__", "api", "api.design", "api.maintenance", "config", "engine", "extensions", "language"),
-        *("report", "report.comparison", "studies.registry"),
+        *("report", "studies.registry"),
     ),
     "__init__": ("api", "api.design", "papers", "recordings.python"),  # the names that users import
     "__main__": ("cli",),
