@@ -51,7 +51,7 @@ def always(case: str, name: str) -> Callable[[Results], str]:
     """The share of bursts with all errors within three spreads, prior included, at all windows, %."""
 
     def text(results: Results) -> str:
-        return f"{bounded(last(results, PAPER, case, name), 'always_posterior_rate_3sigma', 'always_posterior', 100)} %"
+        return f"{bounded(last(results, PAPER, case, name), 'unbroken_posterior_lock_rate_3sigma', scale=100)} %"
 
     return text
 
@@ -132,7 +132,7 @@ def motion(results: Results) -> list[tuple]:
     table = select_rows(results, PAPER, "motion")
     table = table[table["case"] == COMPUTED]
     for wavelength, rows_of_band in table.groupby("wavelength_m"):
-        spots = [rows_of_band[rows_of_band["at"] == moment].iloc[0] for moment in ("beginning", "middle")]
+        spots = [rows_of_band[rows_of_band["burst_point"] == moment].iloc[0] for moment in ("beginning", "middle")]
         cells = (
             f"{spot[f'sigma_{quantity}']:.2g}" for quantity in ("velocity_mps", "acceleration_mps2") for spot in spots
         )

@@ -36,7 +36,7 @@ def sigma(results: Results, stem: str, case: str, name: str, component: str) -> 
 def bound_of(results: Results, stem: str, case: str) -> float:
     """The Fisher bound of the velocity from the first burst of a case, m/s."""
     estimates = select_rows(results, stem, "estimates", case=case.partition(" ")[2], filter="ideal")
-    return float(estimates.iloc[0]["bound"])
+    return float(estimates.iloc[0]["crb"])
 
 
 def filters(results: Results) -> list[tuple]:
@@ -131,7 +131,7 @@ def tracks(results: Results) -> str:
 
 def accuracy(results: Results) -> str:
     """The Fisher bound of velocity in the long bursts, mm/s."""
-    return f"{1e3 * select_rows(results, 'pulses_acceleration', 'estimates', component='Vr').iloc[0]['bound']:.2g}"
+    return f"{1e3 * select_rows(results, 'pulses_acceleration', 'estimates', component='Vr').iloc[0]['crb']:.2g}"
 
 
 def radars(results: Results) -> list[tuple]:

@@ -23,15 +23,15 @@ def sigma(row) -> str:
 
 def plots(results: Results) -> list[tuple]:
     """What each further plot of a straight course buys, smoothed and a scan ahead, σ of a plot being 1."""
-    heads = ("plots", "smoothed", "formula", "bought, %", "one scan ahead", "formula", "bought, %")
+    heads = ("plots", "smoothed", "formula", "reduction, %", "one scan ahead", "formula", "reduction, %")
     table_rows: list[tuple] = [heads]
     for count in range(2, 9):
         cells: list[str] = [str(count)]
         for estimate in ("smoothed", "extrapolated"):
-            columns = {"filter": "growing", "component": "r", "what": estimate, "plots": count}
+            columns = {"filter": "growing", "component": "r", "quantity": estimate, "plots": count}
             row = select_rows(results, "sonar_smoothing", "plots", **columns).iloc[0]
             value = with_bounds(row["ratio"], row["ratio_lo"], row["ratio_hi"])
-            cells += [value, f"{row['formula']:.4f}", f"{row['bought_percent']:.1f}" if count > 2 else ""]
+            cells += [value, f"{row['formula']:.4f}", f"{row['reduction_percent']:.1f}" if count > 2 else ""]
         table_rows.append(tuple(cells))
     return table_rows
 
@@ -104,7 +104,7 @@ def conversion(results: Results) -> list[tuple]:
             select_rows(results, "sonar_conversion", "conversion", case=f"deg={degrees:g} frame={frame}").iloc[0]
             for frame in ("cartesian", "cartesian_unbiased")
         )
-        first, second = (with_bounds(row["bias_m"], row["bias_lo"], row["bias_hi"]) for row in (plain, unbiased))
+        first, second = (with_bounds(row["bias_m"], row["bias_m_lo"], row["bias_m_hi"]) for row in (plain, unbiased))
         table_rows.append((f"{degrees:g}°", first, signed(f"{plain['formula_m']:.1f}"), second))
     return table_rows
 

@@ -27,8 +27,8 @@ def keeping(results: Results) -> list[tuple]:
     table_rows: list[tuple] = [("false plots per km²", *heads)]
     for density in DENSITIES:
         nearest, pda = (track(results, name, density) for name in BOTH)
-        lives = (bounded(row, "life_s", "life") for row in (nearest, pda))
-        wrong = (bounded(row, "wrong_share", "wrong") for row in (nearest, pda))
+        lives = (bounded(row, "life_s") for row in (nearest, pda))
+        wrong = (bounded(row, "wrong_share") for row in (nearest, pda))
         table_rows.append((f"{density:g}", f"{pda['false_in_gate']:.2g}", *lives, *wrong))
     return table_rows
 
@@ -52,8 +52,8 @@ def false_tracks(results: Results) -> list[tuple]:
     table_rows: list[tuple] = [("false plots per km²", *heads)]
     for density in DENSITIES:
         pair = [track(results, name, density) for name in ("nearest", SLOWER)]
-        rates = (bounded(row, "false_tracks_per_hour", "false") for row in pair)
-        times = (bounded(row, "time_to_confirm_s", "time") for row in pair)
+        rates = (bounded(row, "false_tracks_per_hour") for row in pair)
+        times = (bounded(row, "time_to_confirm_s") for row in pair)
         table_rows.append((f"{density:g}", *rates, *times))
     return table_rows
 
@@ -66,11 +66,8 @@ def gates(results: Results) -> list[tuple]:
     for nearest in table.sort_values(["detection_probability", "gate_probability"], ascending=[False, True]).iloc:
         columns = {"filter": "PDA", "case": nearest["case"]}
         pda = select_rows(results, "sonar_clutter_gate", "tracking", **columns).iloc[0]
-        cells = (bounded(row, "life_s", "life") for row in (nearest, pda))
-        further_cells = (
-            bounded(nearest, "time_to_confirm_s", "time"),
-            bounded(nearest, "false_tracks_per_hour", "false"),
-        )
+        cells = (bounded(row, "life_s") for row in (nearest, pda))
+        further_cells = (bounded(nearest, "time_to_confirm_s"), bounded(nearest, "false_tracks_per_hour"))
         settings = (f"{nearest['detection_probability']:g}", f"{nearest['gate_probability']:g}")
         table_rows.append((*settings, *cells, *further_cells))
     return table_rows

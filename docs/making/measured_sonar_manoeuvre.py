@@ -43,7 +43,7 @@ def alarms(results: Results) -> list[tuple]:
             for acceleration in ACCELERATIONS
         ]
         table_rows.append((f"{plots} plots", *(f"{row['probability']:.3f}" for row in detections)))
-        table_rows.append(("exact", *(f"{row['exact']:.3f}" for row in detections)))
+        table_rows.append(("exact", *(f"{row['exact_probability']:.3f}" for row in detections)))
     return table_rows
 
 
@@ -54,7 +54,7 @@ def widest(results: Results) -> str:
         for plots in PLOTS
         for acceleration in ACCELERATIONS
     ]
-    return f"{max((row['hi'] - row['lo']) / 2 for row in detections):.4f}"
+    return f"{max((row['probability_hi'] - row['probability_lo']) / 2 for row in detections):.4f}"
 
 
 def times(event: str) -> Callable[[Results], list[tuple]]:
@@ -140,9 +140,9 @@ def use(name: str, component: str) -> Callable[[Results], str]:
 
 def beyond(results: Results) -> str:
     """How many rates lie outside the binomial 99.99 % bounds of their exact law, of how many."""
-    table = results.table(STEM, "detections").dropna(subset="exact")
+    table = results.table(STEM, "detections").dropna(subset="exact_probability")
     count = (table["probability"] * table["n"]).round()
-    low, high = (binom.ppf(tail, table["n"], table["exact"]) for tail in (0.5e-4, 1 - 0.5e-4))
+    low, high = (binom.ppf(tail, table["n"], table["exact_probability"]) for tail in (0.5e-4, 1 - 0.5e-4))
     outside = int(((count < low) | (count > high)).sum())
     return f"Of {len(table)} rates {outside} outside, {len(table) * 1e-4:.1f} to be expected"
 
@@ -155,7 +155,7 @@ def turn(plots: int) -> Callable[[Results], str]:
         columns = {"case": case, "filter": f"{plots} plots", "component": "r", "t_s": END_S}
         table = select_rows(results, "sonar_manoeuvre_turning", "detections", **columns)
         row = table[(table["false_alarm_probability"] - 0.01).abs() < 1e-6].iloc[0]
-        return with_bounds(row["probability"], row["lo"], row["hi"])
+        return with_bounds(row["probability"], row["probability_lo"], row["probability_hi"])
 
     return text
 

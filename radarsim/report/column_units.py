@@ -18,7 +18,9 @@ UNITS_BY_SUFFIX = {
     "_m": "m",
     "_s": "s",
 }
-COMPONENT_COLUMN = re.compile(r"(\w+_)?(sigma(_all)?|bias|spread)|floor")  # of errors of a component; and the intervals
+COMPONENT_COLUMN = re.compile(
+    r"(\w+_)?(sigma(_all)?|bias|spread|crb(_sum)?)|floor"
+)  # of errors of a component; and the intervals
 INTERVAL_ENDS = ("_lo", "_hi", "_se")
 
 
@@ -37,6 +39,4 @@ def _unit(name: str, names: Collection[str]) -> str:
     is_end = stem != name and stem not in names
     if is_end and f"{stem}{PERCENT}" in names:  # gain_lo of gain_percent
         return UNITS_BY_SUFFIX[PERCENT]
-    if is_end and f"{stem}_sigma" in names:  # last_lo of last_sigma
-        stem = f"{stem}_sigma"
     return UNIT_COLUMN if "unit" in names and COMPONENT_COLUMN.fullmatch(stem) else ""

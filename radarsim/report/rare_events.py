@@ -75,10 +75,10 @@ def rate_columns(
 
     event: in words
     sought: whether realisations are drawn for it
-    rate ±: its probability
+    event_rate ±: its probability
     events: number of realisations that have it; `n_eff` effective ones
     variance_factor: how many times as many plain realisations give the same precision
-    plain: number of the n drawn from the original law
+    n_plain: number of the n drawn from the original law
     mean_weight, mean_weight_se: mean of all weights, which must be one, and its standard error"""
     estimate, size = event_rate(events, sampling), len(sought)
     variance = events.squared / sampling.n - estimate.value**2
@@ -92,11 +92,11 @@ def rate_columns(
         "event": np.full(size, event, dtype=object),
         "sought": sought,
         "n": np.full(size, sampling.n),
-        "rate": estimate,
+        "event_rate": estimate,
         "events": events.number.astype(np.int64),
         "n_eff": effective,
         "variance_factor": factor,
-        "plain": np.full(size, sampling.plain_count).astype(np.int64),
+        "n_plain": np.full(size, sampling.plain_count).astype(np.int64),
         "mean_weight": np.full(size, mean),
         "mean_weight_se": np.full(size, spread),
         "note": weight_notes(sampling, events),
@@ -146,9 +146,9 @@ def rate_table(parts: "Sequence[dict[str, Any]]") -> "pd.DataFrame | None":
 def rate_fields(row: "pd.Series") -> dict[str, Any]:
     """The fields of a sentence on a row of rare.csv: rate with interval, number of events, and effective ones."""
     return {
-        "rate": row["rate"],
-        "low": row["rate_lo"],
-        "high": row["rate_hi"],
+        "rate": row["event_rate"],
+        "low": row["event_rate_lo"],
+        "high": row["event_rate_hi"],
         "events": row["events"],
         "n_eff": row["n_eff"],
     }
@@ -175,7 +175,7 @@ def mean_weight_warnings(rates: "pd.DataFrame | None") -> list[str]:
 
 def _is_unguided(rates: "pd.DataFrame") -> np.ndarray:
     """The sought rows (rows,) where a part of the event without a shift dominates Σw² = (Σw)²/n_eff."""
-    sought, squared = rates["sought"].astype(bool), rates["rate"] ** 2 / rates["n_eff"].clip(lower=1.0)
+    sought, squared = rates["sought"].astype(bool), rates["event_rate"] ** 2 / rates["n_eff"].clip(lower=1.0)
     of_parts = squared.where(rates[UNGUIDED_PART].astype(bool), 0.0)
     of_parts = of_parts.groupby([rates[name] for name in ("case", "filter", "k")]).transform("max")
     return (sought & (of_parts > UNGUIDED_SHARE * squared)).to_numpy()

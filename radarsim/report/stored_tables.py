@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from radarsim.errors import StoreError
 from radarsim.report import atomic_files, csv_text, provenance
+from radarsim.report.old_columns import with_current_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,12 +67,14 @@ class StoredFiles:
         return self.contents.get(name)
 
     def table(self, name: str) -> "pd.DataFrame | None":
-        """A table; None where the run wrote none of this name. Raises StoreError as `content`, and for no table."""
+        """A table, with the present names of its columns; None where the run wrote none of this name. Raises StoreError
+        as `content`, and for no table."""
         content = self.content(f"{name}.csv")
         if content is None:
             return None
         path = self.folder / f"{name}.csv"
         try:
+            content = with_current_columns(self.record["study"], name, content)
             table = csv_text.from_csv(content, whole_numbers=True)
         except (ValueError, csv.Error) as error:
             raise StoreError(f"{path}: is no table: {_csv_fault(error)}; {HOW_TO_REMAKE}") from error

@@ -271,7 +271,7 @@ class OneFile(Study):
         limits = self.limits(result.spec)
         return {
             **tables.label_columns(result, f, **tables.component_columns(result, c)),
-            "last_sigma|last": sigma,
+            "last_sigma": sigma,
             "exact_last_sigma": result.axes.exact_sigma[f, -1, c],
         } | ({} if limits is None else {"steady_sigma": limits[f, c]})
 

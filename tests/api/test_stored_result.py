@@ -181,8 +181,8 @@ def test_arrays_of_any_table_read_back_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("columns", "units"),
     [
-        ("unit exact_bias steady_sigma last_sigma last_lo last_hi", [column_units.UNIT_COLUMN] * 5),
-        ("above_oracle_percent above_oracle_lo gain_percent gain_hi", ["%"] * 4),
+        ("unit exact_bias steady_sigma last_sigma last_sigma_lo posterior_crb", [column_units.UNIT_COLUMN] * 5),
+        ("excess_over_oracle_percent excess_over_oracle_percent_lo gain_percent gain_hi", ["%"] * 4),
         ("bearing_rad bearing_rad_lo course_deg energy_db", ["rad", "rad", "°", "dB"]),
         ("k n lock_rate_3sigma right_lo nees sigma", []),
     ],

@@ -98,7 +98,7 @@ def test_a_precision_of_rates_is_relative_and_of_the_last_window(tmp_path):
     fewer = ("--set", "sweep.estimators.0.lock_probability=[0.999]", *PLAIN, "--out", tmp_path)
     command("run", "discriminator_rare", "-n", "1e5", "--precision", 20, "--of", "lost", *fewer)
     rare = pd.read_csv(tmp_path / "discriminator_rare" / "rare.csv").iloc[0]
-    assert 50 * (rare["rate_hi"] - rare["rate_lo"]) / rare["rate"] < 20
+    assert 50 * (rare["event_rate_hi"] - rare["event_rate_lo"]) / rare["event_rate"] < 20
     assert rare["n"] < 100_000
     (predicted,) = json.loads(
         command("check", "discriminator_rare", "--precision", 20, "--of", "lost", "--json", *fewer[:2]).stdout

@@ -23,12 +23,22 @@ from radarsim.report.row_notes import concerns
 from radarsim.report.statistics import Z95
 from radarsim.studies import registry
 
-# What tells the rows of a table apart; `plots` and `m` are settings where they stand, but in gates.csv.
+# What tells the rows of a table apart; `plots` and `confirm_plots` are settings where they stand, but in gates.csv.
 LABELS = (
     *("case", "filter", "baseline", "component", "model", "order", "k", "stage", "phase", "shift", "event", "delay_s"),
-    *("truth", "duration_s", "threshold_k", "threshold", "association", "m", "of", "what", "degree"),
+    *(
+        "truth",
+        "duration_s",
+        "threshold_k",
+        "threshold",
+        "association",
+        "confirm_plots",
+        "confirm_scans",
+        "quantity",
+        "degree",
+    ),
     *("frame", "range_m"),
-    *("bin_lo", "plots", "ideal", "since_loss"),
+    *("bin_lo", "plots", "idealisation", "since_loss"),
 )
 MEASURED = {("gates", "plots")}
 NO_INTERVALS = ("bin_lo", "nees_bound_lo", "nis_bound_lo")

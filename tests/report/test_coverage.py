@@ -95,8 +95,13 @@ def test_unmarked_weighted_rates_cover(config):
     """Of rates by importance sampling, and of the shares that other tables take from the same weights."""
     overrides, n = WEIGHTED[config]
     found = kept(load(config, [*overrides, f"realisations={n}"]), n, SEEDS)
-    assert ("rare", "rate") in found
-    for key in found.keys() & {("rare", "rate"), ("folds", "right"), ("folds", "beyond"), ("locks", "lock_rate")}:
+    assert ("rare", "event_rate") in found
+    for key in found.keys() & {
+        ("rare", "event_rate"),
+        ("folds", "right"),
+        ("folds", "beyond_half_interval_share"),
+        ("locks", "lock_rate"),
+    }:
         one = found[key]
         assert not one.wrong(SEEDS).size, (key, one.held[one.wrong(SEEDS)])
         if one.unmarked.sum() >= len(one.held) * SEEDS / 20:

@@ -153,7 +153,7 @@ def test_the_table_of_the_last_scan_holds_what_was_measured_and_what_is_exact(ma
     last = every["last"]
     assert list(last["filter"]) == ["slow", "quick"] * 2
     off = abs(last["last_sigma"] - last["exact_last_sigma"])
-    assert (off < 2.5 * (last["last_hi"] - last["last_lo"]) / 2).all()
+    assert (off < 2.5 * (last["last_sigma_hi"] - last["last_sigma_lo"]) / 2).all()
     start_left = 0.8 ** (2 * 39)  # of the variance, by the slow filter, after forty scans
     assert last["steady_sigma"].to_numpy() == pytest.approx(last["exact_last_sigma"].to_numpy(), rel=start_left)
     assert list(last["exact_last_sigma"]) == [one for r in results for one in r.axes.exact_sigma[:, -1, 0]]

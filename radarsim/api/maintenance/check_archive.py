@@ -23,6 +23,7 @@ from radarsim.config.find_files import is_stem
 from radarsim.engine.store.block_file import piece_named
 from radarsim.errors import ConfigError, RadarsimError, StoreError
 from radarsim.extensions import extensions
+from radarsim.report.old_columns import with_current_columns
 from radarsim.report.stored_tables import HOW_TO_REMAKE, find_record, read_content
 from radarsim.user_code.errors import code_allowed
 
@@ -85,8 +86,9 @@ def differences(archive: Archive, experiment: Experiment, folder: Path) -> tuple
         table = name.removeprefix(place)
         if table == name or not table.endswith(".csv") or "/" in table:
             continue
-        stored, computed = archive.read(name), read_content(folder / table)
         stem = table.removesuffix(".csv")
+        stored = with_current_columns(experiment.study, stem, archive.read(name))
+        computed = read_content(folder / table)
         if computed is None and table == RUNS_FILE:
             continue  # see `missing_runs_option`
         difference = (

@@ -23,6 +23,7 @@ from radarsim.engine.store.block_file import block_path
 from radarsim.engine.sums import Sums
 from radarsim.extensions import extensions
 from radarsim.report import atomic_files, csv_text, provenance
+from radarsim.report.old_columns import with_current_columns
 
 TOLERANCE_FACTOR = 10  # for a power p ≤ 4 of an error, and heavy tails in it
 MAX_RECOMPUTED_SCANS = 10**9  # realisations times scans of all that is computed again: minutes, whatever a record says
@@ -229,7 +230,8 @@ def _compare_tables(
         path = inspection.folder / f"{name}.csv"
         if path.name not in record["outputs"]:
             continue
-        stored, computed = atomic_files.read(path), csv_text.to_csv(table)
+        stored = with_current_columns(experiment.study, name, atomic_files.read(path))
+        computed = csv_text.to_csv(table)
         inspection.tables.append(path.name)
         if difference := differs(experiment.study, name, stored, computed, free_columns.get(name, ())):
             if difference.startswith(OTHER_SHAPE) and (versions := _versions_sentence(record)):

@@ -15,7 +15,7 @@ class Evidence(GeneralEvidence):
     def above_oracle(self, key: str, name: str) -> Curve:
         """By how much σ of the velocity is above that of unfolded velocity, %, by scan."""
         gains = self.tables["gains"]
-        columns = ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")
+        columns = tuple(f"excess_over_oracle_percent{end}" for end in ("", "_lo", "_hi"))
         return self._curve_of_rows(gains[gains["component"] == "Vr"], key, name, columns)
 
     def _curve_of_rows(self, table: "pd.DataFrame", key: str, name: str, columns: tuple[str, ...]) -> Curve:

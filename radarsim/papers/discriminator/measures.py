@@ -67,8 +67,8 @@ class Evidence(GeneralEvidence):
 
     def always(self, key: Key) -> Estimate:
         """Share of bursts with every component of the sequence within 3σ at every window, σ with the prior."""
-        ends = ("always_posterior_lo", "always_posterior_hi")
-        return self.lock(key, "sequence", "always_posterior_rate_3sigma", ends)
+        column = "unbroken_posterior_lock_rate_3sigma"
+        return self.lock(key, "sequence", column, (f"{column}_lo", f"{column}_hi"))
 
     def accuracy(self, key: Key, kind: str, component: str) -> Estimate:
         """σ of the locked bursts over the potential one of the window, at the last window."""

@@ -11,7 +11,7 @@ from radarsim.papers.authoring import Evidence as GeneralEvidence
 from radarsim.physics.motion import transition
 from radarsim.report import statistics
 from radarsim.studies.sonar import closed_forms, least_squares
-from radarsim.studies.sonar.tables import textbook
+from radarsim.studies.sonar.tables import GAIN_COLUMNS, textbook
 
 MAX_PLOTS = 100
 Quantity = Literal["smoothed", "extrapolated", "acceleration"]
@@ -183,7 +183,7 @@ def _last(evidence: Evidence, key: Key, kind: str, component: str = "r") -> Esti
 def over_formula(evidence: Evidence, key: Key, quantity: Quantity, n: int) -> Estimate:
     """σ of growing memory after n plots over the paper's formula, of the range."""
     degree = 2 if quantity == "acceleration" else 1
-    row = evidence.row("plots", case=evidence.case(key).name, component="r", what=quantity, plots=n, degree=degree)
+    row = evidence.row("plots", case=evidence.case(key).name, component="r", quantity=quantity, plots=n, degree=degree)
     return _estimate(row, "ratio", row["formula"])
 
 
@@ -191,7 +191,7 @@ def more_over_few_plots(evidence: Evidence, key: Key, more: int, few: int, quant
     """Smoothed or extrapolated σ of growing memory after more plots over that after few; of the same realisations,
     taken as independent."""
     name = evidence.case(key).name
-    rows = [evidence.row("plots", case=name, component="r", what=quantity, plots=n, degree=1) for n in (more, few)]
+    rows = [evidence.row("plots", case=name, component="r", quantity=quantity, plots=n, degree=1) for n in (more, few)]
     return ratio(_estimate(rows[0], "ratio"), _estimate(rows[1], "ratio"))
 
 
@@ -240,7 +240,7 @@ def fewest_plots(evidence: Evidence, key: Key) -> Estimate:
     name = evidence.case(key).name
     rows = evidence.tables["plots"]
     rows = rows[(rows["case"] == name) & (rows["component"] == "r") & (rows["degree"] == 1)]
-    rows = rows[rows["what"] == "extrapolated"].sort_values("plots")
+    rows = rows[rows["quantity"] == "extrapolated"].sort_values("plots")
     fulfilling = [rows.loc[rows[column] <= 1, "plots"] for column in ("ratio", "ratio_lo", "ratio_hi")]
     return Estimate(*(float(f.iloc[0]) if len(f) else np.inf for f in fulfilling))
 
@@ -248,12 +248,13 @@ def fewest_plots(evidence: Evidence, key: Key) -> Estimate:
 def gain_over_formula(evidence: Evidence, key: Key, letter: Letter, n: int) -> Estimate:
     """A_n or B_n as measured, over its closed form."""
     row = _gain_row(evidence, key, n)
-    return _estimate(row, letter, row[f"{letter}_formula"])
+    return _estimate(row, GAIN_COLUMNS[letter], row[f"{GAIN_COLUMNS[letter]}_formula"])
 
 
 def gain_falls(evidence: Evidence, key: Key, letter: Letter, early: int, late: int) -> Estimate:
     """A gain at one number of plots over that at another."""
-    return ratio(_estimate(_gain_row(evidence, key, late), letter), _estimate(_gain_row(evidence, key, early), letter))
+    late_gain, early_gain = (_estimate(_gain_row(evidence, key, n), GAIN_COLUMNS[letter]) for n in (late, early))
+    return ratio(late_gain, early_gain)
 
 
 def _gain_row(evidence: Evidence, key: Key, n: int) -> Mapping[str, Any]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from radarsim.studies.ambiguous_doppler.study import Plan
     from radarsim.studies.floors.bound import Floor
 
-COLUMN = "above_oracle_percent|above_oracle"  # against the filter that is given the true folds
+COLUMN = "excess_over_oracle_percent"  # against the filter that is given the true folds
 ABOVE_ORACLE = Quantity(
     *("above_oracle", term("σ above the oracle's"), "gains", COLUMN, "exact_above_oracle"),
     per="component",

@@ -13,7 +13,7 @@ from radarsim.report.compared_value import ComparedValue, is_equal
 from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import Estimate
 from radarsim.studies.ambiguous_doppler import remedy_answer
-from radarsim.studies.ambiguous_doppler.tables import Result
+from radarsim.studies.ambiguous_doppler.tables import BEYOND_SHARE, Result
 from radarsim.studies.counted_scans import CountedScans
 
 if TYPE_CHECKING:
@@ -232,7 +232,7 @@ def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -
                 since = _first_good_scan(gains) or np.inf
                 text = f"{key_labels.plain_case_label(result)}: {clause.text}"
                 deciding = _near_the_limit(gains.tail(1))
-                above = gains["above_oracle_percent"].iloc[-1]
+                above = gains["excess_over_oracle_percent"].iloc[-1]
                 comparisons.setdefault(name, []).append(_CaseComparison(since, above, text, clause, deciding))
     if not comparisons:
         return []
@@ -255,12 +255,12 @@ def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -
 def _gains_over_oracle(result: Result, name: str, tables_by_name: TablesByName) -> "pd.DataFrame":
     """The rows (scans) of `gains` in the velocity, of a filter that is compared with its oracle."""
     rows = tables.select_rows(tables_by_name["gains"], case=result.name, filter=name, component="Vr")
-    return rows.dropna(subset=["above_oracle_percent"])
+    return rows.dropna(subset=["excess_over_oracle_percent"])
 
 
 def _first_good_scan(gains: "pd.DataFrame") -> int:
     """The scan from which on a filter is as good as its oracle, for good; 0 where it is not at the last one."""
-    is_worse = gains["above_oracle_hi"].to_numpy() > AS_GOOD_PERCENT
+    is_worse = gains["excess_over_oracle_percent_hi"].to_numpy() > AS_GOOD_PERCENT
     if is_worse[-1]:
         return 0
     return int(gains["k"].to_numpy()[int(is_worse.nonzero()[0][-1]) + 1 if is_worse.any() else 0])
@@ -268,8 +268,10 @@ def _first_good_scan(gains: "pd.DataFrame") -> int:
 
 def _near_the_limit(gains: "pd.DataFrame") -> tuple[sentences.MeasuredInterval, ...]:
     """The intervals by which a filter is as good as its oracle, and would not be if they were twice as wide."""
-    low, high = (gains[name].to_numpy() for name in ("above_oracle_lo", "above_oracle_hi"))
-    return sentences.intervals("gains", "above_oracle", gains[sentences.would_exceed(AS_GOOD_PERCENT, low, high)])
+    low, high = (gains[name].to_numpy() for name in ("excess_over_oracle_percent_lo", "excess_over_oracle_percent_hi"))
+    return sentences.intervals(
+        "gains", "excess_over_oracle_percent", gains[sentences.would_exceed(AS_GOOD_PERCENT, low, high)]
+    )
 
 
 def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, looks: int = 1) -> list[Sentence]:
@@ -285,16 +287,21 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, loo
         )
         return [Sentence(text, _near_the_limit(gains[gains["k"] >= since]))]
     final = gains.iloc[-1]
-    if final["above_oracle_percent"] > LOST_PERCENT:
+    if final["excess_over_oracle_percent"] > LOST_PERCENT:
         return [
             _lost_clause(
                 tables.select_rows(tables_by_name["folds"], case=result.name, filter=name).iloc[-1], final["k"], looks
             )
         ]
-    ratio = Estimate(*(100.0 + final[key] for key in ("above_oracle_percent", "above_oracle_lo", "above_oracle_hi")))
+    ratio = Estimate(
+        *(
+            100.0 + final[key]
+            for key in ("excess_over_oracle_percent", "excess_over_oracle_percent_lo", "excess_over_oracle_percent_hi")
+        )
+    )
     above = ComparedValue(ratio, is_exact=False).chosen_among(looks).mapped(lambda percent: percent - 100.0)
     fields = {"above": above.text("%", ".3g") + above.choice_remark(), "k": final["k"]}
-    if final["above_oracle_percent"] <= AS_GOOD_PERCENT:
+    if final["excess_over_oracle_percent"] <= AS_GOOD_PERCENT:
         text = tr(
             "σ of the velocity is {above} above that of unfolded velocity at scan {k}, the last: too few realisations "
             "to tell whether within {percent:g} %",
@@ -303,21 +310,21 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, loo
         )
     else:
         text = tr("σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last", **fields)
-    return [Sentence(text, sentences.intervals("gains", "above_oracle", final))]
+    return [Sentence(text, sentences.intervals("gains", "excess_over_oracle_percent", final))]
 
 
 def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
     """The share of realisations whose velocity is off by more than half the span at the last scan, k."""
-    beyond = Estimate(*(float(folds[key]) for key in ("beyond", "beyond_lo", "beyond_hi")))
+    beyond = Estimate(*(float(folds[key]) for key in (BEYOND_SHARE, f"{BEYOND_SHARE}_lo", f"{BEYOND_SHARE}_hi")))
     share = ComparedValue(beyond, is_exact=False, kind="share").chosen_among(looks)
     text = tr(
         "at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
         k=k,
         share=wording.share(*(100 * end for end in share.estimate)) + share.choice_remark(),
     )
-    if folds["beyond"] > remedy_answer.LOST_SHARE:
+    if folds[BEYOND_SHARE] > remedy_answer.LOST_SHARE:
         text = tr("lost: {off}", off=text)
-    return Sentence(text, sentences.intervals("folds", "beyond", folds))
+    return Sentence(text, sentences.intervals("folds", BEYOND_SHARE, folds))
 
 
 def _right_folds(result: Result, name: str, tables_by_name: TablesByName) -> list[Sentence]:
@@ -343,4 +350,4 @@ def _wrong_folds_sought(result: Result, name: str, tables_by_name: TablesByName)
         k=row["k"],
         **rare_events.rate_fields(row),
     )
-    return [Sentence(text, sentences.intervals("rare", "rate", row))]
+    return [Sentence(text, sentences.intervals("rare", "event_rate", row))]

@@ -11,7 +11,7 @@ from radarsim.report import case_selection, figure_lines, key_labels, panel_layo
 from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.ambiguous_doppler.hypothesis_fan import hypotheses_figure
-from radarsim.studies.ambiguous_doppler.tables import Result
+from radarsim.studies.ambiguous_doppler.tables import BEYOND_SHARE, Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,7 +50,7 @@ SHARES = {  # figure: column of folds.csv, title of the axis, caption
         ),
     ),
     "lost": (
-        "beyond",
+        BEYOND_SHARE,
         term("P(velocity off by over D/2)"),
         term("Share of realisations whose velocity is off by more than half the span. Bands: 95 % intervals."),
     ),

@@ -16,7 +16,7 @@ from radarsim.report.sentences import Sentence
 from radarsim.studies.ambiguous_doppler.config import MAX_HYPOTHESES, Prior, states_speed
 from radarsim.studies.ambiguous_doppler.kernels.layout import OFF_BY_HALF_SPAN_SUM
 from radarsim.studies.ambiguous_doppler.study import prepare, simulate
-from radarsim.studies.ambiguous_doppler.tables import Result
+from radarsim.studies.ambiguous_doppler.tables import BEYOND_SHARE, Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,7 +84,7 @@ def _trial_text(settings: str, trial: Trial) -> str:
 def _is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:
     """Whether most of its velocities are off by more than half a span at the last scan."""
     folds = tables.select_rows(tables_by_name["folds"], case=result.name, filter=name)
-    return bool(len(folds) and folds.iloc[-1]["beyond"] > LOST_SHARE)
+    return bool(len(folds) and folds.iloc[-1][BEYOND_SHARE] > LOST_SHARE)
 
 
 def _is_worse(result: Result, name: str, tables_by_name: TablesByName) -> bool:

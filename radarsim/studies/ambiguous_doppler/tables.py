@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Result = CaseResult[FoldedAxes]
 table = report_tables.TableMakers()
+BEYOND_SHARE = "beyond_half_interval_share"  # column of folds.csv
 WRONG_FOLD, NO_ROOM = "wrong fold", "wrong fold that found no room"  # events of rare.csv, the second part of the first
 # Velocities off by more than half the span may decide σ even if they occur once in 10⁵; most samples hold none and show
 # no tail. So σ is marked where fewer than FEW_EVENTS occurred: in 60 × 20,000 realisations of `ambiguous_rls5` the
@@ -43,11 +44,10 @@ def _curves(results: Sequence[Result]) -> "pd.DataFrame":
 def _gains(results: Sequence[Result]) -> "pd.DataFrame":
     """As in other studies; and relative to the oracle, the filter whose velocity is unfolded by the truth.
 
-    above_oracle_percent ± above_oracle: by how much σ is above the oracle's, paired; empty without such a filter
+    excess_over_oracle_percent ±: by how much σ is above the oracle's, paired; empty without such a filter
     """
     columns = (
-        {**report_tables.gains([result]), "above_oracle_percent|above_oracle": _above_oracle(result)}
-        for result in results
+        {**report_tables.gains([result]), "excess_over_oracle_percent": _above_oracle(result)} for result in results
     )
     return _with_notes(report_tables.join_columns(columns), _few_folds(results))
 
@@ -106,7 +106,7 @@ def _folds(result: Result) -> report_tables.Columns:
     exact_right: known of the nearest fold, without missed plots, where truth and filter agree; of a `remainder` always
     listed: share whose list holds the right sequence
     hypotheses: mean number of hypotheses kept
-    beyond ±: share whose velocity is off by more than half the span
+    beyond_half_interval_share ±: those whose velocity is off by more than half the span
     """
     axes = result.axes
     visible = np.broadcast_to(unfolding_filters(result)[:, None], axes.exact_right.shape)
@@ -129,7 +129,7 @@ def _folds(result: Result) -> report_tables.Columns:
         "exact_right": axes.exact_right[indices],
         "listed": folds[:, LISTED_SUM] / n,
         "hypotheses": folds[:, COUNT_SUM] / n,
-        "beyond": beyond_rate,
+        BEYOND_SHARE: beyond_rate,
         "note": note,
     }
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 TablesByName = Mapping[str, "pd.DataFrame"]
-LOSS = Quantity("loss", term("rate of lost locks"), "rare", "rate")  # a size, as rare ones differ by factors
+LOSS = Quantity("loss", term("rate of lost locks"), "rare", "event_rate")  # a size, as rare ones differ by factors
 
 
 def question(experiment: Experiment) -> str:
@@ -67,7 +67,7 @@ def _worst_against_design(results: Sequence[CaseResult], tables_by_name: TablesB
             estimator = next(e for e in result.spec.estimators if e.name == row["filter"])
             if estimator.schedule == "designed" and estimator.lock_probability < 1:
                 designed = 1 - estimator.lock_probability
-                losses.append((row["rate"] / designed, designed, row))
+                losses.append((row["event_rate"] / designed, designed, row))
     if not losses:
         return []
     times, designed, row = max(losses, key=lambda loss: loss[0])
@@ -181,4 +181,4 @@ def _rate_of_losses(rates: "pd.DataFrame") -> Sentence:
         estimator=row["filter"],
         **rare_events.rate_fields(row),
     )
-    return Sentence(text, sentences.intervals("rare", "rate", row))
+    return Sentence(text, sentences.intervals("rare", "event_rate", row))

@@ -95,7 +95,7 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
     for n, (letter, (component, _)) in enumerate(zip("bcdefg", result.axes.components, strict=False)):
         component_rows = rows[(result.name, name, component)]
         t, middle, low, high, bound = (
-            component_rows[column].to_numpy(float) for column in ("t_s", "median", "q05", "q95", "posterior_sigma")
+            component_rows[column].to_numpy(float) for column in ("t_s", "median", "q05", "q95", "posterior_crb")
         )
         marks = (
             Line(t, middle, tr("median"), Style(0, 0, 0), low, high),
@@ -156,7 +156,7 @@ def accuracy(result: CaseResult, tables_by_name: Mapping) -> Figure:
             if component_rows is None or len(component_rows) < 2:
                 continue
             ratios = component_rows.assign(
-                **{name: component_rows[name] / component_rows["posterior_sigma"] for name in figure_lines.SIGMA[1:4]}
+                **{name: component_rows[name] / component_rows["posterior_crb"] for name in figure_lines.SIGMA[1:4]}
             )
             marks.append(
                 figure_lines.line_from_rows(ratios, figure_lines.SIGMA[:4], NAMES[component], Style(n, n % 4, n))

@@ -39,7 +39,7 @@ def _curves(result: CaseResult) -> common.Columns:
     """As everywhere, window by window, of the locked bursts; `exact_sigma` is the potential σ.
 
     sigma_all [unit]: σ of all bursts, none dropped
-    posterior_sigma [unit]: the potential σ with the prior
+    posterior_crb [unit]: the potential σ with the prior
     """
     axes, indices = result.axes, common.row_index(result)
     f, k, c = indices
@@ -59,7 +59,7 @@ def _curves(result: CaseResult) -> common.Columns:
         "exact_bias": np.full(f.size, np.nan),
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
         "sigma_all": all_errors.sigma.value * bound,
-        "posterior_sigma": axes.posterior_sigma[indices],
+        "posterior_crb": axes.posterior_sigma[indices],
     }
 
 
@@ -86,9 +86,9 @@ def _locks(result: CaseResult) -> common.Columns:
     """How many bursts lock, at each window; with the key `rare` by the weights of `rare.csv`.
 
     lock_rate ± lock, lock_rate_3sigma: share within five and within three potential σ
-    posterior_rate, posterior_rate_3sigma: within as many σ with the prior
-    always_rate_3sigma ± always: within three potential σ at this and all earlier windows
-    always_posterior_rate_3sigma ± always_posterior: within three σ with the prior at all of these
+    posterior_lock_rate, posterior_lock_rate_3sigma: within as many σ with the prior
+    unbroken_lock_rate_3sigma ±: within three potential σ at this and all earlier windows
+    unbroken_posterior_lock_rate_3sigma ±: within three σ with the prior at all of these
     energy_ratio: μ of the window
     """
     f, k = _at_windows(result)
@@ -102,19 +102,19 @@ def _locks(result: CaseResult) -> common.Columns:
             for name, lost in losses_by_lock.items()
         }
         note = rare_events.weight_notes(sampling_weights(result), losses_by_lock["lock"])
-        always_notes = rare_events.weight_notes(
+        unbroken_notes = rare_events.weight_notes(
             sampling_weights(result), losses_by_lock["always_three"], losses_by_lock["always_posterior_three"]
         )
-        note = np.where(note == "", notes_about(always_notes, "always"), note)
+        note = np.where(note == "", notes_about(unbroken_notes, "unbroken"), note)
     return {
         **_labels(result, f, k),
         "n": np.full(f.size, result.count),
         "lock_rate|lock": rates["lock"],
         "lock_rate_3sigma": rates["three"].value,
-        "posterior_rate": rates["posterior"].value,
-        "posterior_rate_3sigma": rates["posterior_three"].value,
-        "always_rate_3sigma|always": rates["always_three"],
-        "always_posterior_rate_3sigma|always_posterior": rates["always_posterior_three"],
+        "posterior_lock_rate": rates["posterior"].value,
+        "posterior_lock_rate_3sigma": rates["posterior_three"].value,
+        "unbroken_lock_rate_3sigma": rates["always_three"],
+        "unbroken_posterior_lock_rate_3sigma": rates["always_posterior_three"],
         "energy_ratio": result.axes.energy_ratio[f, k],
         "note": note,
     }
@@ -143,7 +143,7 @@ def _residuals(result: CaseResult) -> common.Columns:
     """Size of the errors of all bursts, locked or not, from the histograms.
 
     q05, median, q95 [unit]: 5 %, half and 95 % of the errors lie below
-    posterior_sigma [unit]: the potential σ with the prior
+    posterior_crb [unit]: the potential σ with the prior
     """
     indices = f, k, c = common.row_index(result)
     bound = result.axes.posterior_sigma[indices]
@@ -154,7 +154,7 @@ def _residuals(result: CaseResult) -> common.Columns:
         "q05": low * bound,
         "median": middle * bound,
         "q95": high * bound,
-        "posterior_sigma": bound,
+        "posterior_crb": bound,
     }
 
 
@@ -194,8 +194,8 @@ def _bounds(result: CaseResult) -> common.Columns:
     """What limits an estimate, by component.
 
     prior_sigma [unit]: spread of the forecast
-    potential_sigma [unit]: the potential σ by the closed form
-    potential_sigma_sum [unit]: by the sum over samples
+    crb [unit]: Cramér–Rao bound on σ by the closed form
+    crb_sum [unit]: by the sum over samples
     shortest_window_s: T_min of (17)
     model_error_turns, model_error_hz: what of the truth no polynomial holds
     """
@@ -208,8 +208,8 @@ def _bounds(result: CaseResult) -> common.Columns:
         "component": np.array(names, dtype=object),
         "unit": np.array(units, dtype=object),
         "prior_sigma": axes.prior_sigma,
-        "potential_sigma": axes.potential_closed_form,
-        "potential_sigma_sum": axes.exact_sigma[f, k],
+        "crb": axes.potential_closed_form,
+        "crb_sum": axes.exact_sigma[f, k],
         "shortest_window_s": np.full(size, axes.shortest_window_s),
         "model_error_turns": np.full(size, axes.model_error_turns),
         "model_error_hz": np.full(size, axes.model_error_hz),
@@ -226,7 +226,7 @@ def _motion(result: CaseResult) -> common.Columns:
     """What the spreads mean for a target: λ/2 of those of f₀ and f₁.
 
     band, wavelength_m: metre, decimetre or centimetre, and the wavelength
-    at: beginning or middle of the burst
+    burst_point: its beginning or middle
     sigma_velocity_mps, sigma_acceleration_mps2: potential σ of the radial velocity and acceleration there
     """
     axes, rows = result.axes, []
@@ -234,7 +234,7 @@ def _motion(result: CaseResult) -> common.Columns:
     for band, wavelength in WAVELENGTHS_M:
         for place, t in (("beginning", 0.0), ("middle", 0.5 * duration)):
             velocity, acceleration = (0.5 * wavelength * fisher.derivative_spread(covariance, i, t) for i in (0, 1))
-            row = {"case": result.name, "band": band, "wavelength_m": wavelength, "at": place}
+            row = {"case": result.name, "band": band, "wavelength_m": wavelength, "burst_point": place}
             rows.append(row | {"sigma_velocity_mps": velocity, "sigma_acceleration_mps2": acceleration})
     return common.columns_from_rows(rows)
 

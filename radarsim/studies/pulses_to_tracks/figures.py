@@ -151,7 +151,7 @@ def measured_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]")
     marks = [_line(result, name, filter_rows, columns) for (name,), filter_rows in rows.items()]
     if rows:
         marks.append(
-            figure_lines.line_from_rows(next(iter(rows.values())), ("t_s", "bound"), tr("Fisher bound"), Style(9, 1))
+            figure_lines.line_from_rows(next(iter(rows.values())), ("t_s", "crb"), tr("Fisher bound"), Style(9, 1))
         )
     y = panel_layout.fitting_axis(tr("$\\sigma$ of measured $V_r$, m/s"), marks)
     return Panel(panel_layout.time_axis(), y, tuple(marks), _title(result))

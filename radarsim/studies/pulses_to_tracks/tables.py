@@ -87,8 +87,8 @@ def _locks(result: Result) -> report_tables.Columns:
     """How many bursts lock, by scan.
 
     lock_rate ± lock, lock_rate_3sigma: share within five, or three, Fisher bounds of the truth in all that is taken
-    taken: share taken into the track; of a mixture the mean weight
-    wrong_fold ±: share taken in a fold that is not the truth's
+    used_share: those taken into the track; of a mixture the mean weight
+    wrong_fold_share ±: those taken in a fold that is not the truth's
     """
     f, k = _scans(result, result.axes.takes > 0)
     counts, n = np.asarray(result.sums["locks"])[f, k], np.full(f.size, float(result.count))
@@ -97,8 +97,8 @@ def _locks(result: Result) -> report_tables.Columns:
         "n": n.astype(np.int64),
         "lock_rate|lock": statistics.rate(counts[:, layout.LOCKED], n),
         "lock_rate_3sigma": counts[:, layout.LOCKED_3] / n,
-        "taken": counts[:, layout.TAKEN] / n,
-        "wrong_fold": statistics.rate(counts[:, layout.WRONG_FOLD], n),
+        "used_share": counts[:, layout.TAKEN] / n,
+        "wrong_fold_share": statistics.rate(counts[:, layout.WRONG_FOLD], n),
     }
 
 
@@ -107,7 +107,7 @@ def _estimates(result: Result) -> report_tables.Columns:
     """Errors of the burst's velocity and acceleration, by scan and component; `n` and `sigma` of those that locked.
 
     sigma_all ± [unit]: σ of all bursts; marked where few lost ones decide it
-    bound [unit]: the Fisher bound
+    crb [unit]: Cramér–Rao bound on σ
     energy_db: energy of the burst over the density of the noise
     """
     axes = result.axes
@@ -123,7 +123,7 @@ def _estimates(result: Result) -> report_tables.Columns:
         "n": locked.astype(np.int64),
         "sigma": statistics.root_mean_square(moments[:, 0, 0], moments[:, 0, 1], locked),
         "sigma_all": statistics.root_mean_square(moments[:, 1, 0], moments[:, 1, 1], n),
-        "bound": axes.bound[f, k, c],
+        "crb": axes.bound[f, k, c],
         "energy_db": axes.energy_db[k],
         "note": notes_where(is_heavy, SIGMA_ALL_NOTE),
     }
@@ -151,7 +151,7 @@ def _losses(result: Result) -> report_tables.Columns:
 def _ideal(result: Result) -> report_tables.Columns:
     """σ of a filter beside the exact σ of its idealisation, where the case has one.
 
-    ideal: name of the idealisation, a filter that is otherwise the same
+    idealisation: its name, a filter that is otherwise the same
     over_ideal ±: σ over the exact σ of that
     paired_over_ideal ±: σ over the measured σ of that, in the same bursts
     """
@@ -172,7 +172,7 @@ def _ideal(result: Result) -> report_tables.Columns:
             result,
             f,
             k,
-            ideal=report_tables.pick_names(axes.filters, axes.ideal[f]),
+            idealisation=report_tables.pick_names(axes.filters, axes.ideal[f]),
             **report_tables.component_columns(result, c),
         ),
         "over_ideal": statistics.Estimate(*(value / exact for value in sigmas)),

@@ -64,7 +64,17 @@ def _individual_gains(result: Result) -> common.Columns:
 
 
 STEADY = (
-    *("case", "filter", "manoeuvre_variance", "component", "unit", "steady_sigma", "last_sigma", "last_lo", "last_hi"),
+    *(
+        "case",
+        "filter",
+        "manoeuvre_variance",
+        "component",
+        "unit",
+        "steady_sigma",
+        "last_sigma",
+        "last_sigma_lo",
+        "last_sigma_hi",
+    ),
     *("settling_periods", "settling_s", "under_10_periods", "best"),
 )
 
@@ -78,7 +88,7 @@ def steady(results: Sequence[Result]) -> "pd.DataFrame":
 
     manoeuvre_variance [(m/s³)²]: D_M of the filter's model
     steady_sigma [unit]: σ in steady state, exact
-    last_sigma ± last [unit]: σ measured at the last scan
+    last_sigma ± [unit]: σ measured at the last scan
     settling_periods, settling_s [scan periods, s]: time from which on the exact σ stays within 5 % of its steady value
         to the end of the run; `inf` if it does not
     under_10_periods: whether it settles in under ten scan periods

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from radarsim.studies.sonar.config import Keys
 
 TRACKING = (  # quantities of a tracker among false plots
-    Quantity("loss", term("ends of a track an hour"), "tracking", "ends_per_hour|ends", unit=term("/h")),
-    Quantity("false_tracks", term("false tracks an hour"), "tracking", "false_tracks_per_hour|false", unit=term("/h")),
+    Quantity("loss", term("ends of a track an hour"), "tracking", "ends_per_hour", unit=term("/h")),
+    Quantity("false_tracks", term("false tracks an hour"), "tracking", "false_tracks_per_hour", unit=term("/h")),
 )
 CaseOrResult = TypeVar("CaseOrResult", "Case", "CaseResult")
 

@@ -12,6 +12,7 @@ from radarsim.report import figure_lines, key_labels, panel_layout, tables
 from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
 from radarsim.studies.sonar.axes import GivenPlotsAxes
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
+from radarsim.studies.sonar.tables import GAIN_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,7 +32,7 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         return None
     sigma_lines: list[Mark] = [Reference(1.0, label=tr("one plot"))]
     gain_lines: list[Mark] = []
-    for n, (quantity, quantity_rows) in enumerate(rows.groupby("what", sort=False)):
+    for n, (quantity, quantity_rows) in enumerate(rows.groupby("quantity", sort=False)):
         sigma_lines.append(
             figure_lines.line_from_rows(
                 quantity_rows,
@@ -42,12 +43,12 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         )
         x, measured, formula = (
             quantity_rows[key].to_numpy(dtype=float)[1:]
-            for key in ("plots", "bought_percent", "formula_bought_percent")
+            for key in ("plots", "reduction_percent", "formula_reduction_percent")
         )
         gain_lines.append(Line(x, measured, tr(QUANTITY_TERMS[str(quantity)]), Style(n, n, n), exact=formula))
     x_axis = panel_layout.count_axis(tr("plots n"), float(rows["plots"].max()))
     sigma_axis = Axis(tr("$\\sigma$ / $\\sigma$ of a plot"), limits=(0, None))
-    has_loss = bool((rows["bought_percent"] < 0).any())  # by chance: of few realisations
+    has_loss = bool((rows["reduction_percent"] < 0).any())  # by chance: of few realisations
     gain_axis = Axis(tr("gained by the n-th plot, %"), limits=(None if has_loss else 0, None))
     figure_panels = (
         Panel(
@@ -73,8 +74,10 @@ def gains_figure(table: "pd.DataFrame") -> Figure:
     first = table.iloc[0]
     rows = tables.select_rows(table, filter=first["filter"], component=first["component"])
     marks = [
-        figure_lines.line_from_rows(rows, ("plots", key, f"{key}_lo", f"{key}_hi", f"{key}_formula"), f"${key}_n$", n)
-        for n, key in enumerate(("A", "B"))
+        figure_lines.line_from_rows(
+            rows, ("plots", column, f"{column}_lo", f"{column}_hi", f"{column}_formula"), f"${letter}_n$", n
+        )
+        for n, (letter, column) in enumerate(GAIN_COLUMNS.items())
     ]
     caption = tr(
         "Weights of the residual in position and velocity of growing memory, from the measured "
@@ -169,7 +172,7 @@ def conversion_figure(table: "pd.DataFrame") -> Figure | None:
     if table["across_m"].round(6).nunique() < 2:
         return None
     marks: list[Mark] = [Reference(-1.0, label=tr("one σ of the range"))]
-    names = ("bias_m", "bias_lo", "bias_hi", "formula_m")
+    names = ("bias_m", "bias_m_lo", "bias_m_hi", "formula_m")
     for n, (frame, rows) in enumerate(table.groupby("frame", sort=False)):
         rows = rows.sort_values("across_m")
         rows = rows.assign(**{name: rows[name] / rows["sigma_range_m"] for name in names})

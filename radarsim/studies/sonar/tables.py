@@ -15,6 +15,7 @@ from radarsim.studies.sonar.axes import GivenPlotsAxes, SonarAxes
 if TYPE_CHECKING:
     import pandas as pd
 
+GAIN_COLUMNS = {"A": "position_gain", "B": "velocity_gain"}  # of smoothing_gains.csv, by the paper's letter
 Index = tuple[np.ndarray, ...]
 table = common.TableMakers()
 
@@ -124,11 +125,11 @@ def _plots(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """Benefit of each further plot to growing memory.
 
     degree: of the polynomial
-    what: smoothed, extrapolated by one scan, or for degree 2 the acceleration
+    quantity: smoothed, extrapolated by one scan, or for degree 2 the acceleration
     plots: number in memory
     ratio ±: σ over σ of a plot
     formula: the paper's for degree 1, and its (3) for the acceleration
-    bought_percent, formula_bought_percent: reduction by the last of these plots
+    reduction_percent, formula_reduction_percent: reduction of σ by the last of these plots
     """
     return stack_columns(
         [
@@ -160,12 +161,12 @@ def _plot_gains(result: CaseResult[GivenPlotsAxes], f: int, c: int, quantity: st
         **label_columns(result, np.full(len(n), f)),
         "degree": np.full(len(n), member.degree),
         "component": np.full(len(n), axes.coordinates[c][0], dtype=object),
-        "what": np.full(len(n), quantity, dtype=object),
+        "quantity": np.full(len(n), quantity, dtype=object),
         "plots": n,
         "ratio": statistics.Estimate(*(bound / unit for bound in rms)),
         "formula": formula,
-        "bought_percent": np.append(np.nan, 100 * (1 - rms.value[1:] / rms.value[:-1])),
-        "formula_bought_percent": np.append(np.nan, 100 * (1 - formula[1:] / formula[:-1])),
+        "reduction_percent": np.append(np.nan, 100 * (1 - rms.value[1:] / rms.value[:-1])),
+        "formula_reduction_percent": np.append(np.nan, 100 * (1 - formula[1:] / formula[:-1])),
     }
 
 
@@ -174,8 +175,8 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
     """A_n and B_n of (14), by filters of degree 1 without process noise: var r/σ² and T₀ cov(r, v)/σ².
 
     plots: their number n
-    A ±, B ±: as measured
-    A_formula, B_formula: by the paper
+    position_gain ±, velocity_gain ±: A_n and B_n as measured
+    position_gain_formula, velocity_gain_formula: by the paper
     """
     axes = result.axes
     parts: list[Columns] = []
@@ -194,7 +195,11 @@ def _gains(result: CaseResult[GivenPlotsAxes]) -> Columns:
             columns = label_columns(result, np.full(len(n), f), component=np.full(len(n), name, dtype=object)) | {
                 "plots": n
             }
-            parts.append(columns | {"A": A, "A_formula": A_formula, "B": B, "B_formula": B_formula})
+            parts.append(
+                columns
+                | {GAIN_COLUMNS["A"]: A, f"{GAIN_COLUMNS['A']}_formula": A_formula}
+                | {GAIN_COLUMNS["B"]: B, f"{GAIN_COLUMNS['B']}_formula": B_formula}
+            )
     return stack_columns(parts)
 
 
@@ -206,7 +211,7 @@ def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
     range_m: its range
     sigma_range_m, sigma_bearing_rad: σ of its measurement
     across_m: error across the line of sight, range × bearing error
-    bias_m ± bias: mean error along the line of sight
+    bias_m ±: mean error along the line of sight
     formula_m: the same by formula
     bias_to_sigma_range: the mean error over σ of the range
     """
@@ -222,7 +227,7 @@ def _conversion(result: CaseResult[GivenPlotsAxes]) -> Columns:
         **{"case": result.name, "frame": result.spec.frame, "range_m": float(r)},
         **{"sigma_range_m": sensor.sigma_range_m, "sigma_bearing_rad": sensor.sigma_bearing_rad},
         "across_m": float(r * sensor.sigma_bearing_rad),
-        "bias_m|bias": statistics.Estimate(bias, bias - half, bias + half),
+        "bias_m": statistics.Estimate(bias, bias - half, bias + half),
         "formula_m": float(axes.conversion_bias),
         "bias_to_sigma_range": bias / sensor.sigma_range_m,
     }

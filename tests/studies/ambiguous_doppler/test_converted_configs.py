@@ -78,7 +78,7 @@ def test_keys_without_counterpart_are_refused(changed, fault):
 def lost_share_at_the_end(result):
     """The share of realisations in which the folded filter's velocity is off by over half the span at the last scan."""
     folds = result.tables["folds"]
-    return folds[folds["filter"] == "r+Vr"]["beyond"].iloc[-1]
+    return folds[folds["filter"] == "r+Vr"]["beyond_half_interval_share"].iloc[-1]
 
 
 def test_remedies_are_those_tried():

@@ -350,23 +350,31 @@ def run_rare(n, *others, **keys):
 def test_tables_have_the_rate_with_its_interval():
     result = run_rare(6000, NEAREST | {"manoeuvre_variance": 1e-3})
     table = result.tables["rare"]
-    assert list(table.columns[6:13]) == ["n", "rate", "rate_lo", "rate_hi", "events", "n_eff", "variance_factor"]
+    assert list(table.columns[6:13]) == [
+        "n",
+        "event_rate",
+        "event_rate_lo",
+        "event_rate_hi",
+        "events",
+        "n_eff",
+        "variance_factor",
+    ]
     row, sums = table.iloc[0], result.cases[0].sums
     weight, square, number, _ = sums["events"][0, -1, weighted_sums.WRONG]
-    assert row["rate"] == weight / 6000
+    assert row["event_rate"] == weight / 6000
     assert row["events"] == number
     assert_rounded(row["n_eff"], weight**2 / square, operations=3)
-    assert row["rate_lo"] < row["rate"] < row["rate_hi"]
+    assert row["event_rate_lo"] < row["event_rate"] < row["rate_hi"]
     assert row["variance_factor"] > 5
     assert list(table["sought"]) == [True, False, False]
     assert list(table["event"]) == ["wrong fold", "wrong fold", "wrong fold that found no room"]
     folds = result.tables["folds"]
     last = folds[(folds["filter"] == "memory") & (folds["k"] == 8)].iloc[0]
-    assert_rounded(last["right"], 1 - row["rate"])
-    assert_rounded(last["right_hi"], 1 - row["rate_lo"])
+    assert_rounded(last["right"], 1 - row["event_rate"])
+    assert_rounded(last["right_hi"], 1 - row["event_rate_lo"])
     weight = sums["events"][0, -1, weighted_sums.BEYOND, 0]
-    assert last["beyond"] == weight / 6000
-    assert result.curves["n"].max() <= row["plain"]
+    assert last["beyond_half_interval_share"] == weight / 6000
+    assert result.curves["n"].max() <= row["n_plain"]
     assert "by importance sampling" in " ".join(result.answer)
     assert not any("rare event" in line for line in result.warnings)
 
@@ -385,7 +393,7 @@ def test_wrong_folds_of_full_lists_have_a_note():
         total, _, full = result.tables["rare"].to_dict("records")
         assert full["event"] == "wrong fold that found no room"
         assert full["events"] <= total["events"]
-        squares = [row["rate"] ** 2 / max(row["n_eff"], 1) for row in (full, total)]
+        squares = [row["event_rate"] ** 2 / max(row["n_eff"], 1) for row in (full, total)]
         assert (squares[0] > 0.1 * squares[1]) == is_noted
         assert (total["note"] == str(rare_events.UNGUIDED)) == is_noted
         assert any("may be too narrow" in line for line in result.warnings) or not is_noted

@@ -59,12 +59,14 @@ def test_calibration_is_of_filters_that_remember(result):
 def test_gains_beside_the_oracle(result):
     gains = result.tables["gains"]
     oracle_gains = gains[(gains["filter"] == "oracle")]
-    assert oracle_gains["above_oracle_percent"].isna().all()
+    assert oracle_gains["excess_over_oracle_percent"].isna().all()
     curves = result.curves.set_index(["filter", "component", "k"])["sigma"]
     row = gains[(gains["filter"] == "memory") & (gains["component"] == "Vr") & (gains["k"] == 5)].iloc[0]
     ratio = curves["memory", "Vr", 5] / curves["oracle", "Vr", 5]
-    assert_rounded(row["above_oracle_percent"], 100 * (ratio - 1), size=100 * ratio, operations=5)
-    assert row["above_oracle_lo"] < row["above_oracle_percent"] < row["above_oracle_hi"]
+    assert_rounded(row["excess_over_oracle_percent"], 100 * (ratio - 1), size=100 * ratio, operations=5)
+    assert (
+        row["excess_over_oracle_percent_lo"] < row["excess_over_oracle_percent"] < row["excess_over_oracle_percent_hi"]
+    )
 
 
 def test_answer_names_the_scan_from_which_folded_velocity_is_as_good(result):
@@ -103,11 +105,11 @@ def test_answer_counts_radars_with_folded_velocity_as_good():
     result = radarsim.run("ambiguous", realisations=400)
     first = result.answer[0]
     gains = result.gains.query("component == 'Vr' and filter == 'memory'").groupby("case").tail(1)
-    good = int((gains["above_oracle_hi"] <= 5).sum())
+    good = int((gains["excess_over_oracle_percent_hi"] <= 5).sum())
     assert first.startswith(
         f"memory: as good as unfolded velocity, within 5 %, in {good} of 4 cases by the last scan; "
     )
-    worst = gains.loc[gains["above_oracle_percent"].idxmax(), "case"]
+    worst = gains.loc[gains["excess_over_oracle_percent"].idxmax(), "case"]
     assert first.split("; ")[1].startswith(worst.replace("ambiguous_rls", "RLS "))
 
 
@@ -127,7 +129,9 @@ def test_answer_counts_radars_with_folded_velocity_as_good():
 def test_interval_around_five_percent_is_not_called_above(result, ends, words):
     gains = result.tables["gains"].copy()
     last = (gains["component"] == "Vr") & (gains["filter"] == "memory") & (gains["k"] == 15)
-    gains.loc[last, ["above_oracle_percent", "above_oracle_lo", "above_oracle_hi"]] = ends
+    gains.loc[
+        last, ["excess_over_oracle_percent", "excess_over_oracle_percent_lo", "excess_over_oracle_percent_hi"]
+    ] = ends
     (sentence,) = answer_texts(registry.study("ambiguous_doppler"), result.cases, {**result.tables, "gains": gains})
     assert words in sentence
 
@@ -333,7 +337,7 @@ def test_sigma_is_marked_where_few_false_velocities_were_seen():
     """Of filters that unfold, and of what is compared with them; one that needs not is left alone."""
     tables = radarsim.run("ambiguous_rls5", realisations=300, overrides=["scans=12", "baseline=memory"]).tables
     folds = tables["folds"].set_index(["filter", "k"])
-    few = (folds["n"] * folds["beyond"]).round() < statistics.MIN_EVENTS
+    few = (folds["n"] * folds["beyond_half_interval_share"]).round() < statistics.MIN_EVENTS
     assert few.any()
     assert not few.all()
     curves, gains = tables["curves"], tables["gains"]

@@ -284,23 +284,31 @@ def result_of(n, *estimators, **other):
 def test_tables_tell_the_rate_and_how_well_it_is_known():
     result = result_of(3000, RARELY, {"name": "wide", "first_windows": 1})
     table = result.tables["rare"]
-    assert list(table.columns[6:13]) == ["n", "rate", "rate_lo", "rate_hi", "events", "n_eff", "variance_factor"]
+    assert list(table.columns[6:13]) == [
+        "n",
+        "event_rate",
+        "event_rate_lo",
+        "event_rate_hi",
+        "events",
+        "n_eff",
+        "variance_factor",
+    ]
     row = table.iloc[0]
     sums = result.cases[0].sums
     last = int(row["k"]) - 1
     weight, square, number, _ = sums["losses"][0, last, 0]
-    assert row["rate"] == weight / 3000
+    assert row["event_rate"] == weight / 3000
     assert row["events"] == number
     assert row["n_eff"] == pytest.approx(weight**2 / square, rel=rounding(operations=3))
-    assert row["rate_lo"] < row["rate"] < row["rate_hi"]
+    assert row["event_rate_lo"] < row["event_rate"] < row["rate_hi"]
     assert row["variance_factor"] > 5
     assert list(table["sought"]) == [True, False]
     locks = result.tables["locks"]
     at = locks[(locks["filter"] == "a") & (locks["k"] == row["k"])].iloc[0]
-    assert at["lock_rate"] == pytest.approx(1 - row["rate"], rel=rounding(operations=2))
-    assert at["lock_hi"] == pytest.approx(1 - row["rate_lo"], rel=rounding(operations=2))
+    assert at["lock_rate"] == pytest.approx(1 - row["event_rate"], rel=rounding(operations=2))
+    assert at["lock_hi"] == pytest.approx(1 - row["event_rate_lo"], rel=rounding(operations=2))
     curves = result.curves
-    assert curves["n"].max() <= row["plain"]
+    assert curves["n"].max() <= row["n_plain"]
     first, second, *_ = result.answer
     assert "by importance sampling" in second
     # Not "locked in 100.00 % of 3,000 bursts": most are shifted.

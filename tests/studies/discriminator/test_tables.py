@@ -31,13 +31,13 @@ def test_curves_are_of_the_locked_and_tell_of_all(made):
     assert last["n"] < 256
     assert last["sigma"] == pytest.approx(1213, rel=sigma_error(last["n"]))
     assert last["sigma_all"] > 10 * last["sigma"]
-    assert np.all(rows["posterior_sigma"] <= rows["exact_sigma"])
+    assert np.all(rows["posterior_crb"] <= rows["exact_sigma"])
 
 
 def test_locks_fall_along_the_windows(made):
     rows = made.tables["locks"]
     own = rows[rows["filter"] == "sequence"]
-    assert np.all(np.diff(own["always_rate_3sigma"]) <= 0)
+    assert np.all(np.diff(own["unbroken_lock_rate_3sigma"]) <= 0)
     assert np.all(
         (own["lock_lo"] <= own["lock_rate"]) & (own["lock_rate"] <= own["lock_hi"] * (1 + rounding(operations=8)))
     )
@@ -55,7 +55,7 @@ def test_every_estimator_has_its_own_windows(made):
 
 
 def test_motion_follows_from_the_wavelength(made):
-    rows = made.tables["motion"].set_index(["band", "at"])
+    rows = made.tables["motion"].set_index(["band", "burst_point"])
     centimetre, metre = rows.loc[("centimetre", "beginning")], rows.loc[("metre", "beginning")]
     assert centimetre["sigma_velocity_mps"] == pytest.approx(0.015 * 0.4502, rel=1e-3)
     assert metre["sigma_acceleration_mps2"] == pytest.approx(0.9 * 12.204, rel=1e-3)
@@ -77,9 +77,9 @@ def test_residuals_lie_under_three_bounds(made):
     rows = made.tables["residuals"]
     own = rows[rows["filter"] == "cured"]
     assert np.all(own["q05"] < own["median"])
-    assert np.all(own["q95"] < 3 * own["posterior_sigma"])
+    assert np.all(own["q95"] < 3 * own["posterior_crb"])
     standard_error = 0.5 / (0.6355 * 256**0.5)  # of a median: the density of |N(0, 1)| there is 0.6355
-    assert own["median"].to_numpy() / own["posterior_sigma"].to_numpy() == pytest.approx(0.6745, abs=4 * standard_error)
+    assert own["median"].to_numpy() / own["posterior_crb"].to_numpy() == pytest.approx(0.6745, abs=4 * standard_error)
 
 
 def test_figures_show_the_paper_and_the_locks(made):
@@ -180,7 +180,7 @@ def test_losses_are_told_beside_the_design_first():
     made = run.run("discriminator_rare", realisations=400)
     rows = made.tables["rare"].query("sought").set_index("case")
     designed = 1 - rows.index.str.rpartition("=").get_level_values(2).astype(float)
-    times = rows["rate"] / designed
+    times = rows["event_rate"] / designed
     first = made.answer[0]
     assert first.startswith("exact tail loses lock in ")
     assert f", {times.max():.3g} times as often, the most of 4 cases." in first

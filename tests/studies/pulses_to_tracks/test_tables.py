@@ -42,14 +42,14 @@ def test_locks(result):
     assert ((locks["lock_lo"] <= locks["lock_rate"]) & (locks["lock_rate"] <= locks["lock_hi"])).all()
     ideal = locks[locks["filter"] == "ideal"]
     assert (ideal["lock_rate"] == 1).all()
-    assert (locks[locks["filter"] == "cured"]["taken"] == 1).all()
-    assert 0.99 < locks[locks["filter"] == "cured, gated"]["taken"].mean() < 1
+    assert (locks[locks["filter"] == "cured"]["used_share"] == 1).all()
+    assert 0.99 < locks[locks["filter"] == "cured, gated"]["used_share"].mean() < 1
 
 
 def test_estimates_against_the_bound(result):
     table = result.tables["estimates"]
     ideal = table[table["filter"] == "ideal"]
-    np.testing.assert_allclose(ideal["sigma_all"], ideal["bound"], rtol=sigma_error(1500))
+    np.testing.assert_allclose(ideal["sigma_all"], ideal["crb"], rtol=sigma_error(1500))
     assert (table["sigma"] <= table["sigma_all"] * (1 + rounding(operations=1500))).all()
     assert set(table["component"]) == {"Vr"}
     np.testing.assert_allclose(table["energy_db"], 17.28, atol=0.011)
@@ -76,7 +76,7 @@ def test_losses_count_all_realisations(result):
 
 def test_idealisations(result):
     table = result.tables["idealisations"]
-    assert set(table["ideal"]) == {"ideal"}
+    assert set(table["idealisation"]) == {"ideal"}
     spectrum_rows = table[(table["filter"] == "spectrum") & (table["component"] == "Vr")]
     assert (spectrum_rows["over_ideal_lo"] < 1.06).all()
     curves = result.curves.set_index(["filter", "component", "k"])

@@ -61,17 +61,17 @@ def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several
     bias, ratio = worst["formula_m"], worst["formula_m"] / worst["sigma_range_m"]
     words = f"plainly: {bias:.3g} m (exact), {ratio:.3g} σ of the range (σ_β = 8°); converted".replace("-", "−")
     assert f"{words} without bias: none (exact)." in told
-    half_width = (plain["bias_hi"] - plain["bias_lo"]) / 2
+    half_width = (plain["bias_m_hi"] - plain["bias_m_lo"]) / 2
     assert ((plain["bias_m"] - plain["formula_m"]).abs() < 2 * half_width).all()  # so that it may be called exact
     assert conversion_figure(table[table["across_m"] == table["across_m"].max()]) is None
 
 
 def test_what_a_plot_buys_has_the_papers_formulas(results):
     table = results["sonar_smoothing"].tables["plots"]
-    rows = table[(table["degree"] == 1) & (table["component"] == "b") & (table["what"] == "smoothed")]
+    rows = table[(table["degree"] == 1) & (table["component"] == "b") & (table["quantity"] == "smoothed")]
     assert (rows["formula"] == closed_forms.sigma_smoothed(rows["plots"])).all()
     assert rows["ratio"].to_numpy() == pytest.approx(rows["formula"].to_numpy(), rel=sigma_error(3000))
-    rows = table[(table["what"] == "acceleration") & (table["component"] == "r")]
+    rows = table[(table["quantity"] == "acceleration") & (table["component"] == "r")]
     assert rows["ratio"].to_numpy() == pytest.approx(rows["formula"].to_numpy(), rel=sigma_error(3000))
 
 
@@ -94,7 +94,7 @@ def test_conversion_table(results):
     plain = table[table["frame"] == "cartesian"]
     assert_rounded(plain["formula_m"], 15e3 * np.expm1(-(plain["sigma_bearing_rad"] ** 2) / 2), operations=6)
     assert (table[table["frame"] != "cartesian"]["formula_m"] == 0).all()
-    middle, half = (table["bias_hi"] + table["bias_lo"]) / 2, (table["bias_hi"] - table["bias_lo"]) / 2
+    middle, half = (table["bias_m_hi"] + table["bias_m_lo"]) / 2, (table["bias_m_hi"] - table["bias_m_lo"]) / 2
     assert (np.abs(middle - table["formula_m"]) < Z / statistics.Z95 * half).all()
 
 
@@ -197,9 +197,9 @@ def test_what_is_known_exactly_is_judged_exactly(results):
 
 @pytest.mark.parametrize(("percent", "low"), [(-3.0, None), (3.0, 0)])
 def test_the_axis_of_further_plots_reaches_below_zero_where_one_loses(percent, low):
-    table = pd.DataFrame({"component": "r", "degree": 1, "what": "smoothed", "plots": [2, 3, 4]})
+    table = pd.DataFrame({"component": "r", "degree": 1, "quantity": "smoothed", "plots": [2, 3, 4]})
     table[["ratio", "ratio_lo", "ratio_hi", "formula"]] = 1.0
-    table[["bought_percent", "formula_bought_percent"]] = [[np.nan] * 2, [5.0, 5.0], [percent, 5.0]]
+    table[["reduction_percent", "formula_reduction_percent"]] = [[np.nan] * 2, [5.0, 5.0], [percent, 5.0]]
     figure = plots_figure(table)
     assert figure is not None
     assert figure.panels[1].y.limits == (low, None)

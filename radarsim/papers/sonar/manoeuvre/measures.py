@@ -150,13 +150,13 @@ def _delays(evidence: Evidence, key: Key, until: Until, rate: float) -> dict[int
 
 def exact_detected_at_one(evidence: Evidence, key: Key) -> float:
     """`detected_at_one` of the exact law."""
-    return float(_at_one(evidence, key)["exact"])
+    return float(_at_one(evidence, key)["exact_probability"])
 
 
 def detected_at_one(evidence: Evidence, key: Key) -> Estimate:
     """Share of alarms of five plots at k = 1 at the last scan of the manoeuvre of one σ_a."""
     row = _at_one(evidence, key)
-    return Estimate(*(float(row[part]) for part in ("probability", "lo", "hi")))
+    return Estimate(*(float(row[part]) for part in ("probability", "probability_lo", "probability_hi")))
 
 
 def _at_one(evidence: Evidence, key: Key) -> Mapping[str, Any]:

@@ -54,18 +54,21 @@ def _sentences_on_rare_events(sought: "pd.DataFrame | None") -> list[Sentence]:
 
 def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
     """How surely and how soon a tracker confirms a track, how long it keeps it, and its false tracks."""
-    if not row["confirmed"]:
+    if not row["confirmed_share"]:
         return Sentence(tr("{filter} confirms no track", filter=row["filter"]))
     life = _life_clause(row, sought)
     text = tr(
         "{filter} confirms {confirmed} after {time} on average, {life}, {rate} false tracks per hour",
         filter=row["filter"],
-        confirmed=wording.share(*(100 * row[key] for key in ("confirmed", "confirmed_lo", "confirmed_hi"))),
-        time=_estimate(row, "time_to_confirm_s", "time", tr("s")),
+        confirmed=wording.share(
+            *(100 * row[key] for key in ("confirmed_share", "confirmed_share_lo", "confirmed_share_hi"))
+        ),
+        time=_estimate(row, "time_to_confirm_s", tr("s")),
         life=life.text,
-        rate=_estimate(row, "false_tracks_per_hour", "false"),
+        rate=_estimate(row, "false_tracks_per_hour"),
     )
-    intervals = (interval for name in ("confirmed", "time", "false") for interval in _tracking_interval(row, name))
+    names = ("confirmed_share", "time_to_confirm_s", "false_tracks_per_hour")
+    intervals = (interval for name in names for interval in _tracking_interval(row, name))
     return Sentence(text, (*intervals, *life.intervals))
 
 
@@ -78,19 +81,19 @@ def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Senten
     if sought is not None:
         ended = sought[(sought["filter"] == row["filter"]) & (sought["event"] == ENDED_TRACK_EVENT)]
         if len(ended):
-            rates = (100 * ended.iloc[0][key] for key in ("rate", "rate_lo", "rate_hi"))
+            rates = (100 * ended.iloc[0][key] for key in ("event_rate", "event_rate_lo", "event_rate_hi"))
             share = wording.estimate(rates, "%", ".2g")
             text = tr("of its tracks {share} ended by the last scan", share=share)
-            return Sentence(text, sentences.intervals("rare", "rate", ended.iloc[0]))
+            return Sentence(text, sentences.intervals("rare", "event_rate", ended.iloc[0]))
     if not row["ends_per_hour"]:
         return Sentence(tr("no track lost"))
-    text = tr("life {life}", life=_estimate(row, "life_s", "life", tr("s")))
-    return Sentence(text, _tracking_interval(row, "life"))
+    text = tr("life {life}", life=_estimate(row, "life_s", tr("s")))
+    return Sentence(text, _tracking_interval(row, "life_s"))
 
 
-def _estimate(row: "pd.Series[Any]", column: str, interval: str, unit: str = "") -> str:
+def _estimate(row: "pd.Series[Any]", column: str, unit: str = "") -> str:
     """The value of a column with its interval, to three digits."""
-    values = (float(f"{row[key]:.3g}") for key in (column, f"{interval}_lo", f"{interval}_hi"))
+    values = (float(f"{row[key]:.3g}") for key in (column, f"{column}_lo", f"{column}_hi"))
     return wording.estimate(values, unit, ",.10g")
 
 
@@ -123,4 +126,4 @@ def _ended_tracks_sought(rows: "pd.DataFrame") -> Sentence:
         "{found}.",
         found="; ".join(trackers),
     )
-    return Sentence(text, sentences.intervals("rare", "rate", rows))
+    return Sentence(text, sentences.intervals("rare", "event_rate", rows))

@@ -93,7 +93,7 @@ def with_line_names(tracking: "pd.DataFrame", column: str, result: CaseResult[Cl
 def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | None:
     """Probability of a confirmed track against time: a panel for each case, a line for each tracker."""
     groups = tables.group_by(tracks, "case", "filter")
-    confirmed = ("t_s", "confirmed", "confirmed_lo", "confirmed_hi", "exact_confirmed")
+    confirmed = ("t_s", "confirmed_share", "confirmed_share_lo", "confirmed_share_hi", "exact_confirmed_share")
     figure_panels: list[Panel] = []
     shown_results = case_selection.pick_evenly(results, case_selection.MAX_CASES)
     for result in shown_results:
@@ -103,7 +103,9 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
                 rows = groups[result.name, f]
                 marks.append(figure_lines.line_from_rows(rows, confirmed, key_labels.escape_dollars(f), n))
                 marks.append(
-                    figure_lines.line_from_rows(rows, ("t_s", "kept", "kept_lo", "kept_hi"), "", Style(n, n, None, 0.7))
+                    figure_lines.line_from_rows(
+                        rows, ("t_s", "kept_share", "kept_share_lo", "kept_share_hi"), "", Style(n, n, None, 0.7)
+                    )
                 )
         if marks:
             keys = ((tr("thin: kept at that time"), Style(0, 0, None, 0.7)),) if not figure_panels else ()
@@ -142,7 +144,7 @@ def life_figure(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") 
     x, tracking = axis_over(results[0], column, tracking)
     figure_panels, clauses, level_quantities = [], [], []
     for quantity in _life_quantities(tracking, tables_by_name, results[0].axes.k[-1]):
-        lines = _lines(with_line_names(quantity.table, column, results[0]), column, quantity.value, quantity.bounds)
+        lines = _lines(with_line_names(quantity.table, column, results[0]), column, quantity.column)
         line_values = [line.y[np.isfinite(line.y)] for line in lines]
         if all(np.ptp(values) <= MAX_LEVEL_SHARE * values.max() for values in line_values if len(values)):
             level_quantities.append(_level_quantity(quantity.name, quantity.unit, np.concatenate(line_values)))
@@ -167,10 +169,9 @@ def life_figure(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") 
 
 
 class _LifeQuantity(NamedTuple):
-    """A quantity of the figure of track life: columns of its value and interval, name, unit, rows, and clause."""
+    """A quantity of the figure of track life: column, name, unit, rows, and clause."""
 
-    value: str
-    bounds: str
+    column: str
     name: str
     unit: str
     is_logarithmic: bool
@@ -191,21 +192,21 @@ def _life_quantities(
     at_end = tables.select_rows(tables_by_name["curves"], component="r", k=last_scan).merge(
         cases, on="case", how="left"
     )
-    life = _LifeQuantity("life_s", "life", tr("track life"), "s", True, tracking, tr(LIFE_CAPTION))
+    life = _LifeQuantity("life_s", tr("track life"), "s", True, tracking, tr(LIFE_CAPTION))
     rare_events = tables_by_name.get("rare")
     if rare_events is not None:
         ended = rare_events[rare_events["sought"] & (rare_events["event"] == ENDED_TRACK_EVENT)]
         if len(ended):
             name, rates = tr("share of tracks ended by the last scan"), ended.merge(cases, on="case", how="left")
-            life = _LifeQuantity("rate", "rate", name, "", True, rates, tr(ENDS_CAPTION))
+            life = _LifeQuantity("event_rate", name, "", True, rates, tr(ENDS_CAPTION))
     time, wrong, sigma = (tr("time to confirmation"), tr("share of wrong plots"), tr("$\\sigma$ of $r$ of kept tracks"))
     time_clause, wrong_clause = tr("mean time to its confirmation"), tr("weight of false plots among those used")
     sigma_clause = tr("root-mean-square error of the range of the tracks kept at the end")
     return (
         life,
-        _LifeQuantity("time_to_confirm_s", "time", time, "s", False, tracking, time_clause),
-        _LifeQuantity("wrong_share", "wrong", wrong, "", False, tracking, wrong_clause),
-        _LifeQuantity("sigma", "sigma", sigma, "m", False, at_end, sigma_clause),
+        _LifeQuantity("time_to_confirm_s", time, "s", False, tracking, time_clause),
+        _LifeQuantity("wrong_share", wrong, "", False, tracking, wrong_clause),
+        _LifeQuantity("sigma", sigma, "m", False, at_end, sigma_clause),
     )
 
 
@@ -218,12 +219,12 @@ def _level_quantity(name: str, unit: str, values: np.ndarray) -> str:
     return f"{math_text.plain_text(name)} ({number})"
 
 
-def _lines(table: "pd.DataFrame", x: str, value: str, bounds: str) -> list[Line]:
+def _lines(table: "pd.DataFrame", x: str, value: str) -> list[Line]:
     """A line for each filter of a table's values over x, without infinite values and without infinite interval ends."""
     lines = []
     for n, (name, rows) in enumerate(table.groupby("filter", sort=False)):
         rows = rows.sort_values(x).replace(np.inf, np.nan)
-        lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{bounds}_lo", f"{bounds}_hi"))
+        lo, hi = (rows[key].where(np.isfinite(rows[key]), rows[value]) for key in (f"{value}_lo", f"{value}_hi"))
         lines.append(figure_lines.line_from_rows(rows.assign(lo=lo, hi=hi), (x, value, "lo", "hi"), str(name), n))
     return lines
 
@@ -238,15 +239,15 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
         return None
     rules: dict[str, list[str]] = {}
     for name, count, rule_scans in (
-        rows[["filter", "m", "of"]].drop_duplicates("filter").itertuples(index=False, name=None)
+        rows[["filter", "confirm_plots", "confirm_scans"]].drop_duplicates("filter").itertuples(index=False, name=None)
     ):
         rules.setdefault(tr("{count} of {of}", count=int(count), of=int(rule_scans)), []).append(name)
     x, rows = axis_over(results[0], column, with_line_names(rows, column, results[0]))
     without_tracks = rows[rows[rate] == 0]
-    upper = Line(without_tracks[column].to_numpy(), without_tracks["false_hi"].to_numpy(), "", UPPER_END_STYLE)
-    rows = rows.assign(**{name: rows[name].where(rows[rate] > 0) for name in (rate, "false_lo", "false_hi")})
+    upper = Line(without_tracks[column].to_numpy(), without_tracks[f"{rate}_hi"].to_numpy(), "", UPPER_END_STYLE)
+    rows = rows.assign(**{name: rows[name].where(rows[rate] > 0) for name in (rate, f"{rate}_lo", f"{rate}_hi")})
     keys = ((tr("none occurred: upper end of the interval"), UPPER_END_STYLE),) if len(without_tracks) else ()
-    marks = (*_lines(rows, column, rate, "false"), *([upper] if keys else []))
+    marks = (*_lines(rows, column, rate), *([upper] if keys else []))
     caption = tr(
         "False tracks confirmed per hour in the whole sector; every false plot starts a tentative track. Plots that "
         "confirm it: {rules}. {realisations} per case. Bands and bars: 95 % intervals.",
@@ -267,8 +268,8 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
         return None
     table = table.assign(filter=table["filter"].map(key_labels.escape_dollars))
     x = Axis(tr("threshold of the score"))
-    false = _lines(table[table["false_called_true"] > 0], "threshold", "false_called_true", "false")
-    true = _lines(table, "threshold", "true_called_false", "true")
+    false = _lines(table[table["false_called_true_share"] > 0], "threshold", "false_called_true_share")
+    true = _lines(table, "threshold", "true_called_false_share")
     figure_panels = []
     if false:
         longest = max(false, key=lambda mark: len(mark.x))

@@ -78,25 +78,27 @@ def false_track_rates(result: CaseResult[ClutterAxes], f: int) -> tuple[Estimate
 def _tracks(result: CaseResult[ClutterAxes]) -> Columns:
     """By scan: tracks of the target.
 
-    confirmed ±: share of realisations that have confirmed one by then
-    kept ±: share that have a confirmed one
-    tentative: number of realisations that have a tentative one
-    lost, dropped, tentative_dropped: number that have lost or dropped a confirmed one, or dropped a tentative one
+    confirmed_share ±: realisations that have confirmed one by then
+    kept_share ±: those that have a confirmed one
+    n_tentative: number of realisations that have a tentative one
+    n_lost, n_dropped, n_tentative_dropped: number that have lost or dropped a confirmed one, or dropped a tentative one
     """
     filter_indices, K, n = tracker_indices(result), len(result.axes.k), result.count
     counts = np.asarray(result.sums["counts"])[filter_indices]
     kinds_by_column = {
-        "tentative": track_sums.TENTATIVE_COUNT,
-        "lost": track_sums.LOST_COUNT,
-        "dropped": track_sums.DROPPED_COUNT,
-        "tentative_dropped": track_sums.TENTATIVE_DROPPED_COUNT,
+        "n_tentative": track_sums.TENTATIVE_COUNT,
+        "n_lost": track_sums.LOST_COUNT,
+        "n_dropped": track_sums.DROPPED_COUNT,
+        "n_tentative_dropped": track_sums.TENTATIVE_DROPPED_COUNT,
     }
     return {
         **label_columns(result, np.repeat(filter_indices, K), np.tile(np.arange(K), len(filter_indices))),
         "n": np.full(len(filter_indices) * K, n),
-        "confirmed": statistics.rate(np.cumsum(counts[:, :, track_sums.FIRST_CONFIRMED_COUNT], axis=1).ravel(), n),
-        "exact_confirmed": result.axes.exact_confirmed[filter_indices].ravel(),
-        "kept": statistics.rate(counts[:, :, track_sums.CONFIRMED_COUNT].ravel(), n),
+        "confirmed_share": statistics.rate(
+            np.cumsum(counts[:, :, track_sums.FIRST_CONFIRMED_COUNT], axis=1).ravel(), n
+        ),
+        "exact_confirmed_share": result.axes.exact_confirmed[filter_indices].ravel(),
+        "kept_share": statistics.rate(counts[:, :, track_sums.CONFIRMED_COUNT].ravel(), n),
         **{name: counts[:, :, kind].ravel().astype(np.int64) for name, kind in kinds_by_column.items()},
     }
 
@@ -108,19 +110,19 @@ def _tracking(result: CaseResult[ClutterAxes]) -> Columns:
     Where false tracks are sought (key `rare`), these are by the weights of `rare.csv`.
 
     association, gate_probability: rule of association and probability of the gate
-    m, of: the tracker confirms with m plots of so many scans
+    confirm_plots, confirm_scans: plots that confirm a track, and scans among which they must be
     detection_probability: of the target's plots
     false_plots_per_km2 [1/km²]: density of false plots a scan
     false_in_gate: mean number of false plots in the gate a scan
-    confirmed ±: share of realisations that confirm a track of the target
-    time_to_confirm_s ± time: mean time until then
-    kept_at_end ± kept: share that have it at the last scan
-    lost, dropped: number of confirmed tracks of the target that are lost or dropped
-    ends_per_hour ± ends [1/h]: rate at which confirmed tracks of the target end
-    life_s ± life: mean time between such ends, over the time of all confirmed tracks
-    wrong_share ± wrong: share of the plots in the target's track that are not the target's
-    false_confirmed ±: probability that a track begun by a false plot is confirmed
-    false_tracks_per_hour ± false [1/h]: rate of confirmed false tracks over the sector
+    confirmed_share ±: realisations that confirm a track of the target
+    time_to_confirm_s ±: mean time until then
+    kept_at_end_share ±: those that have it at the last scan
+    n_lost, n_dropped: number of confirmed tracks of the target that are lost or dropped
+    ends_per_hour ± [1/h]: rate at which confirmed tracks of the target end
+    life_s ±: mean time between such ends, over the time of all confirmed tracks
+    wrong_share ±: plots in the target's track that are not the target's
+    false_confirmed_share ±: tracks begun by a false plot that are confirmed
+    false_tracks_per_hour ± [1/h]: rate of confirmed false tracks over the sector
     false_tracks_at_once, false_life_s: mean number of these at a time, and mean life of one
     """
     return columns_from_rows([_summary(result, f) for f in tracker_indices(result)])
@@ -146,23 +148,28 @@ def _summary(result: CaseResult[ClutterAxes], f: int) -> dict[str, Any]:
         in_gate = counts[:, track_sums.FALSE_IN_GATE_COUNT].sum() / counts[:, track_sums.GATE_COUNT].sum()
     return {
         **{"case": result.name, "filter": result.axes.filters[f], "association": member.association},
-        **{"gate_probability": member.gate_probability, "m": member.rule.m, "of": member.rule.n, "n": n},
+        **{
+            "gate_probability": member.gate_probability,
+            "confirm_plots": member.rule.m,
+            "confirm_scans": member.rule.n,
+            "n": n,
+        },
         "detection_probability": sensor.detection_probability,
         "false_plots_per_km2": sensor.false_plots_per_km2,
         "false_in_gate": in_gate,
-        "confirmed": statistics.rate(first_confirmed.sum(), n),
-        "time_to_confirm_s|time": mean_event_time(np.asarray(result.axes.t_s, dtype=float), first_confirmed),
-        "kept_at_end|kept": statistics.rate(counts[-1, track_sums.CONFIRMED_COUNT], n),
+        "confirmed_share": statistics.rate(first_confirmed.sum(), n),
+        "time_to_confirm_s": mean_event_time(np.asarray(result.axes.t_s, dtype=float), first_confirmed),
+        "kept_at_end_share": statistics.rate(counts[-1, track_sums.CONFIRMED_COUNT], n),
         **{
-            "lost": int(counts[:, track_sums.LOST_COUNT].sum()),
-            "dropped": int(counts[:, track_sums.DROPPED_COUNT].sum()),
+            "n_lost": int(counts[:, track_sums.LOST_COUNT].sum()),
+            "n_dropped": int(counts[:, track_sums.DROPPED_COUNT].sum()),
         },
-        "ends_per_hour|ends": ends_per_hour,
-        "life_s|life": life,
-        "wrong_share|wrong": ratio_of_sums(ratios[track_sums.WRONG_PER_PLOT], n),
-        "false_confirmed": false if any_false else Estimate(0.0, 0.0, 0.0),
-        "exact_false_confirmed": result.axes.exact_begun[f].sum() if any_false else 0.0,
-        "false_tracks_per_hour|false": false_per_hour,
+        "ends_per_hour": ends_per_hour,
+        "life_s": life,
+        "wrong_share": ratio_of_sums(ratios[track_sums.WRONG_PER_PLOT], n),
+        "false_confirmed_share": false if any_false else Estimate(0.0, 0.0, 0.0),
+        "exact_false_confirmed_share": result.axes.exact_begun[f].sum() if any_false else 0.0,
+        "false_tracks_per_hour": false_per_hour,
         "false_tracks_at_once": mean_false_plots(result) * alive / n,
         "false_life_s": false_life,
     }
@@ -177,8 +184,8 @@ def _gates(result: CaseResult[ClutterAxes]) -> Columns:
     were, as far as these lie within the sector.
 
     plots: number of the target's plots
-    inside ±: share of these in the gate
-    false_in_gate ± false: mean number of false plots in it
+    in_gate_share ±: those of them that are in the gate
+    false_in_gate ±: mean number of false plots in it
     """
     counts, filters = np.asarray(result.sums["counts"]), result.spec.filters
     f, k = np.nonzero(counts[:, :, track_sums.GATE_COUNT] > 0)
@@ -190,9 +197,11 @@ def _gates(result: CaseResult[ClutterAxes]) -> Columns:
         **label_columns(result, f, k),
         "n": rows[:, track_sums.GATE_COUNT].astype(np.int64),
         "plots": rows[:, track_sums.TARGET_PLOT_COUNT].astype(np.int64),
-        "inside": statistics.rate(rows[:, track_sums.PLOTS_IN_GATE_COUNT], rows[:, track_sums.TARGET_PLOT_COUNT]),
-        "exact_inside": exact[f],
-        "false_in_gate|false": poisson_rate(rows[:, track_sums.FALSE_IN_GATE_COUNT], rows[:, track_sums.GATE_COUNT]),
+        "in_gate_share": statistics.rate(
+            rows[:, track_sums.PLOTS_IN_GATE_COUNT], rows[:, track_sums.TARGET_PLOT_COUNT]
+        ),
+        "exact_in_gate_share": exact[f],
+        "false_in_gate": poisson_rate(rows[:, track_sums.FALSE_IN_GATE_COUNT], rows[:, track_sums.GATE_COUNT]),
         "exact_false_in_gate": rows[:, track_sums.EXPECTED_FALSE_COUNT] / rows[:, track_sums.GATE_COUNT],
     }
 
@@ -214,9 +223,9 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
 
     threshold: least score of a track called true
     n_true, n_false: number of true and of false tracks
-    true_called_false ± true: share of the true ones called false
-    false_called_true ± false: share of the false ones called true
-    bound: the latter is at most, exp(−threshold)
+    true_called_false_share ±: true tracks called false
+    false_called_true_share ±: false tracks called true
+    false_called_true_bound: upper bound of this share, exp(−threshold)
     """
     filter_indices, thresholds = tracker_indices(result), result.axes.thresholds
     scores = np.asarray(result.sums["scores"])[:, filter_indices]
@@ -226,10 +235,10 @@ def _classes(result: CaseResult[ClutterAxes]) -> Columns:
         **label_columns(result, np.repeat(filter_indices, len(thresholds))),
         "threshold": np.tile(thresholds, len(filter_indices)),
         "n_true": n_true.astype(np.int64),
-        "true_called_false|true": statistics.rate(n_true - true, n_true),
+        "true_called_false_share": statistics.rate(n_true - true, n_true),
         "n_false": n_false.astype(np.int64),
-        "false_called_true|false": statistics.rate(false, n_false),
-        "bound": np.tile(np.exp(-thresholds), len(filter_indices)),
+        "false_called_true_share": statistics.rate(false, n_false),
+        "false_called_true_bound": np.tile(np.exp(-thresholds), len(filter_indices)),
     }
 
 

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-ALARM = Quantity("alarm", term("probability of an alarm"), "detections", "probability", "exact", kind="share")
-ALARM_ENDS = {"lo": "probability_lo", "hi": "probability_hi"}
+ALARM = Quantity("alarm", term("probability of an alarm"), "detections", "probability", kind="share")
 USES = {
     "course": term("course"),
     "speed": term("speed"),
@@ -63,7 +62,7 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
     final_rows = [last_test_of_phase(usual_rows(case_rows, name), "manoeuvre") for name in usual_detectors(result)]
     ranked = sorted(
         (
-            rows.assign(decides=tables.exact_first(rows, "probability", "exact")).rename(columns=ALARM_ENDS).iloc[0]
+            rows.assign(decides=tables.exact_first(rows, ALARM.value, ALARM.exact_column)).iloc[0]
             for rows in final_rows
             if len(rows)
         ),

@@ -113,7 +113,10 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
             label = "" if np.isfinite(shift) else name
             marks.append(
                 figure_lines.line_from_rows(
-                    points, ("false_alarms", "probability", "lo", "hi"), label, Style(n, None, n)
+                    points,
+                    ("false_alarms", "probability", "probability_lo", "probability_hi"),
+                    label,
+                    Style(n, None, n),
                 )
             )
         if marks:
@@ -147,8 +150,10 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
         marks = []
         for n, name in enumerate(usual_detectors(members[0])):
             points = [_last_row(r, detections, name) for r in members]
-            exact_column = ("exact",) if all(np.isfinite(point["exact"]) for point in points) else ()
-            columns = ("probability", "lo", "hi", *exact_column)
+            exact_column = (
+                ("exact_probability",) if all(np.isfinite(point["exact_probability"]) for point in points) else ()
+            )
+            columns = ("probability", "probability_lo", "probability_hi", *exact_column)
             marks.append(figure_lines.line_from_tables(strength, points, columns, name, Style(n, n, n)))
         title = ", ".join(key_labels.value_with_unit(members[0], k, v) for k, v in other_keys)
         x, y = Axis(key_labels.key_axis_label(members[0], key)), Axis(tr("detection probability"), limits=(0, 1))
@@ -180,7 +185,12 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             alarms = alarms[alarms["event"] == "alarm"]
             if len(alarms):
                 marks.append(
-                    figure_lines.line_from_rows(alarms, ("delay_s", "probability", "lo", "hi", "exact"), name, n)
+                    figure_lines.line_from_rows(
+                        alarms,
+                        ("delay_s", "probability", "probability_lo", "probability_hi", "exact_probability"),
+                        name,
+                        n,
+                    )
                 )
         if marks:
             x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("alarm raised"), limits=(0, 1))
@@ -200,7 +210,9 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
     groups = tables.group_by(modes, "case", "filter", "component")
     figure_panels = []
     for result in results:
-        lines = case_lines(result, groups, result.axes.components[0][0], ("t_s", "probability", "lo", "hi"))
+        lines = case_lines(
+            result, groups, result.axes.components[0][0], ("t_s", "probability", "probability_lo", "probability_hi")
+        )
         y = Axis(tr("probability of a manoeuvre"), limits=(0, 1))
         figure_panels.append(
             Panel(panel_layout.time_axis(), y, (*manoeuvre_lines(result), *lines), _swept_values(result), direct=False)

@@ -11,7 +11,7 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.report import consistency_tables, interval_notes, statistics
 from radarsim.report import tables as common
-from radarsim.report.tables import Columns, interval_columns, label_columns
+from radarsim.report.tables import Columns, label_columns
 from radarsim.studies.sonar.closed_forms import sigma_acceleration
 from radarsim.studies.sonar.manoeuvre import detection_laws
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
@@ -74,7 +74,7 @@ def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
     phase: which the test falls in: steady, manoeuvre, after
     shift: mean of the estimated acceleration in its own σ
-    probability: of an alarm
+    probability ±: of an alarm
     """
     axes = result.axes
     index, columns = _test_rows(result)
@@ -85,8 +85,8 @@ def _detections(result: CaseResult[ManoeuvreAxes]) -> Columns:
         "n": n.astype(np.int64),
         "phase": PHASES[axes.phase[k]],
         "shift": axes.shifts[d, g, k],
-        **interval_columns("probability", rates, ""),
-        "exact": axes.exact_alarms[index],
+        "probability": rates,
+        "exact_probability": axes.exact_alarms[index],
     }
 
 
@@ -96,8 +96,8 @@ def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
 
     event: false alarm, alarm, or end of alarms (all clear)
     delay_s: time since the phase began
-    probability: that the event has come by then; exact where tests are independent: overlapping windows have no law
-    independent: what independent tests would give
+    probability ±: that the event has come by then; exact where tests are independent: overlapping windows have no law
+    independent_probability: what independent tests would give
     """
     axes, K = result.axes, len(result.axes.k)
     index, columns = _test_rows(result)
@@ -118,9 +118,9 @@ def _delays(result: CaseResult[ManoeuvreAxes]) -> Columns:
         "n": np.full(d.size, result.count, dtype=np.int64),
         "event": EVENTS[phase[k]],
         "delay_s": columns["t_s"] - since[phase[k]],
-        **interval_columns("probability", rates, ""),
-        "exact": np.where(np.array(axes.independent)[d], law[index], np.nan),
-        "independent": law[index],
+        "probability": rates,
+        "exact_probability": np.where(np.array(axes.independent)[d], law[index], np.nan),
+        "independent_probability": law[index],
     }
 
 
@@ -135,22 +135,23 @@ def _classes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """Tracks classed by their alarms: called manoeuvring if there was one in a phase, of which k is the last scan.
 
     truth: the track's phase: steady, or manoeuvre
-    duration_s, called_manoeuvring: time since the phase began, and share of tracks called so
-    error_probability: that a steady track is called manoeuvring, or a manoeuvring one steady
+    duration_s: time since the phase began
+    called_manoeuvring_share: tracks called so
+    error_probability ±: that a steady track is called manoeuvring, or a manoeuvring one steady
     """
-    delays = _delays(result)
+    delays = common.spread_estimates(_delays(result))
     last = np.concatenate([_last_rows(delays, event) for event in EVENTS[:2]])
     rows = {name: values[last] for name, values in delays.items()}
     steady = rows["event"] == EVENTS[0]
     wrong = np.where(steady, rows["probability"], 1 - rows["probability"])
-    rates = statistics.rate(np.rint(wrong * rows["n"]), rows["n"])
+    errors = statistics.rate(np.rint(wrong * rows["n"]), rows["n"])
     names = list(rows)
     return {name: rows[name] for name in names[: names.index("n") + 1]} | {
         "truth": PHASES[np.where(steady, 0, 1)],
         "duration_s": rows["delay_s"],
-        "called_manoeuvring": rows["probability"],
-        "error_probability|": rates,
-        "exact": np.where(steady, rows["exact"], 1 - rows["exact"]),
+        "called_manoeuvring_share": rows["probability"],
+        "error_probability": errors,
+        "exact_error_probability": np.where(steady, rows["exact_probability"], 1 - rows["exact_probability"]),
     }
 
 
@@ -203,7 +204,7 @@ def _thresholds(result: CaseResult[ManoeuvreAxes]) -> Columns:
 def _modes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     """What an adaptive filter or an IMM lives by, by scan.
 
-    probability: of a manoeuvre: share of realisations in the manoeuvring mode, or mean of the second model's
+    probability ±: of a manoeuvre: share of realisations in the manoeuvring mode, or mean of the second model's
     memory_plots: mean number of plots that an adaptive filter rests on
     """
     sums = np.asarray(result.sums["modes"])
@@ -214,7 +215,7 @@ def _modes(result: CaseResult[ManoeuvreAxes]) -> Columns:
     return {
         **label_columns(result, f, k, component=common.pick_names([name for name, _ in result.axes.coordinates], c)),
         "n": np.full(f.size, result.count, dtype=np.int64),
-        "probability|": statistics.probability(total, square, result.count),
+        "probability": statistics.probability(total, square, result.count),
         "memory_plots": np.where(kinds[f] == "adaptive", plots / result.count, np.nan),
     }
 

@@ -242,16 +242,18 @@ def test_tables_tell_the_curve_and_how_tracks_end():
     for f, name in ((0, "a"), (2, "b")):
         own = table[table["filter"] == name]
         curve = own[own["event"] == "target's track ended"]
-        assert (np.diff(curve["rate"]) >= 0).all()
+        assert (np.diff(curve["event_rate"]) >= 0).all()
         assert list(curve["sought"]) == [False] * (len(curve) - 1) + [True]
         assert curve.iloc[-1][["k", "t_s"]].tolist() == [20, 95.0]
         weight, squared, number, _ = sums["ended"][f].sum(axis=(0, 1))
-        assert_rounded(curve.iloc[-1]["rate"], weight / 5000, operations=20 * 4)  # sums over scans and ways to end
+        assert_rounded(
+            curve.iloc[-1]["event_rate"], weight / 5000, operations=20 * 4
+        )  # sums over scans and ways to end
         assert curve.iloc[-1]["events"] == number
         assert_rounded(curve.iloc[-1]["n_eff"], weight**2 / squared, operations=3 * 20 * 4)
-        how = own[own["event"] != "target's track ended"].set_index("event")["rate"]
+        how = own[own["event"] != "target's track ended"].set_index("event")["event_rate"]
         assert list(how.index) == ["target's track dropped", "target's track lost"]
-        assert_rounded(how.sum(), curve.iloc[-1]["rate"], operations=20 * 4)
+        assert_rounded(how.sum(), curve.iloc[-1]["event_rate"], operations=20 * 4)
     assert "has ended by the last scan, by importance sampling: a, " in " ".join(result.answer)
     assert not result.tables["rare"]["event"].str.contains("false").any()
 

@@ -254,16 +254,16 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     for f in range(2):
         row, of = first.iloc[f], tracking.iloc[f]
         weight, squared, number, _ = sums["held"][f, 0]
-        assert row["rate"] == of["false_confirmed"] == weight / 5000
+        assert row["event_rate"] == of["false_confirmed_share"] == weight / 5000
         assert row["events"] == number
         assert_rounded(row["n_eff"], weight**2 / squared, operations=3)
         assert row["variance_factor"] > 100
         an_hour = 0.03e-6 * result.cases[0].axes.area_m2 * 720
-        assert_rounded(of["false_tracks_per_hour"], an_hour * row["rate"], operations=6)
-        assert_rounded(of["false_lo"], an_hour * row["rate_lo"], operations=6)
+        assert_rounded(of["false_tracks_per_hour"], an_hour * row["event_rate"], operations=6)
+        assert_rounded(of["false_tracks_per_hour_lo"], an_hour * row["event_rate_lo"], operations=6)
         own = table[table["filter"] == row["filter"]]
-        assert (np.diff(own["rate"]) <= 0).all()  # the tail of the life: held for one scan more
-        assert_rounded(of["false_life_s"], 5.0 * own["rate"].sum() / row["rate"], operations=3 * len(own))
+        assert (np.diff(own["event_rate"]) <= 0).all()  # the tail of the life: held for one scan more
+        assert_rounded(of["false_life_s"], 5.0 * own["event_rate"].sum() / row["event_rate"], operations=3 * len(own))
     assert "importance sampling" in " ".join(result.answer)
     assert not any("rare event" in line for line in result.warnings)
     assert "note" not in result.tables["tracks"] or not result.tables["tracks"]["note"].str.contains("events").any()
@@ -278,7 +278,9 @@ def test_solve_takes_the_weighted_rate():
     assert found.lo < found.value < found.hi < 0.99
     assert found.hi - found.lo < 0.02
     again = radarsim.run(keys, overrides=[f"gate_probability={found.value}"]).tables["tracking"].iloc[0]
-    assert abs(again["false_tracks_per_hour"] - 0.5 * at) < RESIDUE * (again["false_hi"] - again["false_lo"])
+    assert abs(again["false_tracks_per_hour"] - 0.5 * at) < RESIDUE * (
+        again["false_tracks_per_hour_hi"] - again["false_tracks_per_hour_lo"]
+    )
 
 
 @pytest.mark.parametrize(

@@ -52,11 +52,11 @@ def test_a_tracker_that_confirms_nothing_keeps_no_track(result):
     """Which is not that it loses none."""
     table = result.tables["tracking"].copy()
     lost = table["filter"] == "PDA"
-    table.loc[lost, ["confirmed", "ends_per_hour", "life_s", "time_to_confirm_s"]] = [0.0, np.nan, np.nan, np.nan]
+    table.loc[lost, ["confirmed_share", "ends_per_hour", "life_s", "time_to_confirm_s"]] = [0.0, np.nan, np.nan, np.nan]
     first, *_ = answer_texts(answer, result.cases, {"tracking": table})
     assert ": nearest confirms " in first
     assert first.endswith("; PDA confirms no track.")
-    table.loc[:, ["confirmed", "ends_per_hour"]] = [0.0, np.nan]
+    table.loc[:, ["confirmed_share", "ends_per_hour"]] = [0.0, np.nan]
     assert "confirms no track" in answer_texts(answer, result.cases, {"tracking": table})[0]
 
 
@@ -67,44 +67,46 @@ def test_tables_say_what_the_sums_hold(result):
     case = result.cases[2]
     counts = case.sums["counts"][1]
     rows = tracks[(tracks["case"] == case.name) & (tracks["filter"] == "PDA")]
-    assert (rows["kept"] == counts[:, track_sums.CONFIRMED_COUNT] / 2000).all()
-    assert rows["lost"].sum() == counts[:, track_sums.LOST_COUNT].sum()
+    assert (rows["kept_share"] == counts[:, track_sums.CONFIRMED_COUNT] / 2000).all()
+    assert rows["n_lost"].sum() == counts[:, track_sums.LOST_COUNT].sum()
     row = tracking[(tracking["case"] == case.name) & (tracking["filter"] == "PDA")].iloc[0]
     held = counts[:, track_sums.CONFIRMED_COUNT].sum() * 5.0
     ends = counts[:, [track_sums.LOST_COUNT, track_sums.DROPPED_COUNT]].sum()
     assert_rounded(row["life_s"], held / ends, operations=6)
     assert_rounded(row["ends_per_hour"], 3600 * ends / held, operations=6)
-    assert row["life_lo"] < row["life_s"] < row["life_hi"]
+    assert row["life_s_lo"] < row["life_s"] < row["life_s_hi"]
     area = np.radians(40) * (144 - 25) / 2  # km²
-    assert_rounded(row["false_tracks_per_hour"], 2.0 * area * 720 * row["false_confirmed"], operations=10)
+    assert_rounded(row["false_tracks_per_hour"], 2.0 * area * 720 * row["false_confirmed_share"], operations=10)
     assert set(gates["filter"]) == {"nearest", "PDA", "told"}
     known = gates[(gates["filter"] == "told")]
-    assert (known["false_lo"] <= known["exact_false_in_gate"] * 1.2).all()
+    assert (known["false_in_gate_lo"] <= known["exact_false_in_gate"] * 1.2).all()
     assert result.gains.empty
 
 
 def test_without_false_plots_there_are_no_false_tracks(result):
     clean = result.tables["tracking"].iloc[:2]
-    assert (clean[["false_tracks_per_hour", "false_confirmed", "wrong_share"]] == 0).all().all()
-    assert (clean["exact_false_confirmed"] == 0).all()
+    assert (clean[["false_tracks_per_hour", "false_confirmed_share", "wrong_share"]] == 0).all().all()
+    assert (clean["exact_false_confirmed_share"] == 0).all()
 
 
 def test_exact_share_of_false_pairs_stands_beside_the_measured_one(result):
     rows = result.tables["tracking"]
     pairs = rows[(rows["filter"] == "nearest") & (rows["false_plots_per_km2"] > 0)]
-    assert np.isfinite(pairs["exact_false_confirmed"]).all()
-    off = (pairs["false_confirmed"] - pairs["exact_false_confirmed"]).abs()
-    assert (off < share_error(pairs["exact_false_confirmed"], 2000)).all()
-    assert rows[rows["filter"] == "PDA"].iloc[1:]["exact_false_confirmed"].isna().all()
+    assert np.isfinite(pairs["exact_false_confirmed_share"]).all()
+    off = (pairs["false_confirmed_share"] - pairs["exact_false_confirmed_share"]).abs()
+    assert (off < share_error(pairs["exact_false_confirmed_share"], 2000)).all()
+    assert rows[rows["filter"] == "PDA"].iloc[1:]["exact_false_confirmed_share"].isna().all()
 
 
 def test_classes_fall_with_the_threshold_and_keep_the_bound(result):
     for _, rows in result.tables["track_classes"].groupby(["case", "filter"]):
-        assert (np.diff(rows["true_called_false"]) >= 0).all()
+        assert (np.diff(rows["true_called_false_share"]) >= 0).all()
         if (rows["n_false"] > 0).all():
-            assert (np.diff(rows["false_called_true"]) <= 0).all()
-            called = np.round(rows["false_called_true"] * rows["n_false"])
-            assert (stats.binom.sf(called - 1, rows["n_false"], rows["bound"]) > 1e-6).all()  # of 124 looks
+            assert (np.diff(rows["false_called_true_share"]) <= 0).all()
+            called = np.round(rows["false_called_true_share"] * rows["n_false"])
+            assert (
+                stats.binom.sf(called - 1, rows["n_false"], rows["false_called_true_bound"]) > 1e-6
+            ).all()  # of 124 looks
 
 
 @pytest.mark.slow
@@ -117,7 +119,10 @@ def test_figures_are_those_of_the_experiment(result):
 
 def test_false_tracks_that_did_not_occur_are_drawn_as_the_upper_end_of_their_interval(result):
     table = result.tables["tracking"].copy()
-    rows, sparse = table.columns.get_indexer(["false_tracks_per_hour", "false_lo"]), table["false_plots_per_km2"] == 1
+    rows, sparse = (
+        table.columns.get_indexer(["false_tracks_per_hour", "false_tracks_per_hour_lo"]),
+        table["false_plots_per_km2"] == 1,
+    )
     table.iloc[sparse.to_numpy().nonzero()[0], rows] = 0.0
     figure = figures.false_figure(result.cases, table)
     *lines, upper = figure.panels[0].marks
@@ -125,8 +130,8 @@ def test_false_tracks_that_did_not_occur_are_drawn_as_the_upper_end_of_their_int
         row = table[(table["filter"] == name) & (table["false_plots_per_km2"] == 2)].iloc[0]
         np.testing.assert_array_equal(line.x, [1, 2])  # and no point without false plots
         np.testing.assert_array_equal(line.y, [np.nan, row["false_tracks_per_hour"]])
-        assert (line.lo[1], line.hi[1]) == (row["false_lo"], row["false_hi"])
-    np.testing.assert_array_equal(upper.y, table[sparse]["false_hi"])
+        assert (line.lo[1], line.hi[1]) == (row["false_tracks_per_hour_lo"], row["false_tracks_per_hour_hi"])
+    np.testing.assert_array_equal(upper.y, table[sparse]["false_tracks_per_hour_hi"])
     assert figure.panels[0].keys == (("none occurred: upper end of the interval", upper.style),)
     assert "Plots that confirm it: 2 of 3 (nearest); 3 of 4 (PDA)." in figure.caption
     table.loc[table["filter"] == "PDA", "false_tracks_per_hour"] = 0.0
@@ -147,7 +152,7 @@ def test_what_does_not_change_over_a_sweep_is_said_and_rare_ends_are_drawn():
     rare = result.tables["rare"]
     ended = rare[rare["sought"] & (rare["filter"] == "PDA")]
     line = next(mark for mark in figure.panels[0].marks if mark.label == "PDA")
-    np.testing.assert_array_equal(line.y, ended["rate"])
+    np.testing.assert_array_equal(line.y, ended["event_rate"])
     assert figure.panels[0].x.ticks[0] == (line.x[0], "0")  # zero has a place on the logarithmic axis
     np.testing.assert_array_equal(line.x[1:], [3e-4, 1e-3, 3e-3, 1e-2])
     assert_rounded(line.x[0], 1e-4, operations=4)  # a third of the next, in logarithms

@@ -44,7 +44,9 @@ def test_detections_lie_about_the_exact_law(tables):
         *("case", "filter", "component", "plots", "threshold_k", "false_alarm_probability", "k", "t_s", "n")
     ]
     assert (rows["n"] == N).all()
-    inside = (rows["lo"] <= rows["exact"]) & (rows["exact"] <= rows["hi"])
+    inside = (rows["probability_lo"] <= rows["exact_probability"]) & (
+        rows["exact_probability"] <= rows["probability_hi"]
+    )
     assert 0.93 < inside.mean() < 0.985  # discrete counts: Wilson's intervals cover somewhat unevenly
     assert set(rows["component"]) == {"r", "b", "joint"}
     assert set(rows[rows["case"] == case(0)]["phase"]) == {"steady"}
@@ -59,14 +61,17 @@ def test_delays_grow_to_the_class(tables):
     one = one[(one["event"] == "alarm") & np.isclose(one["false_alarm_probability"], 0.01)]
     assert one["delay_s"].to_list() == [5.0 * i for i in range(1, 9)]
     assert (one["probability"].diff().dropna() >= 0).all()
-    assert one["exact"].isna().all()
+    assert one["exact_probability"].isna().all()
     apart = rows[(rows["filter"] == "4 plots, apart") & (rows["event"] == "alarm")]
-    assert ((apart["lo"] <= apart["exact"]) & (apart["exact"] <= apart["hi"])).mean() > 0.8
+    assert (
+        (apart["probability_lo"] <= apart["exact_probability"])
+        & (apart["exact_probability"] <= apart["probability_hi"])
+    ).mean() > 0.8
     named = tables["classes"].set_index(["case", "filter", "component", "false_alarm_probability", "truth"])
     row = named.loc[(case(0.8), "5 plots", "r", one["false_alarm_probability"].iloc[0], "manoeuvre")]
-    assert row["called_manoeuvring"] == one["probability"].iloc[-1]
-    assert_rounded(row["error_probability"], 1 - row["called_manoeuvring"], size=1.0)
-    assert row["lo"] <= row["error_probability"] < row["hi"]
+    assert row["called_manoeuvring_share"] == one["probability"].iloc[-1]
+    assert_rounded(row["error_probability"], 1 - row["called_manoeuvring_share"], size=1.0)
+    assert row["error_probability_lo"] <= row["error_probability"] < row["error_probability_hi"]
     assert row["duration_s"] == 40
     assert set(tables["classes"][tables["classes"]["case"] == case(0)]["truth"]) == {"steady"}
 
@@ -139,7 +144,7 @@ def test_cases_in_several_frames_stand_side_by_side():
         assert dotted == list(result.cases[0].axes.manoeuvre_s)
         assert "Dotted: beginning and end of the manoeuvre." in described[name].caption
     assert {"roc", "detection", "delay", "modes"} <= set(described)
-    assert result.tables["detections"]["exact"].isna().mean() == 0.5
+    assert result.tables["detections"]["exact_probability"].isna().mean() == 0.5
 
 
 def test_a_detector_that_never_has_its_plots():
