@@ -95,7 +95,7 @@ def noise(results: Results) -> list[tuple]:
 def forecast(results: Results) -> list[tuple]:
     """Lock by how much worse the forecast is than believed."""
     names = ("sequence", "dense", "cured")
-    table_rows: list[tuple] = [("errors over those believed", *(f"{name}, %" for name in names))]
+    table_rows: list[tuple] = [("errors over those assumed", *(f"{name}, %" for name in names))]
     for scale in (0.25, 0.5, 1, 1.5, 2, 3, 4):
         case = f"discriminator_pair prior.error_scale={scale:g}"
         table_rows.append((f"{scale:g}", *(percent(last(results, MAPS, case, name)) for name in names)))
@@ -105,7 +105,7 @@ def forecast(results: Results) -> list[tuple]:
 def region(results: Results) -> list[tuple]:
     """Lock of the cured sequence over noise and width of the forecast."""
     variances, scales = REGION
-    table_rows: list[tuple] = [("forecast's spread ×", *(f"σ² = {variance:g}" for variance in variances))]
+    table_rows: list[tuple] = [("forecast's σ ×", *(f"σ² = {variance:g}" for variance in variances))]
     for scale in scales:
         cases = (
             f"discriminator_pair burst.noise_variance={variance:g} prior.scale={scale:g}" for variance in variances

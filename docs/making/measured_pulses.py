@@ -53,7 +53,7 @@ def filters(results: Results) -> list[tuple]:
 
 def threshold(results: Results) -> list[tuple]:
     """Locks and σ of range against the signal-to-noise ratio."""
-    heads = ("SNR of a pulse, dB", "Fisher bound of V, m/s", "cured: locked, %", "spectrum: locked, %")
+    heads = ("SNR of a pulse, dB", "CRB of V, m/s", "cured: locked, %", "spectrum: locked, %")
     table_rows: list[tuple] = [
         (*heads, *(f"σ_r over ideal: {name}" for name in ("cured", "spectrum", "spectrum, mixture")))
     ]

@@ -57,9 +57,9 @@ def judge(
 ) -> None:
     """Judge a filter of your own: is it better than the config's?
 
-    ESTIMATES holds what your filter made of the plots that `radarsim simulate CONFIG --realisations 0:N` wrote. The
-    config's filters are run on the same plots; gains of your filter against every one of them are paired, with 95 %
-    intervals. Results are in DIR/CONFIG_NAME. From Python, `radarsim.judge` also takes a function or an object.
+    ESTIMATES contains your filter's estimates for the plots that `radarsim simulate CONFIG --realisations 0:N` wrote.
+    The config's filters are run on the same plots; gains of your filter against every one of them are paired, with
+    95 % intervals. Results are in DIR/CONFIG_NAME. From Python, `radarsim.judge` also takes a function or an object.
 
     \b
     .npz            estimates (n, K, d): realisations 0 … n - 1, the scans, the leading d

@@ -36,7 +36,7 @@ class TimeLimit:
         return max(0.0, self._end - time.monotonic())
 
     def with_reserve(self, seconds: float) -> "TimeLimit":
-        """The limit reduced by so many seconds, by at most half of the rest."""
+        """Time limit minus a reserve, at most half of what remains."""
         return TimeLimit(self.seconds, self.start_s, min(seconds, 0.5 * self.remaining_s))
 
 

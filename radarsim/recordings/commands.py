@@ -277,8 +277,8 @@ def fit(config: str, plots: str, overrides: tuple[str, ...], **options: Any) -> 
     the likelihood of the plots under the filter's predictions; its interval is a profile-likelihood interval. A key
     whose interval has no lower or no upper bound cannot be determined from these plots.
 
-    Where outliers, or errors that persist from plot to plot, are plain (by chance in one recording of 1000), the fit
-    allows for them, and prints the plain values beside.
+    If outliers or correlated errors are significant (0.1 % false alarms), the fit models them, and prints the values
+    without them, too.
 
     \b
     Example
@@ -326,8 +326,8 @@ def register(radar: str, other: str, as_json: bool) -> None:
     """Find a radar's biases against ADS-B or another radar.
 
     Both files are as `radarsim import` writes them. Plots are compared with the positions of the aircraft that has
-    their address, callsign or Mode 3/A code at that time, interpolated in between. A bias is what to subtract:
-    range_scale from 1, the share of the range; time_s from the times, which are then too late. Outliers have no weight;
+    their address, callsign or Mode 3/A code at that time, interpolated in between. Each bias is the amount to subtract.
+    range_scale - 1 is the share of the range; a positive time_s means that the times are late. Outliers have no weight;
     errors may be correlated within an aircraft. What the flights cannot show is unknown, with the reason. OTHER is
     taken as right. Errors that these biases do not describe are named first, with what they go with. ID is the track,
     address, callsign or code of the plots to which a lone receiver's positions belong.

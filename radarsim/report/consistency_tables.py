@@ -17,8 +17,8 @@ OPTIMISTIC, CONSISTENT, PESSIMISTIC = "optimistic", "consistent", "pessimistic"
 def ratio_columns(true: Estimate, claimed: np.ndarray) -> dict[str, np.ndarray]:
     """Columns of estimates (n,) of σ and believed ones (n,).
 
-    believed_sigma [unit]: root of the mean variance that the filter believes
-    ratio ±: true over believed"""
+    believed_sigma [unit]: root of the mean variance that the filter computes
+    ratio ±: true over filter-computed σ"""
     columns = tables.interval_columns("ratio", _quotient(true, claimed))
     return {"sigma": true.value, "believed_sigma": claimed, **columns}
 
@@ -31,9 +31,9 @@ def _quotient(true: Estimate, believed: np.ndarray) -> Estimate:
 def normalised_square_columns(
     quantity: str, mean: Estimate, bounds: tuple[np.ndarray, np.ndarray], exact: np.ndarray | None = None
 ) -> tables.Columns:
-    """What a filter believes of its whole state (NEES) or of its innovations (NIS), by normalised squares.
+    """Consistency of a filter's covariances with its errors (NEES) or innovations (NIS), by normalised squares.
 
-    nees ±, nis ±: mean of `eᵀP⁻¹e`, `νᵀS⁻¹ν` per degree of freedom, P and S the covariances that the filter believes
+    nees ±, nis ±: mean of `eᵀP⁻¹e`, `νᵀS⁻¹ν` per degree of freedom, P and S the filter-computed covariances
     nees_bound_lo, nees_bound_hi, nis_bound_lo, nis_bound_hi: between them lie all means of a filter that is right about
         itself in 95 % of runs (Bonferroni)
     nees_verdict, nis_verdict: consistent, optimistic or pessimistic, as the exact mean, or where it is not known the

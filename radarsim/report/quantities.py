@@ -173,16 +173,18 @@ GAIN = Quantity(
 )
 COMMON = (SIGMA, GAIN)
 SMOOTHED_TERMS = {  # scans waited, and what σ is called then
-    1: term("least σ one scan later"),
-    2: term("least σ two scans later"),
-    5: term("least σ five scans later"),
-    10: term("least σ ten scans later"),
+    1: term("Cramér–Rao bound one scan later"),
+    2: term("Cramér–Rao bound two scans later"),
+    5: term("Cramér–Rao bound five scans later"),
+    10: term("Cramér–Rao bound ten scans later"),
 }
-FLOOR = Quantity("floor", term("floor under σ"), "floor", "floor", per="component")  # see `radarsim.studies.floors`
+FLOOR = Quantity(
+    "floor", term("Cramér–Rao bound on σ"), "floor", "floor", per="component"
+)  # see `radarsim.studies.floors`
 FLOORS = (
     FLOOR,
     *(Quantity(f"lag_{lag}", words, "floor", f"lag_{lag}", per="component") for lag, words in SMOOTHED_TERMS.items()),
-    Quantity("smoothed", term("least σ after the last scan"), "floor", "smoothed", per="component"),
+    Quantity("smoothed", term("Cramér–Rao bound after the last scan"), "floor", "smoothed", per="component"),
 )
 LOCK = Quantity("lock", term("lock rate"), "locks", "lock_rate|lock", kind="share", more_is_better=True, last=True)
 LOST = LOCK.complement("lost", term("rate of lost locks"))

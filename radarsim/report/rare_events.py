@@ -154,6 +154,14 @@ def rate_fields(row: "pd.Series") -> dict[str, Any]:
     }
 
 
+MIN_EFFECTIVE_EVENTS = 2.0  # below, one weight decides: no estimate
+
+
+def is_estimated(row: "pd.Series") -> bool:
+    """Whether a row of rare.csv rests on more than one effective event."""
+    return bool(row["n_eff"] >= MIN_EFFECTIVE_EVENTS)
+
+
 def mean_weight_warnings(rates: "pd.DataFrame | None") -> list[str]:
     """A line on the worst case whose weights have a wrong mean, which makes every rate wrong."""
     if rates is None or not len(rows := rates[rates["n"] >= statistics.MIN_TRUSTED_REALISATIONS]):

@@ -172,7 +172,7 @@ def curves(results: Sequence[CaseResult]) -> "pd.DataFrame":
     spread [unit]: standard deviation of the errors
     n_eff: realisations that stand behind σ where a few large errors decide: n/(κ − 1), κ the fourth moment over the
         squared second; half of n for Gaussian errors
-    believed_sigma [unit]: root of the mean variance that the filter believes; with sigma above it a filter is
+    believed_sigma [unit]: root of the mean variance that the filter computes; with sigma above it a filter is
         optimistic, with sigma below it pessimistic. A sampled mean where a filter adapts, or learns which plots are
         missed"""
     return join_columns(map(curve_columns, results))

@@ -76,14 +76,14 @@ def with_floor(figure: Figure, curves: "pd.DataFrame", component: str, factor: f
         return figure
     lowest = factor * rows.groupby("t_s", sort=True)["floor"].min()
     (panel,) = figure.panels
-    line = Line(lowest.index.to_numpy(), lowest.to_numpy(), tr("floor"), GUIDE)
+    line = Line(lowest.index.to_numpy(), lowest.to_numpy(), tr("CRB"), GUIDE)
     panel = replace(panel, marks=(*panel.marks, line))
     posterior = rows["floor_kind"].str.startswith("posterior").all()
-    remark = tr("Grey: the floor, a posterior Cramér-Rao bound.") if posterior else tr(UNDER_UNBIASED)
+    remark = tr("Grey: posterior Cramér–Rao bound (CRB).") if posterior else tr(UNDER_UNBIASED)
     return replace(figure, panels=(panel,), caption=f"{figure.caption} {remark}")
 
 
-UNDER_UNBIASED = term("Grey: the floor, a Cramér-Rao bound of unbiased estimators.")
+UNDER_UNBIASED = term("Grey: Cramér–Rao bound (CRB) of unbiased estimators.")
 GUIDE = Style(GREY, 0, width_pt=0.8)
 
 
@@ -204,8 +204,8 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
     if not panels:
         return None
     caption = tr(
-        "Errors of the {quantity} in cases with a mean error above the spread at some time: mean error "
-        "(dynamic, bias) and standard deviation (fluctuation, spread) of {realisations}; σ² is the sum "
+        "Errors of the {quantity} in cases with a mean error above the standard deviation at some time: mean error "
+        "(dynamic, bias) and standard deviation (fluctuation) of {realisations}; σ² is the sum "
         "of their squares.",
         quantity=component.words,
         realisations=realisations_text(results),
@@ -224,9 +224,11 @@ def _dynamic_panel(result: CaseResult, filter_rows: Sequence[tuple], component: 
         bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
         name = escape_dollars(f)
         marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=tr("{name}: bias", name=name)))
-        marks.append(Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=tr("{name}: spread", name=name)))
+        marks.append(
+            Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=tr("{name}: standard deviation", name=name))
+        )
     keys = [(escape_dollars(f), Style(n, None, n)) for n, (f, _) in enumerate(filter_rows)]
-    keys += [(tr("bias"), Style(0, 0)), (tr("spread"), Style(0, 1))]
+    keys += [(tr("bias"), Style(0, 0)), (tr("standard deviation"), Style(0, 1))]
     title = swept_description(result) or config_device(result)
     y = Axis(label_with_unit(tr("error of {symbol}", symbol=component.symbol), component.unit))
     return Panel(time_axis(), y, tuple(marks), title, tuple(keys))

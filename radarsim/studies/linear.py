@@ -271,7 +271,7 @@ class LinearStudy(OneFile):
         return np.stack(limits)[:, : len(self.components)]
 
     def floor(self, spec: Any, axes: Axes) -> Floor:
-        """The posterior Cramér-Rao bound, of each filter with its own plots."""
+        """The posterior Cramér–Rao bound, of each filter with its own plots."""
         (F, Q, _, P), probability = self._truth(spec)
         F, Q = (np.broadcast_to(matrix, (spec.scans, *matrix.shape)) for matrix in (F, Q))
         bound = partial(moving.driven_bound, P, F, Q, detection=probability, component_count=len(self.components))

@@ -38,7 +38,7 @@ class Range:
         return min(max(float(round(x)) if self.whole_numbers else x, self.low), self.high)
 
     def grid(self, points: int | None = None) -> list[float]:
-        """Places from end to end, even on the scale; whole numbers, all of them where they are few."""
+        """Grid over the search range, evenly spaced; every integer if there are few."""
         if self.whole_numbers and self.high - self.low < MAX_POINTS:
             return [float(n) for n in range(math.ceil(self.low), math.floor(self.high) + 1)]
         if points is None:

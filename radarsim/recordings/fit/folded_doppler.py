@@ -85,13 +85,15 @@ def folding_message(folding: Folding, case: Case | None = None) -> str:
     )
     span = "" if folding.span_mps is None else significant_digits(folding.span_mps, "#.3g")
     if folding.span_mps is None:
-        span_clause = tr("the plots do not determine the span")
+        span_clause = tr("the plots do not determine the unambiguous interval")
     elif folding.is_configured:
-        span_clause = tr("the config's span is {span} m/s", span=span)
+        span_clause = tr("the config's unambiguous interval is {span} m/s", span=span)
     elif folding.span_mps >= 4 * folding.velocity_mps:
-        span_clause = tr("the plots suggest a span of about {span} m/s, or an integer fraction of it", span=span)
+        span_clause = tr(
+            "the plots suggest an unambiguous interval of about {span} m/s, or an integer fraction of it", span=span
+        )
     else:
-        span_clause = tr("the plots suggest a span of about {span} m/s", span=span)
+        span_clause = tr("the plots suggest an unambiguous interval of about {span} m/s", span=span)
     clauses = [clause, span_clause]
     if folding.other_causes:
         clauses.append(tr("or {cause}", cause=tr(" or ").join(map(tr, folding.other_causes))))

@@ -73,7 +73,7 @@ def _no_answer_reason(followed: TrackingResult) -> str:
     """Why the plots do not tell which filter is best."""
     if followed.filters_without_test:
         return tr("The plots do not tell which filter is best: the filters give no innovation with a covariance.")
-    return tr("Too few plots to judge the filters by.")
+    return tr("Too few plots to rank the filters.")
 
 
 def _sentences(statements: Sequence[Statement]) -> list[str]:

@@ -129,8 +129,8 @@ VERDICT_MEANINGS = {
         "the plots are less accurate than stated, or the target manoeuvres harder than the filter allows for"
     ),
     TOO_LARGE: term("the plots are more accurate than stated, or the filter allows for harder manoeuvres than occur"),
-    FOLD_LOST: term("the velocity is unfolded by a wrong number of spans; other filters fit the same plots"),
-    MAYBE_TOO_SMALL: term("a wrong fold, plots less accurate than stated, or harder manoeuvres than allowed for"),
+    FOLD_LOST: term("the velocity is unfolded by the wrong number of intervals; other filters fit the same plots"),
+    MAYBE_TOO_SMALL: term("a wrong ambiguity, plots less accurate than stated, or harder manoeuvres than allowed for"),
 }
 
 

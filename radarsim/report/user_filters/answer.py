@@ -38,8 +38,8 @@ DEPENDENCES = {  # why a filter has no intervals, after "as"
     "place": term("its estimates depend on the row in the batch"),
     "others": term("its estimates depend on the other realisations in the batch"),
 }
-UNBIASED = term("the Cramér-Rao bound of unbiased estimators")
-ANY = term("the posterior Cramér-Rao bound")
+UNBIASED = term("the Cramér–Rao bound of unbiased estimators")
+ANY = term("the posterior Cramér–Rao bound")
 
 
 def question(experiment: Experiment) -> str:
@@ -302,27 +302,21 @@ def _floor_sentence(comparison: RivalComparison) -> list[Sentence]:
     }
     if not comparison.has_same_realisations:
         text = tr(
-            "The floor there, {kind}, is {floor}; above it is {others}. {name}, which has an estimate in other "
+            "There {kind} is {floor}; above it is {others}. {name}, which has an estimate in other "
             "realisations, is not compared with it.",
             **fields,
         )
         return [Sentence(text, sentences.intervals("curves", "sigma", comparison.sigma))]
     if comparison.is_equal:
-        text = tr("The floor there, {kind}, is {floor}: above it is {others}, and {name} as far.", **fields)
+        text = tr("There {kind} is {floor}: above it is {others}, and {name} as far.", **fields)
         return [Sentence(text, comparison.best_sigma.intervals)]
     if own.value < 0:
         below = own.mapped(lambda percent: -percent).text("%", ".3g")
-        text = tr(
-            "The floor there, {kind}, is {floor}: {name} is {own} below it; above it is {others}.", own=below, **fields
-        )
+        text = tr("There {kind} is {floor}: {name} is {own} below it; above it is {others}.", own=below, **fields)
     else:
-        text = tr(
-            "The floor there, {kind}, is {floor}: {name} is {own} above it, {others}.",
-            own=own.text("%", ".3g"),
-            **fields,
-        )
+        text = tr("There {kind} is {floor}: {name} is {own} above it, {others}.", own=own.text("%", ".3g"), **fields)
     if comparison.own_sigma.estimate.hi < lowest and is_of_unbiased:
-        text += " " + tr("Below it is only what is biased, or knows more than these plots.")
+        text += " " + tr("Only a biased estimator, or one with extra information, can lie below it.")
     elif comparison.own_sigma.estimate.hi < lowest:
         text += " " + tr(
             "Below it no estimator can be, biased or not, as it holds on the mean over all truths drawn: {name} "

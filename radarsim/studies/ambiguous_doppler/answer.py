@@ -33,7 +33,8 @@ def warnings(experiment: Experiment) -> list[str]:
         for span in radar.spans_mps:
             if span < 2 * radar.sigma_velocity_mps and any(f.folds for f in case.spec.filters):
                 text = tr(
-                    "its span of {span:g} m/s is under 2 σ_V, {sigma:g} m/s: next to nothing can be unfolded",
+                    "its unambiguous interval of {span:g} m/s is under 2 σ_V, {sigma:g} m/s: next to nothing can be "
+                    "unfolded",
                     span=span,
                     sigma=2 * radar.sigma_velocity_mps,
                 )
@@ -46,7 +47,7 @@ def question(experiment: Experiment) -> str:
     names = join_names(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
     if any(f.folds for case in experiment.cases for f in case.spec.filters):
         return tr("How much is the folded velocity of {radars} worth, and from which scan on?", radars=names)
-    return tr("Which filter order follows the target of {radars}, and how should several be combined?", radars=names)
+    return tr("Which model order suits the target of {radars}, and how should several be combined?", radars=names)
 
 
 def answer(
@@ -168,7 +169,7 @@ def _least_error_of_all(
         since=since_texts.pop() if len(since_texts) == 1 else tr("after the start of the track"),
         best=join_names(equal),
         least=_sigma_m(best_row),
-        kind=tr("the best combination") if other_kind[0] in combinations else tr("the best single order"),
+        kind=tr("the best combination") if other_kind[0] in combinations else tr("the best single model order"),
         other=other_kind[0],
         most=_sigma_m(other_row),
         where=key_labels.plain_case_label(other_case),
@@ -318,7 +319,8 @@ def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
     beyond = Estimate(*(float(folds[key]) for key in (BEYOND_SHARE, f"{BEYOND_SHARE}_lo", f"{BEYOND_SHARE}_hi")))
     share = ComparedValue(beyond, is_exact=False, kind="share").chosen_among(looks)
     text = tr(
-        "at scan {k}, the last, the velocity is off by more than half the span in {share} of realisations",
+        "at scan {k}, the last, the velocity is off by more than half the unambiguous interval in {share} of "
+        "realisations",
         k=k,
         share=wording.share(*(100 * end for end in share.estimate)) + share.choice_remark(),
     )
@@ -344,9 +346,14 @@ def _wrong_folds_sought(result: Result, name: str, tables_by_name: TablesByName)
     if (result.name, name) not in rows:
         return []
     row = rows[result.name, name].iloc[0]
+    if not rare_events.is_estimated(row):
+        text = tr(
+            "probability of a wrong ambiguity: no estimate (effective sample size {n_eff:,.0f})", n_eff=row["n_eff"]
+        )
+        return [Sentence(text, sentences.intervals("rare", "event_rate", row))]
     text = tr(
-        "a fold is wrong at scan {k} in {rate:.3g} [{low:.3g}, {high:.3g}] of realisations, by importance sampling "
-        "from {events:,} of them, {n_eff:,.0f} effective ones",
+        "an ambiguity is wrong at scan {k} in {rate:.3g} [{low:.3g}, {high:.3g}] of realisations (importance sampling; "
+        "{events:,} events, effective sample size {n_eff:,.0f})",
         k=row["k"],
         **rare_events.rate_fields(row),
     )

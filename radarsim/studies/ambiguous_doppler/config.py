@@ -65,7 +65,9 @@ class Radar(radial_keys.Radar):
         spans = self.spans_mps
         for i, span in enumerate(spans):
             if any(math.isclose(span, other_span, rel_tol=MIN_SPAN_DIFFERENCE) for other_span in spans[:i]):
-                yield check_error("repetition_rate_hz", f"must differ from rate to rate: two spans are {span:g} m/s")
+                yield check_error(
+                    "repetition_rate_hz", f"must differ from rate to rate: two unambiguous intervals are {span:g} m/s"
+                )
                 return
 
 
@@ -221,7 +223,7 @@ class Filter(Model):
         only=LISTS_HYPOTHESES,
     )
     combine: Literal["likelihood", "expected_error", "intersection"] | None = key(
-        "combination of orders",
+        "combination of model orders",
         "several orders: likelihood (IMM, with transitions between orders), expected_error (the linear "
         "combination of least error over `manoeuvres`), intersection (the smoothest order whose interval "
         "intersects those of all rougher ones)",
@@ -369,7 +371,7 @@ class Keys(radial_keys.TimedStudyKeys):
         widest, name = max((prior.sigma_velocity_mps, "prior"), (radar.sigma_velocity_mps, "radar"))
         if widest > MAX_FOLDS * min(radar.spans_mps):
             smallest = f"{widest / MAX_FOLDS:g} m/s, {name}.sigma_velocity_mps over {MAX_FOLDS:g}"
-            yield check_error("radar.repetition_rate_hz", f"its span must be at least {smallest}")
+            yield check_error("radar.repetition_rate_hz", f"its unambiguous interval must be at least {smallest}")
 
     @cross_check
     def _range_resolved(self) -> Iterator[CheckError]:

@@ -52,7 +52,10 @@ SHARES = {  # figure: column of folds.csv, title of the axis, caption
     "lost": (
         BEYOND_SHARE,
         term("P(velocity off by over D/2)"),
-        term("Share of realisations whose velocity is off by more than half the span. Bands: 95 % intervals."),
+        term(
+            "Share of realisations whose velocity is off by more than half the unambiguous interval. Bands: 95 % "
+            "intervals."
+        ),
     ),
 }
 
@@ -157,7 +160,9 @@ def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: st
         order_panels.append(Panel(panel_layout.time_axis(), Axis(tr("mean weight in the range")), marks, panel_title))
     if not order_panels:
         return {}
-    caption = tr("Weights of the orders in the estimate of range, mean over realisations; shares may be negative.")
+    caption = tr(
+        "Weights of the model orders in the estimate of range, mean over realisations; shares may be negative."
+    )
     titles = [panel.title for panel in order_panels]
     caption += (
         case_selection.left_out_remark(titles, case_selection.pick_evenly(titles, case_selection.MAX_PANELS)) + left_out
@@ -167,6 +172,6 @@ def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: st
     visible = tuple(panel_layout.with_legend_cell(order_panels)) if len(order_panels) > 1 else tuple(order_panels)
     return {
         "orders": Figure(
-            "orders", tr("Weights of orders"), caption, visible, columns, PAGE_MM if columns > 1 else COLUMN_MM
+            "orders", tr("Weights of model orders"), caption, visible, columns, PAGE_MM if columns > 1 else COLUMN_MM
         )
     }

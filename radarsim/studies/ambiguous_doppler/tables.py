@@ -30,7 +30,7 @@ WRONG_FOLD, NO_ROOM = "wrong fold", "wrong fold that found no room"  # events of
 # no tail. So σ is marked where fewer than FEW_EVENTS occurred: in 60 × 20,000 realisations of `ambiguous_rls5` the
 # intervals of marked σ cover in 45 % of cases, those of unmarked σ in 95 %.
 FEW_FOLDS = RowNote(
-    "few_folds", f"under {statistics.MIN_EVENTS} velocities off by half the span: rarer ones may decide"
+    "few_folds", f"under {statistics.MIN_EVENTS} velocities off by half the unambiguous interval: rarer ones may decide"
 )
 
 
@@ -106,7 +106,7 @@ def _folds(result: Result) -> report_tables.Columns:
     exact_right: known of the nearest fold, without missed plots, where truth and filter agree; of a `remainder` always
     listed: share whose list holds the right sequence
     hypotheses: mean number of hypotheses kept
-    beyond_half_interval_share ±: those whose velocity is off by more than half the span
+    beyond_half_interval_share ±: those whose velocity is off by more than half the unambiguous interval
     """
     axes = result.axes
     visible = np.broadcast_to(unfolding_filters(result)[:, None], axes.exact_right.shape)

@@ -175,9 +175,16 @@ def _lock_intervals(*rows: "pd.Series[Any]") -> tuple[sentences.MeasuredInterval
 def _rate_of_losses(rates: "pd.DataFrame") -> Sentence:
     """How often lock is lost, by importance sampling, of the estimator for which it is sought."""
     row = rates[rates["sought"]].iloc[0]
+    if not rare_events.is_estimated(row):
+        text = tr(
+            "{estimator}: probability of a lost lock: no estimate (effective sample size {n_eff:,.0f}).",
+            estimator=row["filter"],
+            n_eff=row["n_eff"],
+        )
+        return Sentence(text, sentences.intervals("rare", "event_rate", row))
     text = tr(
-        "{estimator}: lock is lost in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts, by importance sampling from "
-        "{events:,} losses, {n_eff:,.0f} effective ones.",
+        "{estimator}: lock is lost in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts (importance sampling; "
+        "{events:,} events, effective sample size {n_eff:,.0f}).",
         estimator=row["filter"],
         **rare_events.rate_fields(row),
     )

@@ -101,8 +101,8 @@ class Prior(Model):
     """The forecast: independent Gaussian errors about the truth."""
 
     spread_over_potential: Spreads | None = key(
-        "prior σ over the potential σ",
-        "standard deviations over the potential ones of the whole burst: phase, frequency, …",
+        "prior σ over the Cramér–Rao bound",
+        "standard deviations over the Cramér–Rao bounds of the whole burst: phase, frequency, …",
         None,
     )
     sigma: Spreads | None = key(
@@ -131,7 +131,9 @@ class Estimator(Model):
 
     name: Annotated[Name, marks.DisplayMark()] = key("name", "label; every estimator has its own")
     method: Literal["sequence", "ridge"] = key(
-        "method", "sequence of discriminators, or short-time spectrum, robust fit, unwrapping, scoring", "sequence"
+        "method",
+        "sequence of discriminators, or short-time spectrum, robust fit, unwrapping, Fisher scoring",
+        "sequence",
     )
     schedule: Literal["designed"] | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MAX_WINDOWS)] = key(
         "window lengths", "designed by (14)–(16), or a list of rising window lengths, s", "designed"
@@ -156,7 +158,7 @@ class Estimator(Model):
         "phases tried in the first window", "phases tried in the first window; 0: the phase in closed form", 0
     )
     steps: Annotated[int, WholeNumber(1, 1000)] = key(
-        "scoring steps per window", "scoring steps in a window, at most", 40
+        "scoring steps per window", "Fisher-scoring iterations in a window, at most", 40
     )
     tolerance: Positive = key(
         "step that ends a window",

@@ -107,7 +107,7 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
     caption = tr(
         "Windows of the estimator {name!r} and the absolute error of each component against the "
         "window's length: median and the band from 5 to 95 % of {count:,} bursts, locked or not. "
-        "Dashed: three times the potential spread of the window, prior included, the paper's limit. Dotted: one "
+        "Dashed: three times the Cramér–Rao bound of the window, prior included, the paper's limit. Dotted: one "
         "burst, the first of the run, as the paper's figure 2 shows one.",
         name=name,
         count=result.count,
@@ -125,7 +125,7 @@ def locks(result: CaseResult, tables_by_name: Mapping) -> Figure:
         filter_rows = rows[(result.name, name)]
         marks.append(figure_lines.line_from_rows(filter_rows, ("t_s", "lock_rate", "lock_lo", "lock_hi"), name, n))
     caption = tr(
-        "A burst is locked if every component is within five potential spreads of the window (without "
+        "A burst is locked if every component is within five times the Cramér–Rao bound of the window (without "
         "prior; the phase modulo one turn); of {count:,} bursts. Bands: 95 % intervals.",
         count=result.count,
     )
@@ -165,8 +165,8 @@ def accuracy(result: CaseResult, tables_by_name: Mapping) -> Figure:
             axis = Axis(tr("$\\sigma$ / bound"), limits=(0.9, 1.3))
             panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), axis, tuple(marks), name, direct=False))
     caption = tr(
-        "Root-mean-square error of the locked bursts over the potential spread of the window, prior "
-        "included. Bands: 95 % intervals. {count:,} bursts; lock is judged at five spreads without "
+        "Root-mean-square error of the locked bursts over the Cramér–Rao bound of the window, prior "
+        "included. Bands: 95 % intervals. {count:,} bursts; lock is judged at five times the bound without "
         "prior.",
         count=result.count,
     )

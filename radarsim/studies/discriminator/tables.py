@@ -1,7 +1,7 @@
 """Tables of a burst's Doppler frequency and its derivatives (P4).
 
-Here `k` is the window and `t_s` its length. A burst is locked where all components are within five potential σ of that
-window."""
+Here `k` is the window and `t_s` its length. A burst is locked where all components are within five times the
+Cramér–Rao bound of that window."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -36,10 +36,10 @@ def plain_bursts(result: CaseResult) -> int:
 
 @table("curves")
 def _curves(result: CaseResult) -> common.Columns:
-    """As everywhere, window by window, of the locked bursts; `exact_sigma` is the potential σ.
+    """As everywhere, window by window, of the locked bursts; `exact_sigma` is the Cramér–Rao bound.
 
     sigma_all [unit]: σ of all bursts, none dropped
-    posterior_crb [unit]: the potential σ with the prior
+    posterior_crb [unit]: the bound with the prior
     """
     axes, indices = result.axes, common.row_index(result)
     f, k, c = indices
@@ -85,10 +85,10 @@ def _at_windows(result: CaseResult) -> tuple[np.ndarray, np.ndarray]:
 def _locks(result: CaseResult) -> common.Columns:
     """How many bursts lock, at each window; with the key `rare` by the weights of `rare.csv`.
 
-    lock_rate ± lock, lock_rate_3sigma: share within five and within three potential σ
-    posterior_lock_rate, posterior_lock_rate_3sigma: within as many σ with the prior
-    unbroken_lock_rate_3sigma ±: within three potential σ at this and all earlier windows
-    unbroken_posterior_lock_rate_3sigma ±: within three σ with the prior at all of these
+    lock_rate ± lock, lock_rate_3sigma: share within five and within three times the bound
+    posterior_lock_rate, posterior_lock_rate_3sigma: within as many times the bound with the prior
+    unbroken_lock_rate_3sigma ±: within three times the bound at this and all earlier windows
+    unbroken_posterior_lock_rate_3sigma ±: within three times the bound with the prior at all of these
     energy_ratio: μ of the window
     """
     f, k = _at_windows(result)
@@ -143,7 +143,7 @@ def _residuals(result: CaseResult) -> common.Columns:
     """Size of the errors of all bursts, locked or not, from the histograms.
 
     q05, median, q95 [unit]: 5 %, half and 95 % of the errors lie below
-    posterior_crb [unit]: the potential σ with the prior
+    posterior_crb [unit]: the bound with the prior
     """
     indices = f, k, c = common.row_index(result)
     bound = result.axes.posterior_sigma[indices]
@@ -193,7 +193,7 @@ def _windows(result: CaseResult) -> common.Columns:
 def _bounds(result: CaseResult) -> common.Columns:
     """What limits an estimate, by component.
 
-    prior_sigma [unit]: spread of the forecast
+    prior_sigma [unit]: standard deviation of the forecast
     crb [unit]: Cramér–Rao bound on σ by the closed form
     crb_sum [unit]: by the sum over samples
     shortest_window_s: T_min of (17)
@@ -223,11 +223,11 @@ def _is_whole(result: CaseResult, f: int, k: int) -> bool:
 
 @table("motion")
 def _motion(result: CaseResult) -> common.Columns:
-    """What the spreads mean for a target: λ/2 of those of f₀ and f₁.
+    """What the bounds mean for a target: λ/2 of those of f₀ and f₁.
 
     band, wavelength_m: metre, decimetre or centimetre, and the wavelength
     burst_point: its beginning or middle
-    sigma_velocity_mps, sigma_acceleration_mps2: potential σ of the radial velocity and acceleration there
+    sigma_velocity_mps, sigma_acceleration_mps2: bounds on the radial velocity and acceleration there
     """
     axes, rows = result.axes, []
     covariance, duration = axes.potential_covariance, axes.burst_s

@@ -1,8 +1,8 @@
 """The floor under σ: the lower bound for any estimator of a case that has the same plots.
 
-For a target that each realisation draws, the floor is the posterior Cramér-Rao bound (Van Trees 1968; with noise in the
+For a target that each realisation draws, the floor is the posterior Cramér–Rao bound (Van Trees 1968; with noise in the
 motion by the recursion of Tichavský, Muravchik & Nehorai, IEEE Trans. SP 46, 1998), for every estimator, biased or not.
-For a target that is the same in all realisations, it is the Cramér-Rao bound of the family of motions that the config
+For a target that is the same in all realisations, it is the Cramér–Rao bound of the family of motions that the config
 states, for estimators that are unbiased for the whole family; a biased one may lie below it. Where plots are linear and
 their errors Gaussian, there is an estimator that reaches it."""
 

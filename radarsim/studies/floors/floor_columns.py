@@ -34,7 +34,7 @@ def floors(study: "Study", results: "Sequence[CaseResult]") -> "pd.DataFrame":
 def with_floors(curves: "pd.DataFrame", floors: "pd.DataFrame") -> "pd.DataFrame":
     """Curves with the floor of each row; empty where none is known.
 
-    floor [unit]: what no estimator does better than with the plots that the filter is given up to the scan
+    floor [unit]: lower bound on σ (CRB) for the plots that the filter is given up to the scan
     floor_kind: `CRB`, of a target that is the same in all realisations, under unbiased estimators; `posterior CRB`, of
         a random one, under any; and how missed plots count, see `docs/methods.md`
     """

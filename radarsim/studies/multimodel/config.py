@@ -256,7 +256,7 @@ class Keys(study_keys.StudyKeys):
     baseline: study_keys.Baseline = study_keys.BASELINE
     start_acceleration_mps2: Annotated[NonNegative, DesignMark()] = key(
         "σ of the acceleration at the start of a track",
-        "spread of the acceleration that the start of a track allows for, m/s²",
+        "standard deviation of the acceleration that the start of a track allows for, m/s²",
         30.0,
     )
     scans: Annotated[int | None, key_types.WholeNumber(4, MOST_SCANS), DesignMark()] = key(

@@ -297,7 +297,7 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
         probability_panels = panel_layout.with_legend_cell(probability_panels)
     caption = (
         tr(
-            "Mean posterior probabilities of the models; the numbers after the motions are the spreads of "
+            "Mean posterior probabilities of the models; the numbers after the motions are the standard deviations of "
             "the random acceleration, m/s². Dotted: ends of the stages."
         )
         + left_out
@@ -390,7 +390,7 @@ def _motions(models: Sequence) -> list[str]:
     return [f"{tr(MOTIONS[model.motion])} {numeral(f'{model.sigma_acceleration_mps2:g}')}" for model in models]
 
 
-MOTIONS = {"uniform": term("uniform"), "accelerated": term("accelerated"), "still": term("still")}
+MOTIONS = {"uniform": term("constant velocity"), "accelerated": term("constant acceleration"), "still": term("still")}
 
 
 def _case_sentence(result: CaseResult, results: Sequence[CaseResult]) -> str:

@@ -27,9 +27,9 @@ class PulsesToTracks(Study):
     filters = {
         "observes: [range]": "Kalman filter on range alone, which needs no burst",
         "estimator: sequence": "with the velocity, or velocity and acceleration, that P4's sequence estimates",
-        "estimator: dense": "the same with twice as many windows; cured: with a search where coherence is short",
-        "estimator: spectrum": "the same by the classical method: the peak of the spectrum, then scoring",
-        "estimator: fisher_bound": "the idealisation: Gaussian errors of the Fisher bound, which always lock",
+        "estimator: dense": "twice as many windows; cured: the sequence corrected by a search where coherence is short",
+        "estimator: spectrum": "the same by the classical method: the peak of the spectrum, then Fisher scoring",
+        "estimator: fisher_bound": "the idealisation: Gaussian errors at the Cramér–Rao bound, which always lock",
     }
 
     def keys(self) -> "type[Keys]":

@@ -22,7 +22,7 @@ MAX_RATIO_OF_IDEAL = 1.05  # σ over its idealisation's, up to which the idealis
 
 
 def warnings(experiment: Experiment) -> list[str]:
-    """A line for each config whose forecasts are wider than the span of velocity, if a filter takes the nearest fold.
+    """A line for each config whose forecasts exceed the unambiguous interval, if a filter takes the nearest fold.
 
     No burst alone can tell the fold then."""
     lines: dict[str, None] = {}
@@ -31,8 +31,8 @@ def warnings(experiment: Experiment) -> list[str]:
         reach = 3 * spec.prior.sigma_velocity_mps
         if reach > spec.span_mps / 2 and any(f.hypotheses == 1 for f in spec.filters):
             text = tr(
-                "3 σ of the velocity, {reach:g} m/s, are over half the span of {span:g} m/s: first bursts may be taken "
-                "in a wrong fold",
+                "3 σ of the velocity, {reach:g} m/s, are over half the unambiguous interval of {span:g} m/s: first "
+                "bursts may be taken in a wrong ambiguity",
                 reach=reach,
                 span=spec.span_mps,
             )
@@ -102,12 +102,13 @@ def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Senten
 
 
 def _burst_sentence(result: Result, case: str, sigma: float) -> Sentence:
-    """What a burst allows: its pulses, length and energy, and the Fisher bound of the velocity."""
+    """What a burst allows: its pulses, length and energy, and the Cramér–Rao bound of the velocity."""
     spec, energy_db = result.spec, result.axes.energy_db
     low, high = float(energy_db.min()), float(energy_db.max())
     energy = tr("{low:.3g} dB", low=low) if high - low < 0.05 else tr("{low:.3g} to {high:.3g} dB", low=low, high=high)
     text = tr(
-        "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Fisher bound).",
+        "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Cramér–Rao "
+        "bound).",
         case=case,
         pulses=spec.pulses,
         burst_ms=1e3 * spec.burst_s,

@@ -133,7 +133,7 @@ class Filter(Model):
     estimator: Literal["sequence", "dense", "cured", "spectrum", "fisher_bound"] | None = key(
         "estimator",
         "how the burst is estimated: P4's sequence of windows, with twice as many, with the search where coherence "
-        "is short; peak of the spectrum and scoring; or ideal Gaussian errors; default: cured",
+        "is short; peak of the spectrum and Fisher scoring; or ideal Gaussian errors; default: cured",
         None,
     )
     forecast: Literal["track"] | Forecast | None = key(

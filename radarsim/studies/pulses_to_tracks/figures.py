@@ -64,7 +64,7 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
         return {}
     caption = tr(
         "P(not locked): share of bursts that do not lock, at the worst scan: velocity (or acceleration, "
-        "where used) in error by more than five Fisher bounds; where all lock there is no point. "
+        "where used) in error by more than five times its Cramér–Rao bound; where all lock there is no point. "
         "σ of the range at the last scan. Bands: 95 % intervals."
     )
     figure = Figure(
@@ -141,17 +141,19 @@ def folds_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") ->
         _line(result, name, filter_rows, ("t_s", "right", "right_lo", "right_hi"))
         for (name,), filter_rows in rows.items()
     ]
-    return Panel(panel_layout.time_axis(), Axis(tr("P(no wrong fold)"), limits=(0, 1)), tuple(marks), _title(result))
+    return Panel(
+        panel_layout.time_axis(), Axis(tr("P(no wrong ambiguity)"), limits=(0, 1)), tuple(marks), _title(result)
+    )
 
 
 def measured_panel(result: Result, tables_by_name: "Mapping[str, pd.DataFrame]") -> Panel:
-    """Errors of the measured velocity of all bursts against time, and the Fisher bound."""
+    """Errors of the measured velocity of all bursts against time, and the Cramér–Rao bound."""
     rows = tables.group_by(tables.select_rows(tables_by_name["estimates"], case=result.name, component="Vr"), "filter")
     columns = ("t_s", "sigma_all", "sigma_all_lo", "sigma_all_hi")
     marks = [_line(result, name, filter_rows, columns) for (name,), filter_rows in rows.items()]
     if rows:
         marks.append(
-            figure_lines.line_from_rows(next(iter(rows.values())), ("t_s", "crb"), tr("Fisher bound"), Style(9, 1))
+            figure_lines.line_from_rows(next(iter(rows.values())), ("t_s", "crb"), tr("Cramér–Rao bound"), Style(9, 1))
         )
     y = panel_layout.fitting_axis(tr("$\\sigma$ of measured $V_r$, m/s"), marks)
     return Panel(panel_layout.time_axis(), y, tuple(marks), _title(result))
@@ -179,7 +181,7 @@ STUDY_FIGURES: dict[str, tuple[Draw, str, str]] = {
         term("Bursts that do not lock"),
         term(
             "Share of bursts whose velocity (or acceleration, where used) is in error by more than five "
-            "Fisher bounds. Bands: 95 % intervals. Idealisations, and estimators that lost fewer than 20 "
+            "times its Cramér–Rao bound. Bands: 95 % intervals. Idealisations, and estimators that lost fewer than 20 "
             "bursts in all, are left out."
         ),
     ),

@@ -86,7 +86,7 @@ def _scans(result: Result, visible: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _locks(result: Result) -> report_tables.Columns:
     """How many bursts lock, by scan.
 
-    lock_rate ± lock, lock_rate_3sigma: share within five, or three, Fisher bounds of the truth in all that is taken
+    lock_rate ± lock, lock_rate_3sigma: share within five, or three, times the Cramér–Rao bound in all that is taken
     used_share: those taken into the track; of a mixture the mean weight
     wrong_fold_share ±: those taken in a fold that is not the truth's
     """

@@ -100,9 +100,13 @@ def _ambiguity_sentences(results: Sequence[Result]) -> list[Sentence]:
         if "repetition_rate_hz" in result.spec.radar.model_fields_set and (result.axes.observes == 2).any():
             span, speed = span_mps(result), result.axes.speed_mps
             if 2 * speed < span:
-                text = tr("a span of {span:.4g} m/s", span=span)
+                text = tr("an unambiguous interval of {span:.4g} m/s", span=span)
             else:
-                text = tr("a span of {span:.4g} m/s, which folds the target's {speed:.4g} m/s", span=span, speed=speed)
+                text = tr(
+                    "an unambiguous interval of {span:.4g} m/s, which folds the target's {speed:.4g} m/s",
+                    span=span,
+                    speed=speed,
+                )
             spans.setdefault(key_labels.without_markup(key_labels.config_device(result)), text)
     if not spans:
         return []

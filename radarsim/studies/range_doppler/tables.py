@@ -238,7 +238,7 @@ def _radar(result: Result) -> common.Columns:
     C_theta: σ_r²/(Δt²σ_V²) (eq. 11)
     speed_mps: the target's greatest radial speed at a scan
     doppler_hz, doppler_per_repetition_rate: its Doppler frequency 2V/λ, also over the repetition rate
-    unambiguous_velocity_mps: unambiguous span of velocity λF/2
+    unambiguous_velocity_mps: unambiguous velocity interval λF/2
     """
     axes = result.axes
     doppler = 2 * axes.speed_mps / axes.wavelength_m

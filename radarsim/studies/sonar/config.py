@@ -87,7 +87,7 @@ class Keys(study_keys.StudyKeys):
         tuple[Detector, ...], Field(max_length=8), AfterValidator(study_keys.unique_names), DesignMark()
     ] = key("detectors", "manoeuvre detectors that are evaluated on the plots", ())
     uses: Annotated[Uses | None, DesignMark()] = key(
-        "uses of the track",
+        "quantities derived from the track",
         "course, speed, predicted position and closest approach, with their σ; none: left out",
         None,
     )

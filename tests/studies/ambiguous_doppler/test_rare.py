@@ -364,7 +364,7 @@ def test_tables_have_the_rate_with_its_interval():
     assert row["event_rate"] == weight / 6000
     assert row["events"] == number
     assert_rounded(row["n_eff"], weight**2 / square, operations=3)
-    assert row["event_rate_lo"] < row["event_rate"] < row["rate_hi"]
+    assert row["event_rate_lo"] < row["event_rate"] < row["event_rate_hi"]
     assert row["variance_factor"] > 5
     assert list(table["sought"]) == [True, False, False]
     assert list(table["event"]) == ["wrong fold", "wrong fold", "wrong fold that found no room"]

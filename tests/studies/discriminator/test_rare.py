@@ -300,7 +300,7 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert row["event_rate"] == weight / 3000
     assert row["events"] == number
     assert row["n_eff"] == pytest.approx(weight**2 / square, rel=rounding(operations=3))
-    assert row["event_rate_lo"] < row["event_rate"] < row["rate_hi"]
+    assert row["event_rate_lo"] < row["event_rate"] < row["event_rate_hi"]
     assert row["variance_factor"] > 5
     assert list(table["sought"]) == [True, False]
     locks = result.tables["locks"]

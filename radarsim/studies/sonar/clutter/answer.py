@@ -101,7 +101,7 @@ def _false_tracks_sought(rows: "pd.DataFrame") -> Sentence:
     """The events from which importance sampling has the rates of false tracks, by tracker."""
     trackers = (
         tr(
-            "{filter}, {events:,} of them, {n_eff:,.0f} effective",
+            "{filter} ({events:,} events, effective sample size {n_eff:,.0f})",
             filter=row["filter"],
             events=row["events"],
             n_eff=row["n_eff"],
@@ -115,10 +115,12 @@ def _ended_tracks_sought(rows: "pd.DataFrame") -> Sentence:
     """How rarely the target's track ends by importance sampling, and from how many events, by tracker."""
     trackers = (
         tr(
-            "{filter}, {rate:.3g} [{low:.3g}, {high:.3g}] from {events:,} of them, {n_eff:,.0f} effective",
+            "{filter} {rate:.3g} [{low:.3g}, {high:.3g}] ({events:,} events, effective sample size {n_eff:,.0f})",
             filter=row["filter"],
             **rare_events.rate_fields(row),
         )
+        if rare_events.is_estimated(row)
+        else tr("{filter}: no estimate (effective sample size {n_eff:,.0f})", filter=row["filter"], n_eff=row["n_eff"])
         for _, row in rows.iterrows()
     )
     text = tr(

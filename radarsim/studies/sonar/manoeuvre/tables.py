@@ -1,4 +1,4 @@
-"""Tables of detectors of manoeuvres, of filters that respond to them, and of uses of a track (P3).
+"""Tables of detectors of manoeuvres, of filters that respond to them, and of quantities derived from a track (P3).
 
 The `filter` of a detector's row is the detector; `component` may be `joint`, too.
 
