@@ -469,13 +469,13 @@ def test_a_covariance_that_is_none_does_not_enter_nees(estimates):
 def test_below_the_floor_it_is_said_why(estimates):
     truth = radarsim.plots("rls2", n=300).truth
     answer = radarsim.judge("rls2", (estimates + 3 * truth) / 4).answer
-    found = next(line for line in answer if line.startswith("The floor there"))
+    found = next(line for line in answer if line.startswith("There the "))
     assert re.search(r"mine is 7\d\.?\d* % \[[^]]*\] below it;", found)
     perfect = radarsim.judge("rls2", truth).answer[0]
     assert perfect.startswith(
         "mine is better than r+Vr, the config's best in r at 140 s: gain 100 % [100, 100]; its σ is 0 "
     )
-    assert found.endswith("Below it is only what is biased, or knows more than these plots.")
+    assert found.endswith("Only a biased estimator, or one with extra information, can lie below it.")
 
 
 # ---- other sources ---------------------------------------------------------------------------------------------------

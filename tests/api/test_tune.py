@@ -332,7 +332,7 @@ def test_a_rival_that_is_the_tuned_filter_gains_nothing_on_it():
 def test_both_rivals_stand_beside_the_floor():
     result = radarsim.judge("rls2", lambda plots: plots["range_m"], name="raw", against="tuned",
                             realisations=100)  # fmt: skip
-    (floor,) = [line for line in result.answer if line.startswith("The floor there")]
+    (floor,) = [line for line in result.answer if line.startswith("There the ")]
     sigma = result.curves.query("filter == 'raw' and component == 'r' and k == 15")[["sigma", "sigma_lo", "sigma_hi"]]
     least = result.curves.query("filter == 'raw' and component == 'r' and k == 15")["floor"].item()
     value, lo, hi = (f"{100 * (one / least - 1):.3g}" for one in sigma.to_numpy()[0])

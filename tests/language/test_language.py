@@ -24,13 +24,13 @@ def _english(monkeypatch):
 
 
 def test_numbers_are_written_as_the_language_writes_them():
-    assert tr("a span of {span:.4g} m/s", span=-1.5) == "a span of −1.5 m/s"
+    assert tr("an unambiguous interval of {span:.4g} m/s", span=-1.5) == "an unambiguous interval of −1.5 m/s"
     assert numeral("-1,234.5") == "−1,234.5"
-    assert tr("a span of {span:.4g} m/s", span=6.678e9) == "a span of 6.678·10⁹ m/s"
+    assert tr("an unambiguous interval of {span:.4g} m/s", span=6.678e9) == "an unambiguous interval of 6.678·10⁹ m/s"
     assert numeral("+1e-05") == "+10⁻⁵"
     with use_language("ru"):
         assert numeral("1.72e-05") == "1,72·10⁻⁵"
-        assert tr("a span of {span:.4g} m/s", span=-1.5) == "интервал однозначности −1,5 м/с"
+        assert tr("an unambiguous interval of {span:.4g} m/s", span=-1.5) == "интервал однозначности −1,5 м/с"
         assert numeral("-1,234.5") == "−1\N{NARROW NO-BREAK SPACE}234,5"
         assert wording.number(2.5e-7) == "2,5·10⁻⁷"
         assert wording.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"

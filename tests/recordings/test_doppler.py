@@ -65,7 +65,7 @@ def test_track_and_fit_notice_folded_velocities(flown, tmp_path, monkeypatch):
     csv_output.write_columns(folded(flown), "folded.csv")
     for config, span in (
         (options(*KNOWING), "the config's span is 60.0 m/s"),
-        (options(), "the plots suggest a span of"),
+        (options(), "the plots suggest an unambiguous interval of"),
     ):
         text = command("track", "rls2", "folded.csv", "-o", "track.csv", *config).stdout
         assert "the velocities are folded: none is beyond ±" in text

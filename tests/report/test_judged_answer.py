@@ -23,7 +23,7 @@ def judged(target, **options):
 
 
 def floor_sentence(answer):
-    return next(line for line in answer if line.startswith("The floor there"))
+    return next(line for line in answer if line.startswith("There the "))
 
 
 def test_an_equal_filter_has_the_exact_number_and_no_other():
@@ -73,7 +73,7 @@ def test_below_a_posterior_bound_is_nothing_that_sees_only_the_plots():
     knowing = plots.truth[..., 0] + 0.1 * (plots["range_m"] - plots.truth[..., 0])
     result = judged(knowing, realisations=300, overrides={"target": DRAWN_TARGET})
     floor = floor_sentence(result.answer)
-    assert "the posterior Cramér-Rao bound" in floor
+    assert "the posterior Cramér–Rao bound" in floor
     assert "Below it no estimator can be, biased or not" in floor
     assert "biased, or knows" not in floor
     assert re.search(r": mine is \d\d\.\d % \[\d\d\.?\d*, \d\d\.?\d*\] below it; above it is r\+Vr \d", floor)

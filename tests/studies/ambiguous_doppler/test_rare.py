@@ -375,7 +375,7 @@ def test_tables_have_the_rate_with_its_interval():
     weight = sums["events"][0, -1, weighted_sums.BEYOND, 0]
     assert last["beyond_half_interval_share"] == weight / 6000
     assert result.curves["n"].max() <= row["n_plain"]
-    assert "by importance sampling" in " ".join(result.answer)
+    assert "(importance sampling; " in " ".join(result.answer)
     assert not any("rare event" in line for line in result.warnings)
 
 

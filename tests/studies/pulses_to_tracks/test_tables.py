@@ -106,7 +106,7 @@ def test_sentences(result):
     study, experiment = registry.study("pulses_to_tracks"), load("pulses")
     assert study.question(experiment).startswith("What are the bursts of RLS 4 worth to the track")
     sentences = answer_texts(study, result.cases, result.tables)
-    assert sentences[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Fisher bound)."
+    assert sentences[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Cramér–Rao bound)."
     assert len(sentences) == 7
     ratios = result.tables["idealisations"].query("component == 'r'").groupby("filter").tail(1)
     ratios = ratios.set_index("filter")["paired_over_ideal"]

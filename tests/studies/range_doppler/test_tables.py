@@ -363,9 +363,9 @@ def test_answer_says_that_velocities_are_not_folded(expected_radar):
     plain, rated = expected_radar("rls2"), expected_radar("rls2", radar={"repetition_rate_hz": 1000})
     assert not any("unambiguous" in one for one in told_of([plain]))
     (said,) = [one for one in told_of([rated]) if "unambiguous" in one]
-    assert "a span of 75 m/s, which folds the target's 310 m/s" in said
+    assert "an unambiguous interval of 75 m/s, which folds the target's 310 m/s" in said
     fast = expected_radar("rls2", radar={"repetition_rate_hz": 1e5})
-    assert any("a span of 7500 m/s)" in one for one in told_of([fast]))
+    assert any("an unambiguous interval of 7500 m/s)" in one for one in told_of([fast]))
 
 
 def test_answer_gives_the_variance_that_was_looked_for(expected_radar):
