@@ -48,9 +48,9 @@ TAIL_OF_DIFFERENCES = 16
 # Of every row of a table: what its interval is of, not that it rests on too little. What is computed at an estimate has
 # a spread of its own: ratios of `sonar_manoeuvre` cover 93 %, one in twenty 31.
 BELIEVED_VARIES = RowNote("varies", "interval of sigma alone: the believed one varies from one realisation to the next")
-# Tables that bring all their notes, and one whose mean squares are of several components and bounded: unmarked or
-# marked by these rules, rows of NEES and NIS cover 95 … 97 %.
-WITHOUT_RULES = ("rare", "consistency")
+# Tables that bring all their notes; one whose mean squares are of several components and bounded: unmarked or marked by
+# these rules, rows of NEES and NIS cover 95 … 97 %; and one of probabilities, of which the tail of σ tells nothing.
+WITHOUT_RULES = ("rare", "consistency", "modes")
 CURVE_KEY = ["case", "filter", "component", "k"]
 
 
