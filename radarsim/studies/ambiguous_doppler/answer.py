@@ -46,8 +46,10 @@ def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     names = join_names(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
     if any(f.folds for case in experiment.cases for f in case.spec.filters):
-        return tr("How much is the folded velocity of {radars} worth, and from which scan on?", radars=names)
-    return tr("Which model order suits the target of {radars}, and how should several be combined?", radars=names)
+        return tr("How much does ambiguous Doppler help {radars}, and from which scan on?", radars=names)
+    return tr(
+        "Which model order suits the target of {radars}, and how should several orders be combined?", radars=names
+    )
 
 
 def answer(

@@ -35,8 +35,7 @@ def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     names = list(dict.fromkeys(e.name for case in experiment.cases for e in case.spec.estimators))
     return tr(
-        "How often does an estimate by {estimators} lock onto the Doppler frequency and its derivatives, and how "
-        "accurate is it then?",
+        "How often does the Doppler estimate of a burst lock, and how accurate is it then ({estimators})?",
         estimators=shorten_names(names),
     )
 

@@ -20,11 +20,13 @@ def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
     cases = len(experiment.cases)
+    if len(filters) == 1:
+        return tr("How accurately does {filter} track the target?", filter=filters[0])
     if cases == 1:
-        return tr("How accurately do {filters} track the target?", filters=shorten_names(filters))
+        return tr("Which filter tracks the target best: {filters}?", filters=shorten_names(filters))
     return plural(
-        "How accurately do {filters} track the target in {count} case?",
-        "How accurately do {filters} track the target in {count} cases?",
+        "Which filter tracks the target best in {count} case: {filters}?",
+        "Which filter tracks the target best in {count} cases: {filters}?",
         cases,
         filters=shorten_names(filters),
     )

@@ -1,11 +1,13 @@
 """What the report of the chain asks and answers, in sentences."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.config.experiment import Experiment
+from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, term, tr
 from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
 from radarsim.report.quantities import LOCK, Quantity
@@ -42,11 +44,13 @@ def warnings(experiment: Experiment) -> list[str]:
 
 def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
-    names = join_names(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
-    return tr(
-        "What are the bursts of {radars} worth to the track, and what does a burst that does not lock cost?",
-        radars=names,
-    )
+    names = list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases))
+    if len(names) > 1:
+        return tr(
+            "How well do {radars} track from their pulse bursts, and what does a failed burst cost?",
+            radars=join_names(names),
+        )
+    return tr("How well does {radar} track from its pulse bursts, and what does a failed burst cost?", radar=names[0])
 
 
 def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
@@ -145,8 +149,12 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
     """The least share of a scan's bursts that lock, and σ of the range at the last scan over its idealisation's."""
     locks = tables.select_rows(tables_by_name["locks"], case=result.name, filter=name)
     _, least = compared_value.extreme(locks, LOCK, largest=False)
-    share = wording.share(*(100 * end for end in least.estimate)) + least.choice_remark()
-    locked = tr("at least {share} of the bursts of a scan lock", share=share)
+    if least.value == 1:
+        low = numeral(f"{math.floor(1e4 * least.estimate.lo) / 100:.2f}")
+        locked = tr("{low} % or more of the bursts of a scan lock", low=low) + least.choice_remark()
+    else:
+        share = wording.share(*(100 * end for end in least.estimate)) + least.choice_remark()
+        locked = tr("at least {share} of the bursts of a scan lock", share=share)
     ratios = tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
     final = ratios.iloc[-1]
     if final[RATIO.ends[1]] <= MAX_RATIO_OF_IDEAL:

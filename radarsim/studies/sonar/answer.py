@@ -35,7 +35,7 @@ def question(specs: Sequence[Keys]) -> str:
     if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
         return tr("What does a missed plot cost?")
     names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
-    return tr("How accurate are range and bearing smoothed by {filters}?", filters=shorten_names(names))
+    return tr("How accurate are smoothed range and bearing ({filters})?", filters=shorten_names(names))
 
 
 def _has_correlated_errors(specs: Sequence[Keys]) -> bool:

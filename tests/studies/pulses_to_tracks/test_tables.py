@@ -104,7 +104,7 @@ def test_the_cure_is_the_cheapest_of_the_sequences(result):
 
 def test_sentences(result):
     study, experiment = registry.study("pulses_to_tracks"), load("pulses")
-    assert study.question(experiment).startswith("What are the bursts of RLS 4 worth to the track")
+    assert study.question(experiment).startswith("How well does RLS 4 track from its pulse bursts")
     sentences = answer_texts(study, result.cases, result.tables)
     assert sentences[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Cramér–Rao bound)."
     assert len(sentences) == 7

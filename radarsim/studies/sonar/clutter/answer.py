@@ -20,8 +20,8 @@ MAX_CASES = 3  # each with a sentence on its trackers
 def question(specs: Sequence[Keys]) -> str:
     """The question of cases whose filters have to find their plots."""
     return tr(
-        "How reliably and how soon is a target's track confirmed among false and missed plots, how long "
-        "is it kept, and how many false tracks does that cost?"
+        "How soon and how surely is a track confirmed among false and missed plots, how long does it live, and how "
+        "many false tracks come with it?"
     )
 
 

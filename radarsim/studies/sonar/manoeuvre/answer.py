@@ -38,10 +38,10 @@ USES = {
 def question(specs: Sequence[Keys]) -> str:
     """The question of cases with detectors, filters that respond to manoeuvres, or uses."""
     if any(spec.detectors for spec in specs):
-        return tr("How reliably and how soon is a manoeuvre detected, and what do filters that respond to it gain?")
+        return tr("How soon and how surely is a manoeuvre detected, and what do adaptive filters gain?")
     if any(spec.uses for spec in specs):
         return tr("How well are course, speed, position ahead and closest approach known from a track?")
-    return tr("What do filters that respond to manoeuvres gain?")
+    return tr("What do filters that adapt to manoeuvres gain?")
 
 
 def answer(

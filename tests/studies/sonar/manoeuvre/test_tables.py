@@ -177,7 +177,7 @@ def test_claims_are_judged(result, tables):
 
 def test_words(result, tables):
     told = answer_texts(STUDY, result.cases, tables)
-    assert STUDY.question(result.experiment).startswith("How reliably and how soon is a manoeuvre detected")
+    assert STUDY.question(result.experiment).startswith("How soon and how surely is a manoeuvre detected")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
         sentence.startswith("Measured σ of quantities derived from the track over σ from its covariance (growing, ")
