@@ -20,6 +20,7 @@ from pathlib import Path
 import radarsim
 from radarsim.api import result_content
 from radarsim.api.doppler_chart import describe_chart
+from radarsim.report import caption_remarks
 from radarsim.report.drawing import canvas
 from radarsim.report.drawing.model import Figure
 from radarsim.report.math_text import plain_text
@@ -99,7 +100,10 @@ def picture_text(page: Path, parts: list[tuple[str, Figure, Path]]) -> str:
         f"![{plain_text(figure.title)}]({Path(os.path.relpath(file, page.parent)).as_posix()})"
         for _, figure, file in parts
     ]
-    captions = [f"*{plain_text(figure.title)}.* {plain_text(figure.caption)}" for _, figure, _ in parts]
+    captions = [
+        f"*{plain_text(figure.title)}.* {plain_text(figure.caption)} {caption_remarks.conventions([figure])}".rstrip()
+        for _, figure, _ in parts
+    ]
     if len(parts) > 1:
         captions = [f"* {caption}" for caption in captions]
         return "\n".join(images) + "\n\n" + "\n".join(captions) + "\n"

@@ -18,14 +18,12 @@ from radarsim.report import (
     compared_value,
     gain_sentences,
     interval_notes,
-    panel_layout,
     sentences,
 )
 from radarsim.report import tables as common
 from radarsim.report.drawing.model import Figure, reworded
 from radarsim.report.math_text import plain_text
 from radarsim.report.quantities import GAIN
-from radarsim.report.row_notes import has_note
 from radarsim.report.sentences import Sentence
 from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.studies.floors import floor_columns
@@ -115,11 +113,13 @@ MAX_BASELINE_SENTENCES = 6  # on baselines after the first
 class Answer(NamedTuple):
     """The answer of an experiment: its sentences, and warnings on the intervals that they rest on.
 
-    main_count: how many of the sentences, which come first, `radarsim judge` prints."""
+    main_count: how many of the sentences, which come first, `radarsim judge` prints; tables: those on which each
+    sentence rests."""
 
     texts: tuple[str, ...]
     warnings: tuple[str, ...]
     main_count: int
+    tables: tuple[frozenset[str], ...]
 
 
 def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
@@ -142,12 +142,14 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
     ]
     names = config_names(results)
     texts = [translate_names(str(sentence), names) for sentence in answer]
+    tables = [frozenset(interval.table for interval in sentence.intervals) for sentence in answer]
     if further_baselines:
         texts.append(tr("Further gains are in gains.csv."))
+        tables.append(frozenset(["gains"]))
     warnings = [
         translate_names(line, names) for line in answer_warnings.answer_warnings(results, tables_by_name, answer)
     ]
-    return Answer(tuple(texts), tuple(warnings), len(main))
+    return Answer(tuple(texts), tuple(warnings), len(main), tuple(tables))
 
 
 def question_text(experiment: Experiment) -> str:
@@ -232,8 +234,6 @@ def case_figures(
 
         curves = common.group_by(figure_tables["curves"], "case", "filter", "component")
         figures_by_name |= sweep_figures.sweep_figures(drawn_results, curves)
-    if any(has_note(table).any() for table in tables_by_name.values()):
-        figures_by_name = {name: panel_layout.with_remark_on_bands(figure) for name, figure in figures_by_name.items()}
     translate = partial(translate_names, names=config_names(results))
     return {
         name: coinciding_lines.join_coinciding_lines(
@@ -281,5 +281,7 @@ def captions(figures_by_name: Mapping[str, Figure]) -> str:
     parts = []
     for name, figure in figures_by_name.items():
         caption = f"**{plain_text(figure.title)}.** {plain_text(figure.caption)}\n"
-        parts.append("\n\n".join(filter(None, (f"## {name}", figure.headline, caption))))
-    return "\n".join([f"# {tr('Captions')}\n", *parts])
+        headline = "" if figure.headline == plain_text(figure.title) else figure.headline
+        parts.append("\n\n".join(filter(None, (f"## {name}", headline, caption))))
+    shared = caption_remarks.conventions(figures_by_name.values())
+    return "\n".join([f"# {tr('Captions')}\n", *([f"{shared}\n"] if shared else []), *parts])

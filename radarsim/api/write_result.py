@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +24,10 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import AUTHOR_ERRORS, RadarsimError
 from radarsim.language.translate import tr
 from radarsim.report import atomic_files, csv_text, exact_check, provenance
+from radarsim.report.case_selection import swept_cases
 from radarsim.report.drawing.model import Figure
 from radarsim.report.drawing.page_figure import DrawnFigure
+from radarsim.report.page_links import tables_behind_figure
 from radarsim.report.row_notes import with_note_texts
 from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.studies.registry import study
@@ -74,7 +76,7 @@ def write_files(
     the figures' files; width_mm overrides their width. Outputs of an earlier run that this one does not write are
     removed, so that nothing stale remains, except figures and the table of runs where the earlier run has the same
     numbers. Where figures or sentences of a package's study fail, only the tables are written."""
-    from radarsim.report import page, page_sentences
+    from radarsim.report import headlines, page
 
     if tables_by_name is None:
         tables_by_name = case_tables(results, configs.shipped_stem(experiment))
@@ -87,8 +89,12 @@ def write_files(
     try:
         figures_by_name = _selected_figures(experiment, results, tables_by_name) if draw else {}
         answer = make_answer(results, tables_by_name)
-        for name in [*figures_by_name][:1]:
-            figures_by_name[name] = replace(figures_by_name[name], headline=page_sentences.headline(answer.texts))
+        sources = {
+            name: tables_behind_figure(name, case_study.drawn_from(), tables_by_name) for name in figures_by_name
+        }
+        figures_by_name = headlines.with_headlines(
+            figures_by_name, answer.texts, answer.tables, sources, swept_cases(results)
+        )
         question = question_text(experiment)
     except RadarsimError:
         raise

@@ -59,13 +59,7 @@ def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
         caption=plural(
             "Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged_claims), counted=counted
         )
-        + tr(
-            "For each claim, the part furthest from the paper's words: the measured value with the judged "
-            "interval, and the exact value, in margins of that part; beside it the value itself. What lies beyond "
-            "± {furthest:g} is drawn there, with an arrow. Below 0 it agrees with the words, up to 1 it is within "
-            "their margin. The marker shows the claim's class over all interpretations that its paper allows.",
-            furthest=MAX_DRAWN_MARGINS,
-        ),
+        + tr("Each claim's part furthest from the paper's words: below 0 it agrees, up to 1 it is within the margin."),
         panels=tuple(panels),
         width_mm=PAGE_MM,
     )

@@ -34,12 +34,9 @@ def specification_curve(claim: ClaimVerdicts) -> Figure:
         if len({verdict.interpretation[choice.key] for verdict in verdicts}) > 1
     ]
     caption = tr(
-        "{statement}. {outcome}. Above: distance of the claim's worst part from the paper's words, in "
-        "margins of that part, cut at ± {furthest:g}; below 0 it holds, above 1 it fails beyond the "
-        "margin. Below: the choices of each interpretation.",
+        "{statement}. Above: distance of the claim's worst part from the paper's words, in margins; below 0 it "
+        "holds. Below: the choices of each interpretation.",
         statement=tr(claim.claim.statement),
-        outcome=claim.sentence().capitalize(),
-        furthest=MAX_DRAWN_MARGINS,
     )
     if left_out := len(claim.impossible):
         note = plural(

@@ -1,4 +1,4 @@
-"""Remarks in the captions of figures: their number in the paper, the meaning of crosses, names of lines.
+"""Remarks in the captions of figures: their number in the paper, unusual crosses, names; and what holds in all.
 
 A caption says what is drawn; the numbers are in the answer, and in the titles of the marks."""
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from radarsim.language.translate import join_names, shorten_names, tr
+from radarsim.report.drawing.line_points import rough_points
 from radarsim.report.drawing.model import Figure, Line, Panel
 from radarsim.report.math_text import plain_text
 
@@ -20,12 +21,26 @@ def with_figure_number(figure: Figure, number: str) -> Figure:
 
 
 def with_meaning_of_crosses(figure: Figure) -> Figure:
-    """The figure with the meaning of its crosses, if any, in the caption."""
-    meanings = [panel.crosses or tr("exact values") for panel in figure.panels if _has_crosses(panel)]
+    """The figure with the meaning of its crosses in the caption, if that is another than exact values."""
+    meanings = [panel.crosses for panel in figure.panels if _has_crosses(panel) and panel.crosses]
     if not meanings:
         return figure
     remark = tr("Crosses: {called}.", called=join_names(list(dict.fromkeys(meanings))))
     return replace(figure, caption=f"{figure.caption} {remark}")
+
+
+def conventions(figures: Iterable[Figure]) -> str:
+    """What holds in all figures and their captions do not repeat, as far as any of these figures needs it."""
+    panels = [panel for figure in figures for panel in figure.panels]
+    lines = [mark for panel in panels for mark in panel.marks if isinstance(mark, Line)]
+    sentences = []
+    if any(line.lo is not None and np.isfinite(line.lo).any() for line in lines):
+        sentences.append(tr("Bands and whiskers: 95 % intervals."))
+    if any(rough_points(line).any() for line in lines):
+        sentences.append(tr("Thin lines and open points: rough, as a note in the table says."))
+    if any(_has_crosses(panel) and not panel.crosses for panel in panels):
+        sentences.append(tr("Crosses: exact values."))
+    return " ".join(sentences)
 
 
 def _has_crosses(panel: Panel) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import plural, tr
-from radarsim.report import caption_remarks
 from radarsim.report.key_labels import (
     config_device,
     config_stem,
@@ -43,6 +42,13 @@ def select_reported(results: Sequence[CaseResult], max_cases: int = 3) -> tuple[
         len(results) - 2,
     )
     return [results[0], results[-1]], [remark]
+
+
+def swept_cases(results: Sequence[CaseResult]) -> list[str]:
+    """How sentences name each of several swept cases (`after_swept_values`); none of a single one."""
+    if len(results) < 2:
+        return []
+    return [without_markup(swept_description(result)) for result in results if result.swept_values]
 
 
 def group_by_config(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
@@ -107,16 +113,12 @@ def _of_realisations(counts: Sequence[int]) -> str:
 
 
 def left_out_remark(all_names: Sequence[str], shown_names: Sequence[str]) -> str:
-    """Words on the omissions of a figure, after its caption: how many of how many it shows, and which are missing."""
+    """Words on the omissions of a figure, after its caption: how many of how many it shows."""
     missing = [name for name in all_names if name not in shown_names]
     if not missing:
         return ""
-    fields = {
-        "count": len(all_names) - len(missing),
-        "all": len(all_names),
-        "names": caption_remarks.join_few_names(map(without_markup, missing), MAX_MISSING_NAMES),
-    }
-    return " " + tr("Shown: {count} of {all}; only in the tables: {names}.", **fields)
+    shown = len(all_names) - len(missing)
+    return " " + tr("Shown: {count} of {all}; the others are in the tables.", count=shown, all=len(all_names))
 
 
 def distinct_case_names(results: Sequence[CaseResult]) -> list[str]:

@@ -43,8 +43,7 @@ def join_coinciding_lines(figure: Figure) -> Figure:
         )
         for panel in figure.panels
     )
-    remark = tr("Curves that coincide are drawn once, with both names.")
-    return replace(figure, panels=panels, caption=f"{figure.caption} {remark}")
+    return replace(figure, panels=panels, caption=f"{figure.caption} {tr('“=” joins curves that coincide.')}")
 
 
 def _joined_name(names: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from radarsim.config.experiment import Experiment
 from radarsim.extensions import ReportSection, extension_figures, extension_tables, extensions
 from radarsim.language.translate import tr
-from radarsim.report import provenance
+from radarsim.report import caption_remarks, provenance
 from radarsim.report.drawing import page_figure
 from radarsim.report.drawing.model import COLUMN_MM
 from radarsim.report.drawing.page_figure import DrawnFigure
@@ -70,6 +70,7 @@ def report_page(
         extent=provenance.extent(record),
         sections=sections,
         figures=_page_figures(figures),
+        conventions=caption_remarks.conventions(drawing.figure for drawing in figures),
         visible_figures=_count_visible_figures(figures),
         files=_figure_formats(figures, record["outputs"]),
         sources=sources,
@@ -130,6 +131,7 @@ def comparison_page(
         notes=notes,
         warnings=warnings,
         figures=_page_figures(figures),
+        conventions=caption_remarks.conventions(drawing.figure for drawing in figures),
         files=_figure_formats(figures, outputs),
         differ=_differences(differing),
         settings=[translated_table(title, keys) for title, keys in differing.items()],
@@ -172,6 +174,7 @@ def track_page(
         answer=answer,
         plots=plots,
         figures=_page_figures(figures),
+        conventions=caption_remarks.conventions(drawing.figure for drawing in figures),
         tables=[row_table(name, rows) for name, rows in tables.items() if rows],
         yaml=yaml,
         command=command,

@@ -80,24 +80,13 @@ def loss_axis(label: str, lines: Sequence[Line]) -> Axis:
     return Axis(label, "log", (float(values[values > 0].min(initial=1.0)) / 2, None))
 
 
-def with_remark_on_bands(figure: Figure) -> Figure:
-    """The figure, where a line has a band but not at all of its points, with words on why."""
-    lines = (mark for panel in figure.panels for mark in panel.marks if isinstance(mark, Line) and mark.lo is not None)
-    if not any((np.isnan(np.asarray(line.lo, float)) & np.isfinite(line.y)).any() for line in lines):
-        return figure
-    return replace(
-        figure, caption=f"{figure.caption} {tr('No band is drawn where a note marks the interval as unreliable.')}"
-    )
-
-
 def loss_lines(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
     """The complements of shares that have a loss, and words on zeros, which a logarithmic axis lacks, for a caption."""
     losses = tuple(map(complement_line, lines))
     visible = tuple(line for line in losses if (line.y > 0).any())
     names = [without_markup(line.name or line.label) for line in losses if not (line.y > 0).any()]
     remark = (
-        " "
-        + tr("Zero throughout, so not drawn: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
+        " " + tr("Zero throughout: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
         if names
         else ""
     )

@@ -99,7 +99,7 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
     if not panels_drawn:
         return None
     caption = tr(
-        "σ at the last scan against the {key}, of {realisations} each. Bands: 95 % intervals.",
+        "σ at the last scan against the {key}, of {realisations} each.",
         key=key_labels.key_label(members[0], key).text,
         realisations=case_selection.realisations_text(members),
     )

@@ -58,8 +58,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     panels = [_sigma_panel(title, members, curves, component, filters) for title, members in groups.items()]
     panels = [panel for panel in panels if panel.marks]
     caption = tr(
-        "Root-mean-square error of the {quantity} about the truth against time, of {realisations}. "
-        "Bands: 95 % intervals; a band that is not visible is narrower than the line.",
+        "Root-mean-square error of the {quantity} about the truth against time, of {realisations}.",
         quantity=component.words,
         realisations=realisations_text(results),
     )
@@ -102,7 +101,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     "filter", "component")."""
     caption = tr(
         "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
-        "Bands: 95 % intervals. Below zero: a loss.",
+        "Below zero: a loss.",
         quantity=component.words,
         base=results[0].axes.filters[results[0].axes.baseline],
         realisations=realisations_text(results),
@@ -205,8 +204,7 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
         return None
     caption = tr(
         "Errors of the {quantity} in cases with a mean error above the standard deviation at some time: mean error "
-        "(dynamic, bias) and standard deviation (fluctuation) of {realisations}; σ² is the sum "
-        "of their squares.",
+        "(bias) and standard deviation of {realisations}; σ² is the sum of their squares.",
         quantity=component.words,
         realisations=realisations_text(results),
     )

@@ -18,12 +18,18 @@ def figure(*panels):
     return Figure("f", "σ of the range", "How.", tuple(Panel(Axis("t"), Axis("y"), lines) for lines in panels))
 
 
-def test_caption_says_what_crosses_mean_only_where_a_point_has_one():
+def test_crosses_are_explained_once_and_unusual_ones_in_their_caption():
     without, with_some = figure((line("a", 1.0),)), figure((line("a", 1.0, exact=T),))
     assert caption_remarks.with_meaning_of_crosses(without).caption == "How."
-    assert caption_remarks.with_meaning_of_crosses(with_some).caption == "How. Crosses: exact values."
+    assert caption_remarks.with_meaning_of_crosses(with_some).caption == "How."
+    assert caption_remarks.conventions([without]) == ""
+    assert caption_remarks.conventions([without, with_some]) == "Crosses: exact values."
+    named = replace(with_some, panels=tuple(replace(panel, crosses="the law") for panel in with_some.panels))
+    assert caption_remarks.with_meaning_of_crosses(named).caption == "How. Crosses: the law."
+    assert caption_remarks.conventions([named]) == ""
     unknown = figure((line("a", 1.0, exact=np.full(5, np.nan)),))
     assert caption_remarks.with_meaning_of_crosses(unknown).caption == "How."
+    assert caption_remarks.conventions([unknown]) == ""
 
 
 def test_lines_below_a_limit_are_named_with_their_panels_if_there_are_several():
@@ -34,13 +40,9 @@ def test_lines_below_a_limit_are_named_with_their_panels_if_there_are_several():
     assert caption_remarks.lines_below(two, -4.0) == ""
 
 
-def test_every_figure_of_a_run_says_what_its_crosses_mean_and_no_other_does():
-    from radarsim.api import result_content
-    from radarsim.api.run import run
-
-    for config in ("rls2", "sonar_asynchronous"):
-        result = run(config, realisations=400)
-        for name, one in result_content.case_figures(result.cases, result.tables, result.experiment).items():
-            lines = [m for panel in one.panels for m in panel.marks if isinstance(m, Line) and m.exact is not None]
-            crossed = any(np.isfinite(m.exact).any() for m in lines)
-            assert ("Crosses" in one.caption) is crossed, name
+def test_conventions_are_those_that_figures_need():
+    ends = np.array([1.0, 1.0, np.nan, 1.0, 1.0])
+    banded = figure((replace(line("a", 1.0), lo=T, hi=T + 1),))
+    rough = figure((replace(line("a", 1.0), lo=ends, hi=ends),))
+    assert caption_remarks.conventions([banded]) == "Bands and whiskers: 95 % intervals."
+    assert caption_remarks.conventions([rough]).endswith("rough, as a note in the table says.")

@@ -66,7 +66,7 @@ def test_lines_that_never_lose_are_named_and_not_drawn():
     (line,), said = panel_layout.loss_lines(shares)
     assert line.label == "b"
     assert_rounded(line.y, [0, 0.1, 0.2], size=1)
-    assert said == " Zero throughout, so not drawn: a. A zero has no point on this axis."
+    assert said == " Zero throughout: a. A zero has no point on this axis."
     assert panel_layout.loss_lines([replace(shares[1], y=np.full(3, 0.5))])[1] == ""
 
 
@@ -115,7 +115,7 @@ def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
         Figure("f", "", "Drawn.", (curves([1, 2, 3], near, [0, 0, 9]), curves([4, 5, 6], [4, 5, 6])))
     )
     assert [[mark.label for mark in panel.marks] for panel in both.panels] == [["a = b", "c"], ["a = b"]]
-    assert both.caption == "Drawn. Curves that coincide are drawn once, with both names."
+    assert both.caption == "Drawn. “=” joins curves that coincide."
     for apart in (
         (curves([1, 2, 3], far),),  # seen to differ
         (curves([1, 2, 3], near), curves([4, 5, 6], [4, 5, 7])),  # in one panel
@@ -136,14 +136,32 @@ def test_a_swept_value_that_joined_names_share_is_told_once():
     assert [mark.label for mark in panel.marks] == ["nearest = PDA, $P_D$ = 0.7", "nearest = PDA, $P_D$ = 0.9"]
 
 
-def test_a_missing_band_is_told_of_in_its_figure_alone():
-    x = np.arange(3.0)
-    whole = one(Line(x, x, "a", lo=x - 1, hi=x + 1))
-    assert panel_layout.with_remark_on_bands(whole) is whole
-    ends = np.array([0.5, np.nan, 1.5])
-    assert panel_layout.with_remark_on_bands(one(Line(x, x, "a", lo=ends, hi=ends))).caption.endswith(
-        "a note marks the interval as unreliable."
-    )
+def test_points_without_an_interval_are_thin_and_open_and_the_key_says_so():
+    x = np.arange(5.0)
+    ends = np.array([0.5, np.nan, np.nan, 2.5, 3.5])
+    for dash in (0, None):
+        whole, rough = (Line(x, x, "a", Style(0, dash, 0), low, x + 1) for low in (x - 1, ends))
+        rough = replace(rough, hi=np.where(np.isnan(ends), np.nan, rough.hi))
+        assert not line_points.rough_points(whole).any()
+        assert not line_points.rough_points(replace(rough, lo=None)).any()  # a line that has no band
+        assert not line_points.rough_points(replace(rough, exact=x)).any()
+        thin, sure = drawn(one(rough)).lines
+        assert thin.get_linewidth() < sure.get_linewidth()
+        assert thin.get_markerfacecolor() == "white"
+        assert thin.get_alpha() < 1
+        assert thin.get_markevery() == [1, 2]
+        np.testing.assert_array_equal(np.isfinite(sure.get_ydata()), np.isfinite(ends))
+        np.testing.assert_array_equal(thin.get_ydata(), [0, 1, 2, 3, np.nan])
+        (legend,) = drawn(one(rough, direct=False)).figure.legends
+        assert "rough" in [text.get_text() for text in legend.get_texts()]
+        assert len(drawn(one(whole)).lines) == 1
+
+
+def test_bars_without_an_interval_are_open():
+    bars = Bars(("a", "b"), np.ones(2), np.array([0.5, np.nan]), np.array([1.5, np.nan]))
+    sure, rough = drawn(one(bars)).patches
+    assert sure.get_facecolor()[3] > 0
+    assert rough.get_facecolor()[3] == 0
 
 
 def test_lines_that_a_legend_of_names_explains_are_joined_there_and_those_told_apart_by_dash_are_not():
@@ -587,7 +605,7 @@ def test_a_sweep_is_shown_whole_in_figures_with_a_panel_for_each_config(expected
     assert [result.name for result in shown] == names
     assert left_out == ""
     some, left_out = case_selection.select_cases(results, names)
-    assert left_out == " Shown: 8 of 10; only in the tables: rls1 D=3 and rls2 D=3."
+    assert left_out == " Shown: 8 of 10; the others are in the tables."
     assert [some[0].name, some[-1].name] == [names[0], names[-1]]
 
 

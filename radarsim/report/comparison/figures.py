@@ -67,8 +67,7 @@ def _figure(
     )
     caption = (
         tr(
-            "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times. "
-            "Bands: 95 % intervals.",
+            "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times.",
             words=term(quantity.words),
             value=", ".join(side.label for side in visible),
             of=change_name,

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from radarsim.language.translate import tr
+from radarsim.report.drawing.line_points import rough_points
 from radarsim.report.drawing.model import Figure, Line, Panel, Style
-from radarsim.report.drawing.style import LETTER_MM, ROW_MM, SAMPLE_MM
+from radarsim.report.drawing.style import LETTER_MM, ROUGH_KEY, ROW_MM, SAMPLE_MM
 from radarsim.report.math_text import plain_text
 
 MAX_END_NAME_LETTERS = 28  # of a name at a line's end
@@ -130,6 +131,8 @@ def _legend_keys(panel: Panel, at_ends: bool, explained_crosses: set[str]) -> Le
     if panel.legend != "none":
         keys |= {line.label: line.style for line in named_lines(panel) if not at_ends}
         keys |= dict(panel.keys)
+    if any(isinstance(mark, Line) and rough_points(mark).any() for mark in panel.marks):
+        keys[tr("rough")] = ROUGH_KEY
     has_exact = any(isinstance(m, Line) and m.exact is not None and np.isfinite(m.exact).any() for m in panel.marks)
     name = panel.crosses or tr("exact")
     if has_exact and name not in explained_crosses:

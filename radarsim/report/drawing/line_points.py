@@ -21,6 +21,16 @@ def marker_indices(line: Line) -> list[int]:
     return sorted({*range(0, len(line.x), marker_stride(line)), *lone_points(line)})
 
 
+def rough_points(line: Line) -> np.ndarray:
+    """Which points (n,) of a line with a band have neither ends of it, as a note marks them unreliable, nor an exact
+    value."""
+    if line.lo is None or line.hi is None:
+        return np.full(len(line.x), False)
+    exact = np.full(len(line.x), np.nan) if line.exact is None else np.asarray(line.exact, float)
+    unknown = np.isnan(np.asarray(line.lo, float)) & np.isnan(np.asarray(line.hi, float)) & np.isnan(exact)
+    return unknown & np.isfinite(np.asarray(line.y, float))
+
+
 def lone_points(line: Line) -> list[int]:
     """The points of a line without a neighbour: neither the line nor its band shows them."""
     return [int(run[0]) for run in unbroken_runs(np.isfinite(line.y)) if len(run) == 1]

@@ -10,11 +10,20 @@ from matplotlib.colors import LogNorm, Normalize
 
 from radarsim.language.translate import tr
 from radarsim.report.drawing import scales
-from radarsim.report.drawing.line_points import lone_points, marker_indices, marker_stride, thin_line
+from radarsim.report.drawing.line_points import lone_points, marker_indices, marker_stride, rough_points, thin_line
 from radarsim.report.drawing.model import Axis as AxisSpec
 from radarsim.report.drawing.model import Bars, Heat, Line, Mark, Note, Panel, Reference
 from radarsim.report.drawing.scales import Scale, scans_of, tick_text
-from radarsim.report.drawing.style import EXACT, SYMBOL, TOP_NOTE_PT, TOP_ROW_PT, UPRIGHT, line_options, style_colour
+from radarsim.report.drawing.style import (
+    EXACT,
+    ROUGH,
+    SYMBOL,
+    TOP_NOTE_PT,
+    TOP_ROW_PT,
+    UPRIGHT,
+    line_options,
+    style_colour,
+)
 from radarsim.report.drawing.ticks import set_ticks
 from radarsim.report.wording import number
 
@@ -72,6 +81,10 @@ def _draw_line(axes: Axes, line: Line, crosses: str) -> None:
         positive = np.where(np.asarray(line.y) > 0, 1.0, np.nan)
         lo, hi = (None if end is None else end * positive for end in (line.lo, line.hi))
         line = replace(line, y=line.y * positive, lo=lo, hi=hi)
+    rough = rough_points(line)
+    if rough.any():
+        _draw_rough_points(axes, line, rough)
+        line = replace(line, y=np.where(rough, np.nan, line.y))
     colour, lone = style_colour(line.style), lone_points(line)
     label = line.label or line.name or None
     axes.plot(line.x, line.y, markevery=marker_indices(line), zorder=3, label=label, **line_options(line.style))
@@ -86,6 +99,14 @@ def _draw_line(axes: Axes, line: Line, crosses: str) -> None:
         first = 0 if stride == 1 else stride // 2  # markers and crosses alternate
         label = crosses or tr("exact")
         axes.plot(line.x[first::stride], line.exact[first::stride], zorder=4, label=label, **EXACT)
+
+
+def _draw_rough_points(axes: Axes, line: Line, rough: np.ndarray) -> None:
+    """Draw the points that a note marks as unreliable, and the line to their neighbours: thin, with open markers."""
+    near = rough | np.append(rough[1:], False) | np.append(False, rough[:-1])
+    indices = [i for i in marker_indices(line) if rough[i]]
+    options = line_options(line.style) | ROUGH
+    axes.plot(line.x, np.where(near, line.y, np.nan), markevery=indices, zorder=2.9, **options)
 
 
 REFERENCE_SHARE = 0.2  # of an axis of x: the words of a reference line nearer to its left end stand right of it
@@ -108,8 +129,11 @@ def _draw_reference(axes: Axes, mark: Reference, x: AxisSpec) -> None:
 
 def _draw_bars(axes: Axes, bars: Bars) -> None:
     positions = np.arange(len(bars.names))
-    axes.bar(positions, bars.values, color=style_colour(bars.style), alpha=0.75, width=0.65, zorder=2)
+    patches = axes.bar(positions, bars.values, color=style_colour(bars.style), alpha=0.75, width=0.65, zorder=2)
     if bars.lo is not None and bars.hi is not None:
+        for patch, low, high in zip(patches, bars.lo, bars.hi, strict=True):
+            if np.isnan(low) and np.isnan(high):  # rough
+                patch.set(facecolor="none", edgecolor=style_colour(bars.style), linewidth=0.8)
         axes.vlines(positions, bars.lo, bars.hi, color="black", linewidth=0.9, zorder=3)
     axes.set_xticks(positions, bars.names)
     axes.grid(False, axis="x")

@@ -39,6 +39,8 @@ EXACT: dict[str, Any] = {
     "markersize": 4.2,
     "markeredgewidth": 0.6,
 }
+ROUGH: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6, "markeredgewidth": 0.5, "mfc": "white"}
+ROUGH_KEY = Style(GREY, 0, 0, width_pt=0.5)
 STYLE: dict[Any, Any] = {  # Matplotlib names every key that it knows as a type of its own
     "font.family": "DejaVu Sans",
     "font.size": 7.5,

@@ -44,18 +44,14 @@ SHARES = {  # figure: column of folds.csv, title of the axis, caption
         "right",
         term("P(all folds right)"),
         term(
-            "Share of realisations in which all folds so far are right, for the best hypothesis. Bands: 95 % "
-            "intervals. Exact values are known for the nearest fold where truth and filter agree, and for "
-            "the Chinese remainder of two scans."
+            "Share of realisations in which all folds so far are right, for the best hypothesis; exact for the "
+            "nearest fold where truth and filter agree, and for the Chinese remainder of two scans."
         ),
     ),
     "lost": (
         BEYOND_SHARE,
         term("P(velocity off by over D/2)"),
-        term(
-            "Share of realisations whose velocity is off by more than half the unambiguous interval. Bands: 95 % "
-            "intervals."
-        ),
+        term("Share of realisations whose velocity is off by more than half the unambiguous interval."),
     ),
 }
 
@@ -112,7 +108,7 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
         return {}
     caption = tr(
         "Share of realisations in which a fold is wrong by the last scan, for the best hypothesis, of "
-        "{realisations} each. Bands: 95 % intervals.",
+        "{realisations} each.",
         realisations=case_selection.realisations_text(results),
     ) + "".join(dict.fromkeys(notes))
     figure = panel_layout.arrange_columns(Figure("right", tr("P(a fold is wrong)"), caption, tuple(rare_panels)))

@@ -71,9 +71,8 @@ def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
     fan_panels = [replace(panel, title=title) for title, panel in panels_by_title.items()]
     counts = [len(velocities) for velocities, _, _ in next(iter(fans.values())).lists]
     caption = tr(
-        "Fold sequences kept, {name}: {first} at first, {last} after {scans} scans. One realisation "
-        "(number 7): after each scan a line for every sequence kept, with its velocity and acceleration, "
-        "up to the next scan; brighter and broader lines are more probable. Dots: the true velocity.",
+        "Fold sequences kept in realisation 7, {name}: {first} at first, {last} after {scans} scans. A line for each, "
+        "with its velocity and acceleration; broader: more probable. Dots: the true velocity.",
         **{
             "first": counts[0],
             "last": counts[-1],

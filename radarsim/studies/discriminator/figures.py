@@ -105,10 +105,8 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
         y = Axis(key_labels.label_with_unit(*SYMBOLS[component]), "log")
         panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), y, marks, letter, direct=False))
     caption = tr(
-        "Windows of the estimator {name!r} and the absolute error of each component against the "
-        "window's length: median and the band from 5 to 95 % of {count:,} bursts, locked or not. "
-        "Dashed: three times the Cramér–Rao bound of the window, prior included, the paper's limit. Dotted: one "
-        "burst, the first of the run, as the paper's figure 2 shows one.",
+        "Windows of {name!r} and absolute error of each component: median and band from 5 to 95 % of {count:,} "
+        "bursts, locked or not. Dashed: three times the Cramér–Rao bound, prior included. Dotted: the first burst.",
         name=name,
         count=result.count,
     )
@@ -125,8 +123,7 @@ def locks(result: CaseResult, tables_by_name: Mapping) -> Figure:
         filter_rows = rows[(result.name, name)]
         marks.append(figure_lines.line_from_rows(filter_rows, ("t_s", "lock_rate", "lock_lo", "lock_hi"), name, n))
     caption = tr(
-        "A burst is locked if every component is within five times the Cramér–Rao bound of the window (without "
-        "prior; the phase modulo one turn); of {count:,} bursts. Bands: 95 % intervals.",
+        "Locked: every component within five times the Cramér–Rao bound of the window; of {count:,} bursts.",
         count=result.count,
     )
     panel, remark = _shares(Axis(tr(WINDOW_LABEL), "log"), marks, 0)
@@ -166,8 +163,7 @@ def accuracy(result: CaseResult, tables_by_name: Mapping) -> Figure:
             panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), axis, tuple(marks), name, direct=False))
     caption = tr(
         "Root-mean-square error of the locked bursts over the Cramér–Rao bound of the window, prior "
-        "included. Bands: 95 % intervals. {count:,} bursts; lock is judged at five times the bound without "
-        "prior.",
+        "included, of {count:,} bursts.",
         count=result.count,
     )
     columns = min(3, max(1, len(panels)))
@@ -192,7 +188,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], tables_by_n
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     key_name = key_labels.key_label(members[0], key).text
     caption = tr(
-        "Lock in the last window against the {called}, of {count:,} bursts each. Bands: 95 % intervals.",
+        "Lock in the last window against the {called}, of {count:,} bursts each.",
         called=key_name,
         count=members[0].count,
     )
@@ -225,12 +221,10 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ta
         x_axis, y_axis = (Axis(_swept_axis(key, members[0])) for key in keys)
         panels.append(Panel(x_axis, y_axis, marks, estimator))
     panels.append(lock_border_panel(keys, members, tables_by_name, x, y))
-    first, second = (key_labels.key_label(members[0], key).text for key in keys)
+    second = key_labels.key_label(members[0], keys[1]).text
     caption = tr(
-        "Share of bursts locked at the end, over the {first} and the {second}, of {count:,} in each "
-        "cell. Last: the largest {second} up to which the whole 95 % interval of that share lies above "
-        "{sure:g}; an estimator without a line reaches this nowhere.",
-        first=first,
+        "Share of bursts locked at the end, of {count:,} a cell. Last: the largest {second} up to which its whole "
+        "95 % interval lies above {sure:g}, which estimators without a line reach nowhere.",
         second=second,
         count=members[0].count,
         sure=CERTAIN_LOCK_RATE,

@@ -12,11 +12,10 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, term, tr
+from radarsim.language.translate import term, tr
 from radarsim.report import caption_remarks, case_selection, figure_lines, key_labels, panel_layout, tables
 from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
-from radarsim.studies.multimodel import stage_ranking
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -157,20 +156,9 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
         for (x, y, title, marks), panel_lines in zip(axes, lines, strict=True)
     ]
     flight_panels[0] = replace(flight_panels[0], marks=(*flight_panels[0].marks, *_landmarks(lines[0])), equal=True)
-    track, (height, *_), (acceleration, *_) = lines[0][0], lines[1], lines[3]
-    ground_range_km = np.hypot(track.x, track.y)
     caption = tr(
-        "{name}: ground range from {begin:.0f} to {end:.0f} km, height up to {height:.0f} km, "
-        "acceleration up to {acceleration:.0f} m/s². ",
-        **{
-            "name": track.name or track.label or key_labels.plain_case_label(results[0]),
-            "begin": float(ground_range_km[0]),
-            "end": float(ground_range_km[-1]),
-        },
-        **{"height": float(height.y.max()), "acceleration": float(acceleration.y.max())},
-    ) + tr(
-        "The true flight: the ground track from its start, at one scale "
-        "north and east, with the radar at the origin. Dotted: ends of the stages."
+        "The true flight, its ground track at one scale north and east with the radar at the origin. Dotted: ends of "
+        "the stages."
     )
     return _with_paper_number(
         _figure_of_panels("trajectory", tr("Flight"), caption, flight_panels, 56), results, "1 … 4"
@@ -243,8 +231,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
             replace(panel, marks=tuple(_without_labels(panel.marks)), keys=keys, direct=False, legend="right")
         ]
     caption = tr(
-        "Root-mean-square error of {quantity} about the truth, of {count:,} realisations; bands: 95 % "
-        "intervals. Dotted: ends of the stages.",
+        "Root-mean-square error of {quantity} about the truth, of {count:,} realisations. Dotted: ends of the stages.",
         quantity=quantity,
         count=results[0].count if results else 0,
     )
@@ -364,22 +351,9 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
         x = Axis(tr("operations per update"), limits=(0, 1.06 * float(max_operations)))
         y = Axis(key_labels.sigma_axis_label("$y$", "m"), "log")
         cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
-    points = [mark for mark in cost_panels[-1].marks if isinstance(mark, Line)]
-    min_operations = min(float(point.x[0]) for point in points)
-    cheapest = join_names([point.label for point in points if float(point.x[0]) == min_operations])
-    last_rows = rows[rows["stage"] == rows["stage"].iloc[-1]]
-    best = last_rows.loc[last_rows["sigma"].idxmin()]
-    headline = tr(
-        "Fewest operations: {cheap} ({count:.0f}); least σ, {stage}: {good}. ",
-        cheap=cheapest,
-        count=min_operations,
-        stage=cost_panels[-1].title,
-        good=key_labels.escape_dollars(stage_ranking.least_filters(result, rows, best)),
-    )
     cost_panels = _with_legend(cost_panels, result, dash=None)
-    caption = headline + tr(
-        "Accuracy against cost: σ of the height over a stage (whiskers: 95 %) and the mean count of "
-        "arithmetic operations of one update.{of_case}",
+    caption = tr(
+        "σ of the height over a stage and the mean count of arithmetic operations of one update.{of_case}",
         of_case=_case_sentence(result, results),
     )
     return _figure_of_panels("cost", tr("Cost and accuracy"), caption, cost_panels, 62)
@@ -438,8 +412,8 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
         )
     consistency_panels = _with_legend(consistency_panels, result, dash=None)
     caption = tr(
-        "Normalised squared errors per degree of freedom, by stage: 1 where the filter's own covariance "
-        "is correct, more where it is optimistic, less where it is pessimistic.{of_case}",
+        "Normalised squared errors per degree of freedom, by stage: 1 if the filter's own covariance is correct, more "
+        "if it is optimistic.{of_case}",
         of_case=_case_sentence(result, results),
     )
     return _figure_of_panels("consistency", tr("Consistency of the filters"), caption, consistency_panels, 66)

@@ -63,9 +63,8 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
     if not any(panel.marks for panel in threshold_panels):
         return {}
     caption = tr(
-        "P(not locked): share of bursts that do not lock, at the worst scan: velocity (or acceleration, "
-        "where used) in error by more than five times its Cramér–Rao bound; where all lock there is no point. "
-        "σ of the range at the last scan. Bands: 95 % intervals."
+        "P(not locked): share of bursts, at the worst scan, whose velocity (or acceleration, where used) is in error "
+        "by more than five times its Cramér–Rao bound; no point where all lock."
     )
     figure = Figure(
         "threshold",
@@ -181,7 +180,7 @@ STUDY_FIGURES: dict[str, tuple[Draw, str, str]] = {
         term("Bursts that do not lock"),
         term(
             "Share of bursts whose velocity (or acceleration, where used) is in error by more than five "
-            "times its Cramér–Rao bound. Bands: 95 % intervals. Idealisations, and estimators that lost fewer than 20 "
+            "times its Cramér–Rao bound. Idealisations, and estimators that lost fewer than 20 "
             "bursts in all, are left out."
         ),
     ),
@@ -190,23 +189,20 @@ STUDY_FIGURES: dict[str, tuple[Draw, str, str]] = {
         term("Folds that are right"),
         term(
             "Share of realisations in which a filter's best hypothesis has used no velocity in a wrong fold "
-            "so far. Bands: 95 % intervals. Filters that use the nearest fold are left out."
+            "so far. Filters that use the nearest fold are left out."
         ),
     ),
     "measured": (
         measured_panel,
         term("What the bursts measure"),
-        term(
-            "Root-mean-square error of the burst's velocity, of all bursts, those that did not lock "
-            "included. Bands: 95 % intervals."
-        ),
+        term("Root-mean-square error of the burst's velocity, of all bursts, those that did not lock included."),
     ),
     "losses": (
         losses_panel,
         term("What a lost burst costs"),
         term(
             "Root-mean-square error of the range at the last scan, by the number of scans since the last "
-            "burst that did not lock. Bands: 95 % intervals."
+            "burst that did not lock."
         ),
     ),
 }

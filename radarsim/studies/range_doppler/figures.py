@@ -18,7 +18,6 @@ from radarsim.report import (
     panel_layout,
     tables,
     time_figures,
-    wording,
 )
 from radarsim.report.drawing.model import GREY, Axis, Figure, Line, Note, Panel, Reference, Style
 from radarsim.report.drawing.scales import Scale
@@ -111,34 +110,26 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     panels = case_selection.pick_evenly(panels, case_selection.MAX_PANELS)
     if not panels:
         return None
-    caption = _best_settled(panels) + tr(
-        "Steady σ of the range against its settling time, both exact (within 5 % of the steady value, "
-        "for good); grey lines join equal manoeuvre variances D_M, labelled in (m/s³)². Dotted: ten scan "
-        "periods, the paper's limit; star: the least steady error within it. Filters that do not settle "
-        "within the run are named and left out."
+    caption = tr(
+        "Exact steady σ of the range against its settling time, to within 5 %; grey lines join equal manoeuvre "
+        "variances. Star: the least error settled within ten scan periods (dotted)."
     )
+    if names := _unsettled_filters(panels):
+        caption += " " + tr("Without one: {names}.", names=caption_remarks.join_few_names(names))
     caption += case_selection.left_out_remark(titles, [panel.title for panel in panels])
     return panel_layout.arrange_columns(
         Figure("settling", tr("Steady error against settling time"), caption, tuple(panels))
     )
 
 
-def _best_settled(panels: Sequence[Panel]) -> str:
-    """The least steady error within the paper's limit, of all panels."""
-    stars = [
-        (mark, panel)
+def _unsettled_filters(panels: Sequence[Panel]) -> list[str]:
+    """The filters of each panel that nowhere settle within the paper's limit: those without a star."""
+    return [
+        plain_text(", ".join(filter(None, (panel.title, star.name.partition(":")[0]))))
         for panel in panels
-        for mark in panel.marks
-        if isinstance(mark, Line) and len(mark.y) and mark.style.marker == BEST_MARKER
+        for star in panel.marks
+        if isinstance(star, Line) and star.style.marker == BEST_MARKER and not len(star.y)
     ]
-    if not stars:
-        return tr("Nothing settles within {periods} scan periods. ", periods=PERIODS)
-    star, panel = min(stars, key=lambda pair: float(pair[0].y[0]))
-    name = ", ".join(filter(None, (panel.title, star.name)))
-    return tr(
-        "Least steady σ within {periods} scan periods: {sigma} m ({name}). ",
-        **{"periods": PERIODS, "sigma": wording.number(float(star.y[0]), 3), "name": plain_text(name)},
-    )
 
 
 def _settling_panel(title: str, result: Result, rows: "pd.DataFrame", sigma_limits: tuple[float, float]) -> Panel:

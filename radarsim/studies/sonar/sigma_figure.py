@@ -53,8 +53,7 @@ def sigma_figure(
         return None
     caption = (
         tr(
-            "Root-mean-square error of the {name} about the truth against time, of {count:,} realisations. "
-            "Bands: 95 % intervals; a band that is not visible is narrower than the line.",
+            "Root-mean-square error of the {name} about the truth against time, of {count:,} realisations.",
             name=component.words,
             count=results[0].count,
         )

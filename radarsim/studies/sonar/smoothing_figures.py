@@ -81,8 +81,7 @@ def gains_figure(table: "pd.DataFrame") -> Figure:
     ]
     caption = tr(
         "Weights of the residual in position and velocity of growing memory, from the measured "
-        "errors (var r / σ² and T₀ cov(r, v) / σ²). They go to zero: new "
-        "plots count less and less."
+        "errors (var r / σ² and T₀ cov(r, v) / σ²)."
     )
     if table["case"].nunique() > 1:
         caption += tr(" Case: {case}.", case=first["case"])
@@ -120,8 +119,7 @@ def believed_figure(
         nees_lines.append(figure_lines.line_from_rows(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
     caption = tr(
         "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and the filter's own (markers "
-        "alone, where they differ by over 5 %). Right: normalised squared error per component, 1 for a "
-        "consistent filter.",
+        "alone, where they differ by over 5 %). Right: normalised squared error per component.",
         name=COMPONENTS_BY_NAME[component].words,
         last=last,
     )
@@ -157,9 +155,8 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
         figure_panels.append(Panel(panel_layout.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = tr(
-        "σ of the {name} for several detection probabilities (legend), one panel per filter, of "
-        "{count:,} realisations. Exact values are means over all patterns of misses, where these can be "
-        "enumerated.",
+        "σ of the {name} for several detection probabilities, one panel per filter, of {count:,} realisations; "
+        "exact over all patterns of misses where these can be enumerated.",
         name=component.words,
         count=cases[0].count,
     ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")
@@ -180,8 +177,7 @@ def conversion_figure(table: "pd.DataFrame") -> Figure | None:
         marks.append(figure_lines.line_from_rows(rows, ("across_m", *names), label, n))
     caption = tr(
         "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ "
-        "of the bearing. Bands: 95 % intervals. Exact: (exp(−σ²/2) − 1) r, and zero. The plain "
-        "conversion pulls the target in."
+        "of the bearing. Exact: (exp(−σ²/2) − 1) r, and zero."
     )
     x, y = Axis(tr("range × σ of the bearing, m"), limits=(0, None)), Axis(tr("bias / σ of the range"))
     return Figure(

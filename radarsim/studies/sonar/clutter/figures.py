@@ -22,7 +22,7 @@ SWEPT_KEYS = {  # columns of the table `tracking`, and the keys whose values the
     "detection_probability": "sensor.detection_probability",
     "gate_probability": "gate_probability",
 }
-LIFE_CAPTION = term("mean time between ends of a confirmed track (no point: no end occurred)")
+LIFE_CAPTION = term("mean time between ends of confirmed tracks, extrapolated from those within the run")
 ENDS_CAPTION = term("probability, by importance sampling, that the target's first confirmed track has ended")
 ZERO_FACTOR = 3.0  # between zero and the smallest positive value on a logarithmic axis
 UPPER_END_STYLE = Style(GREY, None, 4)
@@ -118,7 +118,7 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
     caption = (
         tr(
             "Probability that a track of the target was confirmed by that time, of {realisations}; thin "
-            "lines: that a confirmed track exists and is on the target. Bands: 95 % intervals.",
+            "lines: that a confirmed track exists and is on the target.",
             realisations=case_selection.realisations_text(results),
         )
     ) + case_selection.cases_left_out_remark(results, shown_results)
@@ -155,7 +155,7 @@ def life_figure(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") 
         return None
     text = join_names(clauses)
     caption = tr(
-        "{panels}, of {realisations}. Bands: 95 % intervals.",
+        "{panels}, of {realisations}.",
         panels=text[0].upper() + text[1:],
         realisations=case_selection.realisations_text(results),
     )
@@ -201,7 +201,7 @@ def _life_quantities(
             life = _LifeQuantity("event_rate", name, "", True, rates, tr(ENDS_CAPTION))
     time, wrong, sigma = (tr("time to confirmation"), tr("share of wrong plots"), tr("$\\sigma$ of $r$ of kept tracks"))
     time_clause, wrong_clause = tr("mean time to its confirmation"), tr("weight of false plots among those used")
-    sigma_clause = tr("root-mean-square error of the range of the tracks kept at the end")
+    sigma_clause = tr("root-mean-square error of the range of kept tracks")
     return (
         life,
         _LifeQuantity("time_to_confirm_s", time, "s", False, tracking, time_clause),
@@ -249,13 +249,13 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
     keys = ((tr("none occurred: upper end of the interval"), UPPER_END_STYLE),) if len(without_tracks) else ()
     marks = (*_lines(rows, column, rate), *([upper] if keys else []))
     caption = tr(
-        "False tracks confirmed per hour in the whole sector; every false plot starts a tentative track. Plots that "
-        "confirm it: {rules}. {realisations} per case. Bands and bars: 95 % intervals.",
+        "False tracks confirmed per hour in the whole sector, of {realisations} per case. Plots that confirm a track: "
+        "{rules}.",
         rules="; ".join(f"{rule} ({shorten_names(names)})" for rule, names in rules.items()),
         realisations=case_selection.realisations_text(results),
     )
     if zero_names := rows.groupby("filter", sort=False)[rate].sum().loc[lambda rates: rates == 0].index.tolist():
-        caption += " " + tr("Zero throughout, so not drawn: {names}.", names=shorten_names(zero_names))
+        caption += " " + tr("Zero throughout: {names}.", names=shorten_names(zero_names))
     panel = Panel(x, Axis(tr("false tracks per hour"), "log"), marks, keys=keys, direct=False)
     return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panel_layout.WIDE_MM)
 
@@ -280,9 +280,8 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
         y = Axis(tr("share of target's tracks declared false"), limits=(0, None))
         figure_panels.append(Panel(x, y, tuple(true), direct=False))
     caption = tr(
-        "Error rates of declaring a track true once its score (logarithm of the likelihood ratio) "
-        "reaches a threshold, of {realisations} of each kind. Left: tracks started by false plots, at "
-        "most exp(−threshold) of them (bound). Right: the target's first tracks. Bands: 95 % intervals.",
+        "Error rates of declaring a track true once its log likelihood ratio reaches a threshold, of {realisations} "
+        "of each kind. Left: tracks of false plots (bound: exp(−threshold)). Right: the target's.",
         realisations=case_selection.realisations_text(results),
     ) + (tr(" Case: {swept}.", swept=_swept_values(case)) if case.swept_values else "")
     return (

@@ -46,9 +46,8 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     marks.append(_map_line(course, tr("target"), Style(1, 1, None)))
     marks.append(_map_line(_north_east(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
     caption = tr(
-        "Confirmed tracks near the target: {tracks}, among {false} false plots in {k} scans. The target's course and "
-        "plots, the false plots of all scans, the tracks, and at every fourth scan the gate of the one nearest to the "
-        "course, in realisation 0 of {name}, tracker {tracker}.",
+        "Realisation 0 of {name}, tracker {tracker}: {tracks} confirmed tracks near the target among {false} false "
+        "plots of {k} scans; gates of every fourth scan.",
         tracks=len(tracks),
         false=len(false_north),
         name=key_labels.plain_case_label(result),

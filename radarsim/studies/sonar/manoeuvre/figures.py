@@ -126,7 +126,7 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
     caption = tr(
         "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the "
         "manoeuvre against that at the last scan before it. Lines: exact laws; markers: measured, of "
-        "{count:,} realisations, with 95 % intervals.",
+        "{count:,} realisations.",
         count=results[0].count,
     )
     return _figure_of_panels("roc", tr("Detections and false alarms"), caption, figure_panels)
@@ -160,8 +160,7 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
         figure_panels.append(Panel(x, y, tuple(marks), title, direct=False))
     caption = tr(
         "Probability of an alarm of detectors in the range at about {usual:g} false alarms a test, at "
-        "the last scan of the manoeuvre (for a steady target, at the last scan), against the manoeuvre's "
-        "strength. Bands: 95 % intervals; a band that is not visible is narrower than the line.",
+        "the last scan of the manoeuvre (for a steady target, at the last scan), against the manoeuvre's strength.",
         usual=USUAL_FALSE_ALARM_RATE,
     )
     return _figure_of_panels("detection", tr("Detection against the strength of the manoeuvre"), caption, figure_panels)
@@ -196,10 +195,8 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("alarm raised"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
     caption = tr(
-        "Probability that a detector in the range has raised its first alarm, against the time since the "
-        "manoeuvre began, at about {usual:g} false alarms a test. It is known exactly where windows do "
-        "not overlap and tests are independent; overlapping windows have no closed form. Bands: 95 % "
-        "intervals.",
+        "Probability that a detector in the range has raised its first alarm, against the time since the manoeuvre "
+        "began, at about {usual:g} false alarms a test; exact where windows do not overlap.",
         usual=USUAL_FALSE_ALARM_RATE,
     )
     return _figure_of_panels("delay", tr("How soon a manoeuvre is detected"), caption, figure_panels)
@@ -218,9 +215,8 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
             Panel(panel_layout.time_axis(), y, (*manoeuvre_lines(result), *lines), _swept_values(result), direct=False)
         )
     caption = tr(
-        "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean "
-        "probability of the manoeuvring model of an imm, first coordinate. Dotted: beginning and end of "
-        "the manoeuvre."
+        "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean probability of an "
+        "imm's manoeuvring model, first coordinate. Dotted: beginning and end of the manoeuvre."
     )
     return _figure_of_panels("modes", tr("Manoeuvre state assumed by the filters"), caption, figure_panels)
 
@@ -249,7 +245,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
     caption = (
         tr(
             "σ about the truth over the one computed from the track's covariance to first order{case}, "
-            "of {count:,} realisations, with 95 % intervals.",
+            "of {count:,} realisations.",
             case=case,
             count=result.count,
         )

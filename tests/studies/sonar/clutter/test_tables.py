@@ -135,7 +135,7 @@ def test_false_tracks_that_did_not_occur_are_drawn_as_the_upper_end_of_their_int
     assert figure.panels[0].keys == (("none occurred: upper end of the interval", upper.style),)
     assert "Plots that confirm it: 2 of 3 (nearest); 3 of 4 (PDA)." in figure.caption
     table.loc[table["filter"] == "PDA", "false_tracks_per_hour"] = 0.0
-    assert figures.false_figure(result.cases, table).caption.endswith("Zero throughout, so not drawn: PDA.")
+    assert figures.false_figure(result.cases, table).caption.endswith("Zero throughout: PDA.")
     assert figures.false_figure(result.cases, table.assign(false_tracks_per_hour=0.0)) is None
 
 

@@ -1,0 +1,120 @@
+"""The words over each figure: the sentence of the answer that is about what it draws, else its title."""
+
+import math
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import tr
+from radarsim.report import wording
+from radarsim.report.drawing.model import Bars, Figure, Heat, Line, Mark
+from radarsim.report.math_text import plain_text
+
+DIGITS = r"[−-]?\d[\d\u202f\u00a0]*(?:[.,]\d+)*"
+POWER = r"(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
+AFTER_VALUE = rf"{POWER}(?P<unit>[ \u00a0][^\s\[(]+)?(?:[ \u00a0]\w+)?[ \u00a0]"  # unit, "lower"
+SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+ROUNDING = 1e-9
+MAX_LETTERS = 200  # of a headline
+
+
+def with_headlines(
+    figures_by_name: Mapping[str, Figure],
+    answer: Sequence[str],
+    tables_of_answer: Sequence[Collection[str]],
+    tables_by_figure: Mapping[str, Collection[str]],
+    single_cases: Collection[str] = (),
+) -> dict[str, Figure]:
+    """The figures with a headline each.
+
+    tables_of_answer: the tables that each sentence of the answer rests on; tables_by_figure: those that are drawn;
+    single_cases: how sentences on one of several cases begin, which none of these figures is about."""
+
+    def headline(name: str, figure: Figure) -> str:
+        values = drawn_values(figure)
+        for sentence, sentence_tables in zip(answer, tables_of_answer, strict=True):
+            text = first_statement(sentence)
+            is_on_one_case = any(case in text.partition(":")[0] for case in single_cases)
+            is_of_tables = set(sentence_tables) <= set(tables_by_figure[name])
+            if is_of_tables and not is_on_one_case and len(text) <= MAX_LETTERS and is_drawn(text, values):
+                return text
+        return plain_text(figure.title)
+
+    return {name: replace(figure, headline=headline(name, figure)) for name, figure in figures_by_name.items()}
+
+
+def first_statement(sentence: str) -> str:
+    """A sentence up to its first semicolon, unless that separates the items of a list, each after a colon."""
+    clause, *others = wording.split_clauses(sentence)
+    return sentence if clause.count(": ") > 1 or not others else f"{clause}."
+
+
+class DrawnColumn(NamedTuple):
+    """Finite values (n,) of a figure, the label of their axis, and whether it is one of losses."""
+
+    label: str
+    values: np.ndarray
+    is_of_losses: bool
+
+
+def drawn_values(figure: Figure) -> list[DrawnColumn]:
+    """All values that a figure draws, exact ones too."""
+    columns = [
+        (mark.label if isinstance(mark, Heat) else panel.y.label, np.ravel(np.asarray(column, float)), panel)
+        for panel in figure.panels
+        for mark in panel.marks
+        for column in _columns(mark)
+    ]
+    return [
+        DrawnColumn(plain_text(label), values[np.isfinite(values)], panel.y.scale == "log")
+        for label, values, panel in columns
+    ]
+
+
+def _columns(mark: Mark) -> Iterable[np.ndarray]:
+    if isinstance(mark, Line):
+        return [column for column in (mark.y, mark.exact) if column is not None]
+    return [mark.values] if isinstance(mark, Bars | Heat) else []
+
+
+def is_drawn(sentence: str, columns: Sequence[DrawnColumn]) -> bool:
+    """Whether a sentence has values, exact or with an interval, and all of them are among those of a figure.
+
+    A loss is drawn as a negative gain, a percentage as a share or its complement. Shares of none and of all tell
+    nothing of what they are shares of."""
+    quoted = quoted_values(sentence)
+    is_telling = any(unit != "%" or number not in (0, 100) for number, _, unit in quoted)
+    return is_telling and all(any(_is_among(value, column) for column in columns) for value in quoted)
+
+
+def _is_among(value: tuple[float, float, str], column: DrawnColumn) -> bool:
+    number, step, unit = value
+    is_share = unit == "%" and "%" not in column.label
+    if not column.values.size or (not is_share and not column.label.endswith(unit)):
+        return False
+    if is_share and np.abs(column.values).max() > 1:
+        return False
+    scale = 0.01 if is_share else 1.0
+    candidates = 1 - column.values if is_share and column.is_of_losses else np.abs(column.values)
+    nearest = np.abs(candidates - abs(number) * scale).min()
+    return bool(nearest <= scale * step / 2 * (1 + ROUNDING) + ROUNDING * abs(number))
+
+
+def quoted_values(sentence: str) -> list[tuple[float, float, str]]:
+    """The values that a sentence quotes, each with the step of its last digit and its unit."""
+    exact = re.escape(tr("{value} (exact)", value="").strip())
+    marked = re.compile(rf"(?P<digits>{DIGITS}){AFTER_VALUE}(?:\[|{exact})")
+    return [(*_parsed(match), (match["unit"] or "").strip()) for match in marked.finditer(sentence)]
+
+
+def _parsed(match: re.Match[str]) -> tuple[float, float]:
+    """A number and the step of its last digit."""
+    point, thousands = numeral("."), numeral(",")
+    digits = match["digits"].replace(thousands, "").replace(point, ".").replace("−", "-")
+    power = int(match["power"].translate(SUPERSCRIPTS)) if match["power"] else 0
+    decimals = len(digits.partition(".")[2])
+    return float(digits) * 10.0**power, math.pow(10.0, power - decimals)

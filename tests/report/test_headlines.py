@@ -1,0 +1,118 @@
+"""The words over a figure are about it: every value that they quote is drawn. Captions are short."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radarsim.api import result_content
+from radarsim.api.run import run
+from radarsim.config.find_files import SHIPPED
+from radarsim.language.current import language_codes, use_language
+from radarsim.report import headlines
+from radarsim.report.case_selection import swept_cases
+from radarsim.report.drawing.model import Axis, Figure, Heat, Line, Panel
+from radarsim.report.math_text import plain_text
+from radarsim.report.page_links import tables_behind_figure
+from radarsim.studies.registry import study
+
+CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
+MAX_CAPTION_WORDS = 40
+
+
+def figure_of(label, *values, scale="linear"):
+    lines = tuple(Line(np.arange(2.0), np.array([0.1, value]), str(value)) for value in values)
+    return Figure("f", "The title", "A caption.", (Panel(Axis("x"), Axis(label, scale), lines),))
+
+
+GAIN, SIGMA, SHARE = (
+    figure_of("gain in $\\sigma$ of $r$, %", 18.31, -5.79),
+    figure_of("$\\sigma$ of $r$, m", 18.31, 1234.4),
+    figure_of("share locked", 0.97, 1.0),
+)
+
+
+@pytest.mark.parametrize(
+    ("figure", "sentence", "is_about"),
+    [
+        (GAIN, "Range: σ is 18.3 % (exact) lower than with range alone.", True),
+        (GAIN, "Range: σ is 5.8 % [3.0, 7.1] higher than with range alone.", True),
+        (GAIN, "Range: σ is 17.3 % [3.0, 27.1] lower than with range alone.", False),
+        (GAIN, "Least σ 18.3 m (exact).", False),
+        (SIGMA, "Range: σ is 18.3 % (exact) lower than with range alone.", False),
+        (SIGMA, "Least σ 18.3 m (exact), largest 1234 m [1230, 1240].", True),
+        (SIGMA, "Least σ 18.3 m (exact), largest 5678 m [5600, 5700].", False),
+        (SHARE, "Locked in 97.00 % [95.1, 98.2] of the bursts.", True),
+        (SHARE, "Locked in 3.00 % [1.8, 4.9] of the bursts.", False),
+        (SHARE, "Locked in 100 % [99.1, 100] of the bursts.", False),  # of whatever
+        (figure_of("share not locked", 0.03, scale="log"), "Locked in 97.00 % [95.1, 98.2] of the bursts.", True),
+        (SIGMA, "A sentence without values at 18.3 m.", False),
+    ],
+)
+def test_a_sentence_is_about_a_figure_that_draws_its_values(figure, sentence, is_about):
+    (headline,) = headlines.with_headlines({"f": figure}, [sentence], [()], {"f": ()}).values()
+    assert headline.headline == (sentence if is_about else "The title")
+
+
+def test_a_headline_is_of_the_tables_and_of_all_cases_of_its_figure():
+    sentence = "a = 1 m/s²: σ is 18.3 m (exact)."
+    found = headlines.with_headlines({"f": SIGMA}, [sentence], [("curves",)], {"f": ("curves",)})
+    assert found["f"].headline == sentence
+    assert (
+        headlines.with_headlines({"f": SIGMA}, [sentence], [("folds",)], {"f": ("curves",)})["f"].headline != sentence
+    )
+    one_of_two = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, ["a = 1 m/s²"])
+    assert one_of_two["f"].headline == "The title"
+
+
+def test_a_headline_ends_with_its_first_statement_unless_that_begins_a_list():
+    assert headlines.first_statement("Range: 3 m; once settled 2 m.") == "Range: 3 m."
+    assert headlines.first_statement("By stage: start: 3 m; after: 2 m.") == "By stage: start: 3 m; after: 2 m."
+
+
+def test_values_of_maps_are_read_under_their_bar():
+    heat = Heat(np.arange(2.0), np.arange(1.0), np.array([[0.25, 0.5]]), "share locked")
+    figure = replace(SHARE, panels=(Panel(Axis("x"), Axis("noise"), (heat,)),))
+    assert headlines.is_drawn("locked in 25.00 % [20, 30]", headlines.drawn_values(figure))
+
+
+def check_words_of_figures(result):
+    """Headlines are sentences of the answer, or titles; no caption is long, in any language."""
+    for code in language_codes():
+        with use_language(code):
+            tables = result._tables
+            figures = result_content.case_figures(result.cases, tables, result.experiment)
+            answer = result_content.make_answer(result.cases, tables)
+            declared = study(result.experiment.study).drawn_from()
+            sources = {name: tables_behind_figure(name, declared, tables) for name in figures}
+            named = headlines.with_headlines(figures, answer.texts, answer.tables, sources, swept_cases(result.cases))
+            long = {name: len(plain_text(figure.caption).split()) for name, figure in figures.items()}
+            assert {name: count for name, count in long.items() if count > MAX_CAPTION_WORDS} == {}
+            sentences = [headlines.first_statement(text) for text in answer.texts]
+            for figure in named.values():
+                assert figure.headline in (*sentences, plain_text(figure.title))
+                assert not re.search(r"95 %", figure.caption) or "interval lies" in figure.caption or code != "en"
+
+
+@pytest.mark.parametrize("config", ["rls2", pytest.param("sonar_missed", marks=pytest.mark.slow)])
+def test_words_of_figures_are_short_and_about_them(config):
+    check_words_of_figures(run(config, realisations=200))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", CONFIGS)
+def test_words_of_all_shipped_figures_are_short_and_about_them(config):
+    check_words_of_figures(run(config, realisations=200))
+
+
+def test_each_gain_of_a_radar_bears_its_own_sentence(tmp_path):
+    run("rls2", realisations=200, out=tmp_path)
+    captions = (tmp_path / "rls2" / "figures" / "captions.md").read_text(encoding="utf-8")
+    head, *parts = captions.split("\n## ")
+    assert head.strip().splitlines()[-1] == "Bands and whiskers: 95 % intervals. Crosses: exact values."
+    said = {part.split("\n")[0]: part.split("\n")[2] for part in parts}
+    assert said["gain_r"].startswith("Range: at 140 s")
+    assert said["gain_Vr"].startswith("Radial velocity: at 140 s")
+    assert said["gain_ar"].startswith("Radial acceleration: at 140 s")
+    assert said["sigma_r"].startswith("**σ of the range.**")
