@@ -202,8 +202,8 @@ def test_figures_have_the_width_asked_for_their_captions_and_what_they_were_made
     names = {path.name for path in (folder / "figures").iterdir()}
     assert "captions.md" in names
     captions = (folder / "figures" / "captions.md").read_text()
-    assert f"## sigma_r\n\n{first.answer[0]}\n\n**" in captions
-    assert "## gain_r\n\n**" in captions
+    assert f"## gain_r\n\n{first.answer[0]}\n\n**" in captions
+    assert "## sigma_r\n\n**" in captions
     svg = (folder / "figures" / "sigma_r.svg").read_text()
     assert ">time from the first plot, s</text>" in svg  # text, not paths
     record = json.loads((folder / "run.json").read_text())

@@ -136,8 +136,7 @@ def test_of_very_many_cases_the_caption_says_how_many_are_left_out():
     sigma = described["sigma_r"]
     assert len(sigma.panels) == 12
     assert sigma.panels[-1].title == "$σ_V$ = 14 m/s"  # the ends are among those shown
-    assert f"Shown: {12 * 8} of {14 * 10}; only in the tables: “σ_V = 1 m/s, D_M = " in sigma.caption
-    assert f" and {14 * 10 - 12 * 8 - 8} more." in sigma.caption
+    assert sigma.caption.endswith(f" Shown: {12 * 8} of {14 * 10}; the others are in the tables.")
 
 
 def test_lists_and_long_names_at_an_axis_and_in_titles():

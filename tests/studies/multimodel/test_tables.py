@@ -116,16 +116,6 @@ def test_all_stages_are_named_and_their_names_do_not_overlap():
         assert not any(a.overlaps(b) for n, a in enumerate(boxes) for b in boxes[n + 1 :])
 
 
-@pytest.mark.slow
-def test_filters_with_equally_few_operations_are_listed_together():
-    result = radarsim.run("multimodel_families_1hz", realisations=3)
-    counts = result.tables["operations"].query("stage == 'after'").set_index("filter")["operations"]
-    fewest = counts[counts == counts.min()].index
-    assert set(fewest) == {"MMA1 best", "MMA2 best"}
-    caption = result_content.case_figures(result.cases, result.tables, result.experiment)["cost"].caption
-    assert caption.startswith(f"Fewest operations: MMA2 best and MMA1 best ({counts.min():.0f}); ")
-
-
 def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     first, height, climb = answer_texts(answer, result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):

@@ -133,7 +133,7 @@ def test_false_tracks_that_did_not_occur_are_drawn_as_the_upper_end_of_their_int
         assert (line.lo[1], line.hi[1]) == (row["false_tracks_per_hour_lo"], row["false_tracks_per_hour_hi"])
     np.testing.assert_array_equal(upper.y, table[sparse]["false_tracks_per_hour_hi"])
     assert figure.panels[0].keys == (("none occurred: upper end of the interval", upper.style),)
-    assert "Plots that confirm it: 2 of 3 (nearest); 3 of 4 (PDA)." in figure.caption
+    assert "Plots that confirm a track: 2 of 3 (nearest); 3 of 4 (PDA)." in figure.caption
     table.loc[table["filter"] == "PDA", "false_tracks_per_hour"] = 0.0
     assert figures.false_figure(result.cases, table).caption.endswith("Zero throughout: PDA.")
     assert figures.false_figure(result.cases, table.assign(false_tracks_per_hour=0.0)) is None
