@@ -25,6 +25,7 @@ from radarsim.papers.verdict_rule import (
 from radarsim.report.wording import interval
 
 BOLD_CLASSES = (CONFIRMED, REFUTED)  # in bold
+EXTENSION_ENDING = ", extension"  # of the class of claims that are ours, apart from the paper's
 CLASS_ORDER = (*CLASSES, NOT_JUDGED, NOT_RUN)
 NOT_COUNTED = term("extension, not counted")  # a claim, or a part of one, that is not the paper's own
 
@@ -39,8 +40,17 @@ def claim_ranges(claims: Sequence[str]) -> str:
     return ", ".join(f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)
 
 
+def class_text(kind: str) -> str:
+    """A class in words, also one of extensions."""
+    own_class = kind.removesuffix(EXTENSION_ENDING)
+    return tr(own_class) if own_class == kind else tr("{kind} (extension)", kind=tr(own_class))
+
+
 def class_count(kind: str, count: int) -> str:
-    """The number of claims of a class, in words."""
+    """The number of claims of a class, in words, also of one of extensions."""
+    own_class = kind.removesuffix(EXTENSION_ENDING)
+    if own_class != kind:
+        return tr("{kind} (extension)", kind=class_count(own_class, count))
     if kind == DEPENDS:
         return plural(
             "{count} depends on what the paper leaves open", "{count} depend on what the paper leaves open", count

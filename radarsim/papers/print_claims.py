@@ -15,6 +15,7 @@ from radarsim.papers.claim_rows import (
     cell_number,
     claim_ranges,
     class_count,
+    class_text,
     classes_in_words,
     decisive_value_words,
     expected_words,
@@ -77,7 +78,7 @@ def verdict_lines(result: "Result") -> list[tuple[str, str]]:
 def _shipped_classes_of(names: Sequence[str], as_shipped: Mapping[str, Sequence[str]]) -> str:
     """Which of these claims have which other class as shipped."""
     differing = {kind: [name for name in claims if name in names] for kind, claims in as_shipped.items()}
-    return "; ".join(f"{tr(kind)}: {claim_ranges(claims)}" for kind, claims in differing.items() if claims)
+    return "; ".join(f"{class_text(kind)}: {claim_ranges(claims)}" for kind, claims in differing.items() if claims)
 
 
 def print_claims(

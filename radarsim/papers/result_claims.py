@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from radarsim.api import configs
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
-from radarsim.papers.claim_rows import CLASS_ORDER, group_by_claim, is_extension
+from radarsim.papers.claim_rows import CLASS_ORDER, EXTENSION_ENDING, group_by_claim, is_extension
 from radarsim.papers.claims_table import NOT_JUDGED, NOT_RUN_CELLS, NUMBER_COLUMNS, claims_table, first_rows
 from radarsim.papers.outdated_verdicts import current_marks, current_rows
 from radarsim.papers.stored_verdicts import known_classes
@@ -75,7 +75,7 @@ def claims_by_class(result: "Result", column: str = "class") -> dict[str, list[s
     by_class: dict[str, list[str]] = {}
     rows = group_by_claim(_records(result))
     for parts in sorted(rows, key=lambda parts: CLASS_ORDER.index(parts[0][column])):
-        kind = parts[0][column] + (", extension" if is_extension(parts) else "")
+        kind = parts[0][column] + (EXTENSION_ENDING if is_extension(parts) else "")
         by_class.setdefault(kind, []).append(parts[0]["claim"])
     return by_class
 

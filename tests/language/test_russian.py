@@ -10,9 +10,11 @@ from radarsim.api import result_content, write_result
 from radarsim.api.configs import load
 from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
+from radarsim.extensions import extensions
 from radarsim.language import current, translate
 from radarsim.language.current import use_language
 from radarsim.language.translate import tr, translate_names
+from radarsim.papers.claim_rows import class_count, class_text
 from radarsim.report.csv_text import to_csv
 from radarsim.report.drawing.model import Figure
 
@@ -101,7 +103,8 @@ def check(stem: str, realisations: int, folder) -> None:
         )
         page = (written.folder / "report.html").read_text(encoding="utf-8")
         texts = [words for figure in figures.values() for words in shown(figure)]
-        said = [result.question, *type(result).answer.func(result), *texts]
+        claims = [line for extension in extensions() for _, line in extension.result_lines(result)]
+        said = [result.question, *type(result).answer.func(result), *claims, *texts]
     stems = {stem, *(case.name.partition(" ")[0] for case in result.cases)}
     assert {words: found for words in said if (found := latin(words, stems))} == {}
     assert [words for words in said if UNPARTED.search(words)] == []
@@ -175,6 +178,14 @@ def listed_in(spec):
     """What has a name in a case: filters, detectors, estimators."""
     for key in ("filters", "detectors", "estimators"):
         yield from getattr(spec, key, None) or ()
+
+
+def test_extensions_are_counted_in_russian():
+    with use_language("ru"):
+        assert class_count("confirmed, extension", 1) == "1 подтверждено (дополнение)"
+        assert class_text("refuted, extension") == "опровергнуто (дополнение)"
+        assert "(дополнение)" in class_count("depends on, extension", 2)
+    assert class_count("confirmed, extension", 1) == "1 confirmed (extension)"
 
 
 def test_claims_are_in_russian_words():
