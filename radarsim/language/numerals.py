@@ -8,6 +8,7 @@ from radarsim.language.current import ENGLISH, current_language, translations
 
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 POWER = re.compile(r"(?P<mantissa>\d[\d.,]*)e(?P<exponent>[+-]\d+)")  # of a number in Python's form
+FOUR_DIGITS = re.compile(r"(?<![\d.,])(\d),(\d{3})(?![\d,])")  # 4,000, which languages that set spaces write as 4000
 NUMBER = "number"  # context of the point and of the separator of thousands
 
 
@@ -22,6 +23,8 @@ def numeral(text: str) -> str:
     if current_language() == ENGLISH:
         return text.replace("-", "−")
     catalogue_of_language = translations(current_language())
+    if catalogue_of_language.pgettext(NUMBER, ",").isspace():
+        text = FOUR_DIGITS.sub(r"\1\2", text)
     return text.translate({ord(mark): catalogue_of_language.pgettext(NUMBER, mark) for mark in ".,"} | {ord("-"): "−"})
 
 

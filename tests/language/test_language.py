@@ -31,7 +31,8 @@ def test_numbers_are_written_as_the_language_writes_them():
     with use_language("ru"):
         assert numeral("1.72e-05") == "1,72·10⁻⁵"
         assert tr("an unambiguous interval of {span:.4g} m/s", span=-1.5) == "интервал однозначности −1,5 м/с"
-        assert numeral("-1,234.5") == "−1\N{NARROW NO-BREAK SPACE}234,5"
+        assert numeral("-12,345.5") == "−12\N{NARROW NO-BREAK SPACE}345,5"
+        assert [numeral(text) for text in ("4,000", "-1,234.5")] == ["4000", "−1234,5"]  # four digits are not split
         assert wording.number(2.5e-7) == "2,5·10⁻⁷"
         assert wording.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"
         assert tr("{name}: bias", name="1.5") == "1.5: смещение"  # a name of the user's stays as it is
