@@ -16,7 +16,7 @@ from radarsim.config.radial_keys import MAX_SCANS
 FOLDED_STUDY = "study=ambiguous_doppler"  # takes the same config over
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
 
-SWEPT_POWERS = range(-2, 5)  # of ten, times a D_M: from that of a steady target to that of a missile
+SWEPT_POWERS = range(-2, 4)  # of ten, times a D_M
 
 
 class Radar(radial_keys.Radar):

@@ -189,5 +189,5 @@ def test_the_sweep_of_a_new_config_can_be_switched_on(tmp_path, monkeypatch, lik
     text = path.read_text()
     path.write_text(text.replace("# sweep: {manoeuvre_variance", "sweep: {manoeuvre_variance"))
     result = radarsim.run(path, realisations=20, overrides=["target=turn", "scans=9"], out=tmp_path, figures=False)
-    assert len(result.cases) == 7
+    assert len(result.cases) == 6
     assert "with each at its best D_M" in result.answer[1]
