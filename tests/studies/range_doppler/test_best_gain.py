@@ -9,6 +9,7 @@ from scipy import linalg
 import radarsim
 from radarsim.api import new_configs
 from radarsim.report.statistics import Estimate, root_mean_square, simultaneous_sizes
+from radarsim.studies.range_doppler import variance_answer
 from radarsim.studies.range_doppler.best_gain_answer import FilterChoices, gain_sentences
 
 SIGMA, DT = np.array([15.0, 0.8]), 2.5
@@ -191,3 +192,24 @@ def test_the_sweep_of_a_new_config_can_be_switched_on(tmp_path, monkeypatch, lik
     result = radarsim.run(path, realisations=20, overrides=["target=turn", "scans=9"], out=tmp_path, figures=False)
     assert len(result.cases) == 6
     assert "with each at its best D_M" in result.answer[1]
+
+
+@pytest.mark.slow
+def test_measured_errors_have_intervals_for_all_scans_variances_and_filters_at_once(monkeypatch):
+    """As of a run that is too long to compute: the ends are those of the tables, widened for all 2·2·37 of them."""
+    monkeypatch.setattr(
+        variance_answer, "_computed_sigma", lambda result, f, v: np.full((len(v), result.spec.plots, 3), np.nan)
+    )
+    tried, missing = [1e-3, 1e-1], {"detection_probability": 0.85}
+    result = radarsim.run(config(BOAT, scans=61, realisations=500, sweep={"manoeuvre_variance": tried}, radar=missing))
+    curves = result.tables["curves"]
+    rows = curves[(curves["component"] == "r") & (curves["k"] >= 25)]
+    assert rows["exact_sigma"].isna().all()
+    measured = Estimate(*(rows[name].to_numpy() for name in ("sigma", "sigma_lo", "sigma_hi")))
+    widened = rows.assign(**simultaneous_sizes(measured, len(rows))._asdict())
+    r, v = (
+        widened[(widened["filter"] == name) & (widened["case"].str.endswith("0.1"))][["value", "lo", "hi"]].max()
+        for name in ("r", "r+Vr")
+    )
+    ends = f"{100 * (1 - v['hi'] / r['lo']):.1f} to {100 * (1 - v['lo'] / r['hi']):.1f} % (95 % interval) (10⁻¹)"
+    assert ends.replace("-", "−") in gain_sentence(result)
