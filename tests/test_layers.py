@@ -49,7 +49,7 @@ ROOMS = {
     "report.user_filters": ("config.experiment", "engine.results", "language", "report", "report.drawing"),
     "studies": (),
     "studies.noise": ("config.experiment", "config.identity", "kernels.random"),
-    "studies.radial_truth": ("constants", "physics"),
+    "studies.radial_truth": ("config.radial_keys", "constants", "physics"),
     "studies.random_numbers": ("kernels.random",),
     "studies.error_law": (),
     "studies.missed_scans": (),
@@ -58,9 +58,10 @@ ROOMS = {
     "studies.recording_interface": ("config.experiment", "studies.error_law", "studies.plot_arrays"),
     "studies.floors": ("engine.results", "report", "studies.interface"),
     "studies.counted_scans": ("config.experiment", "engine.results", "studies.interface"),
+    "studies.long_run": ("config.experiment", "studies.counted_scans", "studies.interface"),
     "studies.interface": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "report", "report.drawing"),
-        *("studies.counted_scans", "studies.floors", "studies.recording_interface"),
+        *("studies.counted_scans", "studies.floors", "studies.long_run", "studies.recording_interface"),
     ),
     "studies.onefile": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "language", "report", "report.drawing"),
@@ -187,7 +188,8 @@ ROLES = {
     "__init__": (
         (
             *("config.experiment", "engine.results", "language", "report", "report.drawing", "studies.floors"),
-            *("studies.counted_scans", "studies.interface", "studies.plot_arrays", "studies.recording_interface"),
+            *("studies.counted_scans", "studies.interface", "studies.plot_arrays", "studies.radial_truth"),
+            "studies.recording_interface",
         ),
         (*DISPLAYED, "answer", "chart", "floor", "recorded_plots", "tracking"),
     ),

@@ -85,7 +85,7 @@ def first_for_good(is_settled: np.ndarray) -> int:
     return int(wrong[-1]) + 1 if wrong.size else 0
 
 
-def settled_scan(spread: np.ndarray) -> int:
+def settled_scan(spread: np.ndarray, may_grow: bool = True) -> int:
     """The scan, from 1, from which on the spread (K,) of a filter's errors stays within 5 % until the track is half as
     old again, but for twice that in a fifth of the scans; of one that grows, as with the distance, the scan from which
     on it falls no more. K + 1 where the run is too short to tell."""
@@ -101,7 +101,7 @@ def settled_scan(spread: np.ndarray) -> int:
                 return i + 1
             falls.append((i, middle < -margin))
         i += max(1, i // STRIDE)
-    for first, (i, _) in enumerate(falls):
+    for first, (i, _) in enumerate(falls if may_grow else ()):
         if not any(is_falling for _, is_falling in falls[first:]):
             return i + 1
     return len(spread) + 1
@@ -124,7 +124,9 @@ def study_scans(
         return None
     start_s, settled = study.manoeuvre_start_s(case.spec), list[int]()
     if manoeuvre_scan(start_s, t) is None:
-        settled = [settled_scan(spread) for spread in _spread(study, case, axes, c) if not np.isnan(spread).all()]
+        settled = [
+            settled_scan(spread) for spread in spread_by_scan(study, case, axes, c) if not np.isnan(spread).all()
+        ]
     counted = counted_scans(start_s, t, int(available.argmax(axis=1).max()) + 1, settled)
     return counted._replace(k=int(axes.k[counted.k - 1]))
 
@@ -136,19 +138,22 @@ def result_scans(study: "Study", result: CaseResult[Any], component: str | None 
     return study.counted_scans(case, component, result.axes) or last
 
 
-def _spread(study: "Study", case: Case, axes: Axes, c: int) -> np.ndarray:
+def spread_by_scan(study: "Study", case: Case, axes: Axes, c: int, filters: Sequence[int] | None = None) -> np.ndarray:
     """The spread (F, K) of the errors in component c about their means, which a target's motion makes: exact where it
-    is known exactly, else of a few realisations with a seed of their own."""
-    available = np.asarray(axes.available)[:, :, c]
-    sigma, bias = (np.array(values, dtype=float)[:, :, c] for values in (axes.exact_sigma, axes.exact_bias))
+    is known exactly, else of a few realisations with a seed of their own. filters: the F by index, by default all."""
+    chosen = list(range(len(axes.filters)) if filters is None else filters)
+    available = np.asarray(axes.available)[chosen, :, c]
+    sigma, bias = (np.array(values, dtype=float)[chosen, :, c] for values in (axes.exact_sigma, axes.exact_bias))
     if not study.exact_errors or np.isnan(np.where(available, sigma + bias, 0.0)).any():
         plan = study.prepare(replace(case, seed=PILOT_SEED))
         sums: Mapping[str, np.ndarray] = plan.layout.unpack(study.simulate(plan, 0, PILOT_REALISATIONS))
         result = CaseResult(case.name, case.study, case.spec, case.swept_values, PILOT_REALISATIONS, sums, plan.axes)
         curves = study.curves([result])
         curves = curves[curves["component"] == axes.components[c][0]]
+        rows = {axes.filters[f]: i for i, f in enumerate(chosen)}
         places = {int(k): i for i, k in enumerate(axes.k)}
-        for name, k, sigma_s, bias_s in curves[["filter", "k", "sigma", "bias"]].to_numpy():
-            place = axes.filters.index(name), places[int(k)]
-            sigma[place], bias[place] = sigma_s, bias_s
-    return np.where(available, np.sqrt(np.maximum(sigma**2 - bias**2, 0.0)), np.nan)
+        for name, k, sigma_of_scan, bias_of_scan in curves[["filter", "k", "sigma", "bias"]].to_numpy():
+            if name in rows:
+                sigma[rows[name], places[int(k)]], bias[rows[name], places[int(k)]] = sigma_of_scan, bias_of_scan
+    with np.errstate(over="ignore", invalid="ignore"):  # of filters that are lost
+        return np.where(available, np.sqrt(np.maximum(sigma**2 - bias**2, 0.0)), np.nan)

@@ -8,7 +8,7 @@ The numbers are computed by two of them: `prepare` makes a plan of a case, once;
 of realisations. Everything else is derived from these sums."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -132,9 +132,19 @@ class Study(ABC):
 
         return study_scans(self, case, component, axes)
 
-    def in_the_long_run(self, case: "Case") -> "Case | None":
-        """A case whose last scan is that of the same filters once settled, without a manoeuvre. Default: None."""
-        return None
+    def without_manoeuvre(self, spec: Any) -> Mapping[str, Any]:
+        """Changes of a config's keys with which its target does not manoeuvre, however long the run. Default: its key
+        `start_s` is postponed."""
+        from radarsim.studies.long_run import without_manoeuvre
+
+        return without_manoeuvre(spec)
+
+    def in_the_long_run(self, case: "Case", filter_names: "Collection[str] | None" = None) -> "Case | None":
+        """A case whose last scan is that of the same filters once settled, without a manoeuvre; None where those named,
+        by default all, do not settle. Default: with so many scans that σ stays, exact or of a few realisations."""
+        from radarsim.studies.long_run import extended_case
+
+        return extended_case(self, case, filter_names)
 
     def steady_sigma(self, case: "Case") -> "np.ndarray | None":
         """The exact σ (F, C) of a case's filters in the long run, without a manoeuvre. Default: None."""

@@ -251,6 +251,12 @@ class OneFile(Study):
         """The limit of σ (F, C) of a config's errors, NaN where there is none; None: not known."""
         return None
 
+    def steady_sigma(self, case: "Case") -> "np.ndarray | None":
+        import numpy as np
+
+        limits = self.limits(case.spec)
+        return None if limits is None or np.isnan(limits).any() else limits
+
     def quantities(self, spec: Any = None) -> tuple[Quantity, ...]:
         limit = Quantity("limit", term("limit of σ"), "last", "steady_sigma", per="component")
         return COMMON if type(self).limits is OneFile.limits else (*COMMON, limit)

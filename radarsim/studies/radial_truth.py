@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from radarsim.config import radial_keys
 from radarsim.constants import STANDARD_GRAVITY_MPS2
 from radarsim.errors import ConfigError
 from radarsim.physics import recorded_course, targets
@@ -32,6 +33,14 @@ def truth(target: Any, t: np.ndarray) -> np.ndarray:
         case "recorded":
             return recorded_flight(target.file, t)
     raise ValueError(f"no such target: {target.kind}")
+
+
+def resting_target(target: Any) -> Any:
+    """A target that keeps the range of a configured one at the first plot; one that is drawn, as it is."""
+    if target.kind == "random_polynomial":
+        return target
+    first_range_m = float(truth(target, np.zeros(1))[0, 0])
+    return radial_keys.Polynomial(kind="polynomial", coefficients=(first_range_m,))
 
 
 def recorded_flight(file: str, t: np.ndarray) -> np.ndarray:

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import radarsim
+from radarsim.api.configs import load
+from radarsim.api.design import quantities
 from radarsim.config.quantity_phrase import PhraseError, QuantityPhrase, parse_phrase
 from radarsim.errors import ConfigError
 from tests.program import command
@@ -117,7 +119,7 @@ def test_tune_and_sensitivity_take_the_worst_error():
         ),
         (["solve", "rls2", SIGMA_V, "--for", "sigma r", "--sigma", "r", "--equals", "3"], "got sigma, --for"),
         (["sensitivity", "rls2", "--for", "sigma r", "--component", "r"], "--component: stands in --for already"),
-        (["sensitivity", "multimodel", "--for", "sigma x in the long run"], "knows none of it; give a time"),
+        (["sensitivity", "multimodel", "--for", "sigma x in the long run"], "do not settle, or settle only beyond"),
     ],
 )
 def test_what_goes_against_a_phrase_is_refused(words, message):
@@ -160,3 +162,52 @@ def test_a_precision_is_asked_of_a_phrase():
     assert (last["k"].tolist(), last["component"].tolist()) == ([15], ["Vr"])
     with pytest.raises(ConfigError, match="a run has no long run"):
         asked_table(case, "sigma r in the long run")
+
+
+@pytest.mark.slow
+def test_a_long_run_without_a_formula_extends_the_horizon_until_it_has_settled():
+    """The σ of folded Doppler's oracle, a Kalman filter, is the fixed point of its covariance, here by a recursion."""
+    answer = radarsim.solve(
+        "ambiguous_rls4", "radar.sigma_velocity_mps", wanted="sigma r in the long run", filter="oracle", equals=16
+    )
+    radar = load("ambiguous_rls4").cases[0].spec.radar
+    variance = load("ambiguous_rls4").cases[0].spec.filters[1].variances[0]
+    limit = steady_sigma(answer.value, variance, radar.scan_period_s, radar.sigma_range_m)
+    assert limit == pytest.approx(16, rel=2e-3)
+    assert f"in the long run (settled, at {answer.last_s:g} s)" in answer.lines[1][1]
+    assert answer.last_s > 140
+
+
+@pytest.mark.slow
+def test_a_filter_that_never_settles_has_no_long_run():
+    with pytest.raises(ConfigError, match="errors of growing do not settle"):
+        radarsim.solve(
+            "sonar_smoothing", "sensor.sigma_range_m", wanted="sigma r in the long run", filter="growing", equals=9
+        )
+
+
+@pytest.mark.parametrize(("scans", "words"), [(15, "(35 s, not settled)"), (61, "(150 s)")])
+def test_every_answer_of_solve_says_its_time_and_whether_the_filter_has_settled(scans, words):
+    answer = radarsim.solve(
+        *(MINE | {"scans": scans}, "radar.sigma_velocity_mps"), wanted="gain r", filter="r+Vr", equals=50
+    )
+    assert f"at the last scan {words}: 50 %" in answer.lines[1][1]
+
+
+def test_an_exact_long_run_is_solved_once(monkeypatch):
+    from radarsim.studies.range_doppler import long_run
+
+    calls, steady = [], long_run.steady_sigma
+    monkeypatch.setattr(long_run, "steady_sigma", lambda case: calls.append(case) or steady(case))
+    quantities.steady_sigma.cache_clear()
+    radarsim.sensitivity(MINE, wanted="sigma r in the long run")
+    assert len(calls) == len(set(calls))
+
+
+@pytest.mark.slow
+def test_a_sampled_gain_is_solved_where_a_further_quantity_has_no_column():
+    answer = radarsim.solve(
+        *("ambiguous_rls4", "radar.sigma_velocity_mps"),
+        **{"wanted": "gain r", "filter": "no memory", "equals": 30, "between": (1, 3), "realisations": 60},
+    )
+    assert not answer.exact

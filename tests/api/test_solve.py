@@ -347,7 +347,7 @@ def test_the_command_says_value_slope_and_check():
     assert ended.exit_code == 0
     assert ended.stdout.splitlines() == [
         "radar.sigma_velocity_mps = 13.7212 m/s   exact",
-        "attains  gain of r+Vr in r at 60 s: 30 % (at 15 m/s: 27.92 %)",
+        "attains  gain of r+Vr in r at 60 s (not settled): 30 % (at 15 m/s: 27.92 %)",
         "slope    1 m/s more costs 1.70 points",
         "check    radarsim run rls2 --set radar.sigma_velocity_mps=13.7212493675 --out results/solved",
     ]

@@ -5,6 +5,7 @@ names that all studies share: any study with a table `locks` has the quantity lo
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -182,7 +183,7 @@ def unit(quantity: MeasuredQuantity, axes: Axes) -> str:
 
 def shorten_case(quantity: MeasuredQuantity, case: Case) -> Case:
     """The case shortened to the scans that a quantity needs. Raises ConfigError where the whole case is invalid."""
-    if quantity.over == "long run" and registry.study(case.study).steady_sigma(case) is not None:
+    if quantity.over == "long run" and steady_sigma(case) is not None:
         return registry.study(case.study).shortened(case, None, 1)
     if quantity.over != "at":
         return case_read(quantity, case)
@@ -191,18 +192,48 @@ def shorten_case(quantity: MeasuredQuantity, case: Case) -> Case:
 
 def case_read(quantity: MeasuredQuantity, case: Case) -> Case:
     """The case in which a quantity is read: of the long run one that lasts until its filters have settled, without a
-    manoeuvre. Raises ConfigError where a study has none."""
+    manoeuvre. Raises ConfigError where they do not settle."""
     if quantity.over != "long run":
         return case
-    long_case = registry.study(case.study).in_the_long_run(case)
+    long_case = registry.study(case.study).in_the_long_run(case, compared_filters(quantity, case))
     if long_case is None:
-        raise ConfigError(f"{case.name}: in the long run: study {case.study} knows none of it; give a time")
+        raise ConfigError(
+            f"{case.name}: in the long run: errors of {quantity.filter or 'a filter'} do not settle, or settle only "
+            "beyond what can be computed: give a time"
+        )
     return long_case
 
 
 def plan_labels(quantity: MeasuredQuantity, case: Case) -> Axes:
     """The labels of a case's plan, with exact errors up to the scans that a quantity needs. Raises ConfigError."""
     return registry.study(case.study).prepare(shorten_case(quantity, case)).axes
+
+
+def compared_filters(quantity: MeasuredQuantity, case: Case) -> set[str] | None:
+    """The names of the filters on which a quantity depends; None: all."""
+    if quantity.filter is None:
+        return None
+    baseline = {getattr(case.spec, "baseline", None) or case.spec.members[0].name}
+    return {quantity.filter} | (baseline if quantity.definition.paired else set())
+
+
+def is_settled(quantity: MeasuredQuantity, case: Case) -> bool:
+    """Whether the filters on which an error at a time depends have settled by then, or the target manoeuvres before;
+    also where that is not known."""
+    if quantity.over != "at" or not is_planned(quantity.definition):
+        return True
+    names, spec = compared_filters(quantity, case), case.spec
+    members = tuple(member for member in spec.members if names is None or member.name in names)
+    changes = {type(spec).bare_keys: members} | ({"baseline": None} if hasattr(spec, "baseline") else {})
+    compared = replace(case, spec=spec.model_copy(update=changes))
+    try:
+        scans = registry.study(case.study).counted_scans(compared, quantity.component)
+    except ConfigError:  # other keys name the filters that are left out
+        scans = registry.study(case.study).counted_scans(case, quantity.component)
+    if scans is None or scans.reason == "manoeuvre":
+        return True
+    is_late = quantity.at_s is None if quantity.at_k is None else quantity.at_k >= scans.k
+    return scans.reason == "settled" and (is_late or (quantity.at_s or 0.0) >= scans.t_s)
 
 
 PLANNED = {("curves", "sigma"): "exact_sigma", ("gains", "gain_percent"): "exact_gains"}  # by table and column
@@ -219,7 +250,7 @@ def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
         return np.nan
     f = axes.filters.index(str(quantity.filter))
     c = [name for name, _ in axes.components].index(str(quantity.component))
-    if quantity.over == "long run" and (sigma := registry.study(case.study).steady_sigma(case)) is not None:
+    if quantity.over == "long run" and (sigma := steady_sigma(case)) is not None:
         return _steady_value(quantity, sigma[:, c], f, axes.baseline)
     available = axes.available[f, :, c]
     if quantity.definition.paired:
@@ -230,6 +261,12 @@ def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
     values = np.where(available, exact_values[f, :, c], np.nan)
     k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
     return float(estimate_at(quantity, Series(k, t_s, Estimate(values, values, values))).value)
+
+
+@lru_cache(maxsize=4)  # a case is asked for its axes, and then for its value
+def steady_sigma(case: Case) -> np.ndarray | None:
+    """The exact σ (F, C) of a case's filters in the long run, where its study knows it."""
+    return registry.study(case.study).steady_sigma(case)
 
 
 def _steady_value(quantity: MeasuredQuantity, sigma: np.ndarray, f: int, baseline: int | None) -> float:
@@ -296,7 +333,11 @@ def interval_note(quantity: MeasuredQuantity, result: CaseResult) -> str:
 
     study, table_name = registry.study(result.study), quantity.definition.table
     tables = {"curves": study.curves([result]), table_name: quantity_table(quantity.definition, result)}
-    declared_quantities = registry.quantities(result.study, result.spec)
+    declared_quantities = [
+        declared
+        for declared in registry.quantities(result.study, result.spec)
+        if declared.table not in tables or declared.value in tables[declared.table]
+    ]
     table = interval_notes.add_notes(tables, [result], exact=False, quantities=declared_quantities)[table_name]
     if "note" not in table:
         return ""

@@ -136,6 +136,7 @@ class Question:
     overrides: tuple[str, ...]
     realisations: int | None = None
     last_s: float | None = None
+    settled: bool = True
 
     def command(self, value: float) -> str:
         """The run that confirms a value, with independent noise and the requested number of realisations, in a
@@ -367,6 +368,7 @@ def make_answer(
         command=question.command(confirmed_value),
         notes=notes,
         last_s=question.last_s,
+        settled=question.settled,
     )
 
 

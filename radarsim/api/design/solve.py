@@ -11,7 +11,7 @@ from functools import partial
 from radarsim.api import arguments, configs
 from radarsim.api.configs import Config
 from radarsim.api.design import quantities, root_search, solve_answer
-from radarsim.api.design.quantities import QuantityName
+from radarsim.api.design.quantities import MeasuredQuantity, QuantityName
 from radarsim.api.design.question import (
     JUMP_NOTE,
     ROUGH_VALUES,
@@ -35,7 +35,9 @@ from radarsim.api.design.sampled_solve import solve_by_sampling
 from radarsim.api.design.solve_answer import Answer
 from radarsim.api.load_experiments import combine_overrides
 from radarsim.config import numeric_keys
+from radarsim.config.experiment import Case
 from radarsim.config.labels import label
+from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import tr
 from radarsim.report.statistics import Estimate
@@ -124,10 +126,17 @@ def solve(
     config_value = matching_keys[0].value if len({numeric_key.value for numeric_key in matching_keys}) == 1 else None
     question = Question(
         *(cases, key, measured, equals, search_range, config_value, quantities.unit(measured, axes), texts, count),
-        last_s=float(axes.t_s[-1]) if len(axes.t_s) and key not in TIME_KEYS else None,
+        last_s=_last_s(measured, cases.base, axes) if key not in TIME_KEYS else None,
+        settled=key in TIME_KEYS or quantities.is_settled(measured, cases.base),
     )
     work = _solve_exactly if not sampled and curve.is_exact(axes) else solve_by_sampling
     return work(question, curve, notify or (lambda line: None))
+
+
+def _last_s(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float | None:
+    """The time of the last scan in which a quantity is read; None without scans, or of a limit."""
+    is_limit = quantity.over == "long run" and quantities.steady_sigma(case) is not None
+    return None if is_limit or not len(axes.t_s) else float(axes.t_s[-1])
 
 
 def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:

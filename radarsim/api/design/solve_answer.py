@@ -22,7 +22,7 @@ class Answer(Displayable):
     value is None where the target is not attained; then limit is the nearest attainable value, at limit_at. lo and hi
     bound the value at 95 %, and equal it where exact. slope is the change of the quantity for one unit of the key;
     other_values: further values that attain the target. low and high are the searched range, command the run that
-    confirms."""
+    confirms. last_s: the time of the last scan; settled: whether the filters have settled by the time asked about."""
 
     key: str
     unit: str
@@ -45,6 +45,7 @@ class Answer(Displayable):
     command: str
     notes: tuple[str, ...] = ()
     last_s: float | None = None
+    settled: bool = True
 
     @property
     def table(self) -> "pd.DataFrame":
@@ -64,7 +65,7 @@ class Answer(Displayable):
         if abs(attained - self.equals) < NEAR_ZERO * max(abs(self.equals), abs(self.attained_now)):
             attained = self.equals  # of a root at zero rounding is all that is left
         lines = [("", f"{self.key} = {with_unit(value, self.unit)}   {interval}")]
-        lines.append(("attains", f"{self.quantity.translated_words}: {self._quantity(attained)}{self._now}"))
+        lines.append(("attains", f"{self._quantity_and_time}: {self._quantity(attained)}{self._now}"))
         if self.slope is not None:
             lines.append(("slope", self._slope(value, self.slope)))
         if self.other_values:
@@ -78,7 +79,7 @@ class Answer(Displayable):
         if self.value is not None or limit is None or limit_key_value is None:
             return ()
         fields = {
-            **{"quantity": self._quantity_at_the_end, "key": self.key, "wanted": self._quantity(self.equals)},
+            **{"quantity": self._quantity_and_time, "key": self.key, "wanted": self._quantity(self.equals)},
             **{"low": format_number(self.low), "high": with_unit(self.high, self.unit)},
             **{"limit": self._quantity(limit), "at": with_unit(limit_key_value, self.unit)},
         }
@@ -86,12 +87,18 @@ class Answer(Displayable):
         return (line, *(tr("note: {words}", words=tr(note)) for note in self.notes))
 
     @property
-    def _quantity_at_the_end(self) -> str:
-        """The quantity in words, with its time where that is the last scan's."""
-        quantity = self.quantity
-        if self.last_s is None or (quantity.over, quantity.at_s, quantity.at_k) != ("at", None, None):
-            return quantity.translated_words
-        return tr("{what} at the last scan ({t_s:g} s)", what=quantity.translated_words, t_s=self.last_s)
+    def _quantity_and_time(self) -> str:
+        """The quantity in words, with its time, and whether the filters have not settled by then."""
+        quantity, last_s = self.quantity, self.last_s
+        text = quantity.translated_words
+        if quantity.over == "long run" and last_s:
+            return tr("{what} (settled, at {t_s:g} s)", what=text, t_s=last_s)
+        if last_s is not None and (quantity.over, quantity.at_s, quantity.at_k) == ("at", None, None):
+            fields = {"what": text, "t_s": last_s}
+            if self.settled:
+                return tr("{what} at the last scan ({t_s:g} s)", **fields)
+            return tr("{what} at the last scan ({t_s:g} s, not settled)", **fields)
+        return text if self.settled else tr("{what} (not settled)", what=text)
 
     def _answer_lines(self) -> list[str]:
         return [labelled_line(label, words).strip() for label, words in self.lines]

@@ -1,7 +1,7 @@
 """Folded Doppler velocity: filters that unfold it by hypotheses, with memory and without (P1's suggested extension)."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from radarsim.language.translate import term
 from radarsim.report.quantities import COMMON, FLOORS, RIGHT, WRONG, Quantity
@@ -50,6 +50,11 @@ class AmbiguousDoppler(Study):
 
     def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
         return (*COMMON, ABOVE_ORACLE, RIGHT, WRONG, *FLOORS)
+
+    def without_manoeuvre(self, spec: "Keys") -> Mapping[str, Any]:
+        from radarsim.studies.radial_truth import resting_target
+
+        return {"target": resting_target(spec.target)}
 
     def prepare(self, case: "Case") -> "Plan":
         from radarsim.studies.ambiguous_doppler import study

@@ -40,6 +40,11 @@ class PulsesToTracks(Study):
     def quantities(self, spec: "Keys | None" = None) -> tuple[Quantity, ...]:
         return (*COMMON, LOCK, LOST, RIGHT, WRONG, *FLOORS)
 
+    def without_manoeuvre(self, spec: "Keys") -> Mapping[str, Any]:
+        from radarsim.studies.radial_truth import resting_target
+
+        return {"target": resting_target(spec.target)}
+
     def prepare(self, case: "Case") -> "Plan":
         from radarsim.studies.pulses_to_tracks import study
 

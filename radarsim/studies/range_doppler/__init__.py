@@ -1,6 +1,6 @@
 """P1 (Gorshkov & Zavizhenets 2017): range-only against range + Doppler Kalman filters of the second order."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from radarsim.report.quantities import COMMON, FLOORS, Quantity
@@ -75,7 +75,7 @@ class RangeDoppler(Study):
 
         return long_run.counted_scans(case, component)
 
-    def in_the_long_run(self, case: "Case") -> "Case | None":
+    def in_the_long_run(self, case: "Case", filter_names: "Collection[str] | None" = None) -> "Case | None":
         from radarsim.studies.range_doppler import long_run
 
         return long_run.in_the_long_run(case)
