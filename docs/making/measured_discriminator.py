@@ -73,7 +73,7 @@ def efficiency(stem: str, case: str, column: str, figures: int, *names: str) -> 
         for name in names:
             table = select_rows(results, stem, "curves", filter=name)
             last_window = table[table["case"] == case].groupby("component").tail(1)
-            ratios += list(last_window[column] / last_window["exact_sigma"])
+            ratios += list(last_window[column] / last_window["bound"])
         return " … ".join(f"{float(f'{ratio:.{figures}g}'):g}" for ratio in (min(ratios), max(ratios)))
 
     return text

@@ -62,9 +62,10 @@ class Result(Displayable):
         """Question, answer, realisations; below the figure σ and gain at the last scan; text escaped."""
         from html import escape
 
-        curve_columns = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi", "exact_sigma")
-        columns = [*curve_columns, *(name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))]
-        rows = self.last_scan[columns].dropna(axis=1, how="all")
+        curve_columns = ("case", "filter", "component", "unit", "t_s", "sigma", "sigma_lo", "sigma_hi")
+        known_columns = (name for name in ("exact_sigma", "bound") if name in self.curves)
+        gain_columns = (name for name in ("gain_percent", "gain_lo", "gain_hi") if len(self.gains))
+        rows = self.last_scan[[*curve_columns, *known_columns, *gain_columns]].dropna(axis=1, how="all")
         table = rows.to_html(
             index=False, border=0, float_format=lambda v: f"{v:.4g}", na_rep="", max_rows=MAX_NOTEBOOK_ROWS
         )

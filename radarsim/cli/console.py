@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 PIPED_WIDTH = 10_000  # whatever reads it wraps it, or not
 COLUMN_HEADINGS = (  # of tables
-    *(term("case"), term("filter"), term("component"), term("at"), term("sigma"), term("exact"), term("gain")),
+    *(term("case"), term("filter"), term("component"), term("at"), term("sigma"), term("exact"), term("bound")),
+    *(term("gain"),),
     *(term("95 % of gain"), term("of"), term("change"), term("filters"), term("scans")),
     *(term("realisations"), term("one thread"), term("known from"), term("last to get there"), term("claim")),
     *(term("statement"), term("place"), term("measured and expected"), term("class"), term("config"), term("key")),

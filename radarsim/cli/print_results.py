@@ -91,14 +91,16 @@ def print_last_scan(result: "Result") -> None:
 
 def print_last_scan_rows(stem: str, last_scan: "pd.DataFrame", names: Mapping[str, str]) -> None:
     """The table of rows of `Result.last_scan`, by names for the cases; common values are in its title."""
-    scan_rows: Iterable[Any] = last_scan.itertuples()  # named by column, which pandas' stubs do not know
+    known = "bound" if "bound" in last_scan else "exact"
+    is_without_value = last_scan["sigma"].isna()
+    scan_rows: Iterable[Any] = last_scan[~is_without_value].itertuples()  # named by column, which pandas does not say
     rows = [
         (
             *(names[row.case], row.filter, row.component, tr("{t_s:g} s", t_s=row.t_s)),
             f"{significant_digits(row.sigma)} {tr(unit_of(row.unit))}",
             ("" if isnan(row.sigma_lo) else f"{significant_digits(row.sigma_lo)} … {significant_digits(row.sigma_hi)}")
             + narrow_interval_mark(row, "note"),
-            format_if_known(row.exact_sigma),
+            format_if_known(row.bound if known == "bound" else row.exact_sigma),
             format_if_known(row.gain_percent, ".2f", " %"),
             format_if_known(row.gain_lo, ".2f", " … ")
             + format_if_known(row.gain_hi, ".2f")
@@ -106,8 +108,14 @@ def print_last_scan_rows(stem: str, last_scan: "pd.DataFrame", names: Mapping[st
         )
         for row in scan_rows
     ]
-    columns = ("case", "filter", "component", "at", "sigma", "95 %", "exact", "gain", "95 % of gain")
-    print_varying_columns(stem, ("case", "at"), columns, rows, columns[3:], ("exact", "95 %"))
+    columns = ("case", "filter", "component", "at", "sigma", "95 %", known, "gain", "95 % of gain")
+    if rows:
+        print_varying_columns(stem, ("case", "at"), columns, rows, columns[3:], (known, "95 %"))
+    without_value = list(dict.fromkeys(last_scan["filter"][is_without_value]))
+    if without_value:
+        count = plural("{count} row left out", "{count} rows left out", int(is_without_value.sum()))
+        text = tr("{filters} ({rows})", filters=shorten_names(without_value), rows=count)
+        print_field("no lock" if known == "bound" else "no estimate", text)
     for mark, reason in NARROW_INTERVAL_MARKS.items():
         if any(mark in cell for row in rows for cell in row[-4:]):
             print_field("", f"{mark.strip()} {tr(reason)}")

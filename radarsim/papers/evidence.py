@@ -293,7 +293,9 @@ class Evidence:
         if rows is None:
             raise self._lacking(result, filter_name, component, *base)
         _check_independent(result, filter_name, *base)
-        value, lo, hi, exact = (rows[name].to_numpy(dtype=float) for name in names)
+        value, lo, hi, exact = (
+            rows[name].to_numpy(dtype=float) if name in rows else np.full(len(rows), np.nan) for name in names
+        )
         if self._exact:
             if np.isnan(exact).any():
                 raise MissingEvidence("not known exactly")

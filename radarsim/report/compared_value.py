@@ -112,7 +112,7 @@ def sigma_value(row: Row, tables_by_name: "Mapping[str, pd.DataFrame]") -> Compa
     curves = tables.select_rows(tables_by_name["curves"], **labels).set_index("filter")
     for _, gain_row in tables.select_rows(tables_by_name["gains"], filter=row["filter"], **labels).iterrows():
         baseline = curves.loc[gain_row["baseline"]]
-        if baseline["exact_sigma"] > 0 and baseline["n"] == row["n"]:
+        if baseline.get("exact_sigma", np.nan) > 0 and baseline["n"] == row["n"]:
             paired = paired_sigma(float(baseline["exact_sigma"]), gain_row)
             if np.ptp(paired.estimate[1:]) < np.ptp(measured.estimate[1:]):
                 measured = paired

@@ -58,7 +58,7 @@ RENAMED: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     },
     "discriminator": {
         "bounds": {"potential_sigma": "crb", "potential_sigma_sum": "crb_sum"},
-        "curves": {"posterior_sigma": "posterior_crb"},
+        "curves": {"posterior_sigma": "posterior_crb", "exact_sigma": "bound"},
         "locks": {
             "posterior_rate": "posterior_lock_rate",
             "posterior_rate_3sigma": "posterior_lock_rate_3sigma",

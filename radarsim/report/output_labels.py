@@ -8,7 +8,8 @@ LABELS = (  # of lines
     *(term("check"), term("config"), term("package"), term("plots"), term("track"), term("tracks"), term("passed")),
     *(term("missing"), term("no rows"), term("untested"), term("gaps"), term("best"), term("advice")),
     *(term("again"), term("doubles")),
-    *(term("more"), term("no effect"), term("no estimate"), term("not paired"), term("left out"), term("files")),
+    *(term("more"), term("no effect"), term("no estimate"), term("no lock"), term("not paired"), term("left out")),
+    term("files"),
 )
 LONG_LABEL = 8  # letters of an English label from which it does not set the width of all
 

@@ -89,9 +89,9 @@ HEADINGS = (  # of their other columns
 def page_table(name: str, table: "pd.DataFrame", max_rows: int = MAX_ROWS) -> dict[str, Any]:
     """The part of a table that a page shows, with how many rows have which note."""
     order = list(table.columns)
-    if {"sigma", "exact_sigma"} <= set(order):  # side by side, to be compared
-        order.remove("exact_sigma")
-        order.insert(order.index("sigma") + 1, "exact_sigma")
+    for known in [name for name in ("bound", "exact_sigma") if {name, "sigma"} <= set(order)]:  # side by side
+        order.remove(known)
+        order.insert(order.index("sigma") + 1, known)
     rows = table[order].head(max_rows)
     return {
         "name": name,

@@ -79,7 +79,7 @@ def final_sigma(result: CaseResult, filter_name: str, component: str, curves: Ma
     if rows is None or not len(rows):
         return (np.nan,) * 4
     row = rows.iloc[-1]
-    return tuple(float(row[name]) for name in ("sigma", "sigma_lo", "sigma_hi", "exact_sigma"))
+    return tuple(float(row.get(name, np.nan)) for name in ("sigma", "sigma_lo", "sigma_hi", "exact_sigma"))
 
 
 def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], curves: Mapping) -> Figure | None:

@@ -66,7 +66,7 @@ class Study(ABC):
     about: str
     filters: Mapping[str, str]  # for `radarsim list`: keys of filters, and what they choose
     model: int = 1  # raised by an edit that changes numbers, so that no earlier block is used
-    exact_errors: bool = True  # False: exact_sigma is a bound, which a filter need not reach
+    exact_errors: bool = True  # False: `Axes.exact_sigma` is a bound, which a filter need not reach
     draws_sweeps: bool = False  # True: `figures` draws sweeps as well, in place of the common figures
 
     @abstractmethod

@@ -258,3 +258,15 @@ def test_a_table_has_no_empty_columns_and_says_once_what_all_rows_have(capsys):
     assert title.strip() == "a, b = 1, 1 s"
     assert head.split() == ["filter", "component", "sigma", "95", "%"]
     assert [line.split()[0] for line in lines] == ["f", "g"]
+
+
+def test_rows_without_a_lock_are_counted_and_a_bound_is_not_called_exact(capsys):
+    row = {"case": "a", "component": "f0", "unit": "Hz", "t_s": 0.3, "sigma_lo": 0.9, "sigma_hi": 1.1}
+    row |= {"gain_percent": np.nan, "gain_lo": np.nan, "gain_hi": np.nan}
+    last = [row | {"filter": "f", "sigma": 1.0, "bound": 0.95}, row | {"filter": "g", "sigma": np.nan, "bound": 1416.0}]
+    print_results.print_last_scan_rows("a", pd.DataFrame(last), {"a": "a"})
+    *table, no_lock = capsys.readouterr().out.splitlines()
+    assert "bound" in table[1].split()
+    assert "exact" not in table[1]
+    assert "nan" not in "".join(table)
+    assert no_lock.split() == ["no", "lock", "g", "(1", "row", "left", "out)"]

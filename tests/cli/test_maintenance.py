@@ -247,8 +247,8 @@ def test_the_self_test_says_so_where_numbers_differ(monkeypatch):
     for column, factor, sound in (
         ("sigma", 1 + 1e-10, True),
         ("sigma", 1 + 1e-7, False),
-        ("exact_sigma", 1 + 2e-11, True),
-        ("exact_sigma", 1 + 1e-9, False),
+        ("bound", 1 + 2e-11, True),
+        ("bound", 1 + 1e-9, False),
         ("sigma_hi", 1 + 1e-10, True),
         ("sigma_hi", 1 + 1e-6, False),
         ("spread", 1 + 1e-7, False),

@@ -63,7 +63,7 @@ def tolerance(study: str) -> Tolerance:
     return TOLERANCES.get(study, PACKAGE_TOLERANCE)
 
 
-EXACT_COLUMNS = ("exact_sigma", "exact_bias", "exact_percent", "posterior_crb", "floor")
+EXACT_COLUMNS = ("exact_sigma", "bound", "exact_bias", "exact_percent", "posterior_crb", "floor")
 LABELS_DIFFER = (float("inf"), float("inf"))
 FIRST_NUMBER = {"curves": "sigma", "gains": "gain_percent"}  # columns before it are labels and counts
 

@@ -119,7 +119,7 @@ def compare_with_rivals(
 
 def _ranks(baselines: Sequence[str], rows: Mapping[str, "pd.Series[Any]"], gains: "pd.DataFrame") -> dict[str, float]:
     """By what the config's filters are ranked: exact σ where all have it, else how little is gained against them."""
-    exact = {baseline: float(rows[baseline]["exact_sigma"]) for baseline in baselines}
+    exact = {baseline: float(rows[baseline].get("exact_sigma", np.nan)) for baseline in baselines}
     if not np.isnan(list(exact.values())).any():
         return exact
     return dict(zip(gains["baseline"], gains["gain_percent"], strict=True))

@@ -28,7 +28,7 @@ class Discriminator(Study):
         "method: sequence": "discriminators over windows that grow to the whole burst, Fisher scoring in each",
         "method: ridge": "the classical rival: short-time spectrum, robust fit, unwrapping, then scoring; no prior",
     }
-    exact_errors = False  # exact_sigma is the bound, which an estimator reaches or does not
+    exact_errors = False  # `Axes.exact_sigma` is the bound, which an estimator reaches or does not
     draws_sweeps = True  # lock is what is swept for, and has figures of its own
 
     def keys(self) -> "type[Keys]":

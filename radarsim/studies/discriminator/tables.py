@@ -36,8 +36,9 @@ def plain_bursts(result: CaseResult) -> int:
 
 @table("curves")
 def _curves(result: CaseResult) -> common.Columns:
-    """As everywhere, window by window, of the locked bursts; `exact_sigma` is the Cramér–Rao bound.
+    """As everywhere, window by window, of the locked bursts; without `exact_sigma`, as none is known.
 
+    bound [unit]: the Cramér–Rao bound without the forecast
     sigma_all [unit]: σ of all bursts, none dropped
     posterior_crb [unit]: the bound with the prior
     """
@@ -55,7 +56,7 @@ def _curves(result: CaseResult) -> common.Columns:
         "bias": locked_errors.bias * bound,
         "bias_se": locked_errors.bias_se * bound,
         "spread": locked_errors.spread * bound,
-        "exact_sigma": bound,
+        "bound": bound,
         "exact_bias": np.full(f.size, np.nan),
         "n_eff": statistics.effective(moments[..., 1], moments[..., 3], n),
         "sigma_all": all_errors.sigma.value * bound,

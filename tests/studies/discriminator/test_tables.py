@@ -27,11 +27,11 @@ def test_curves_are_of_the_locked_and_tell_of_all(made):
     rows = made.curves[(made.curves["filter"] == "sequence") & (made.curves["component"] == "f3")]
     last = rows.iloc[-1]
     assert (last["k"], last["t_s"]) == (13, pytest.approx(0.3, rel=rounding(operations=2)))
-    assert last["exact_sigma"] == pytest.approx(1213, rel=5e-4)  # four printed digits
+    assert last["bound"] == pytest.approx(1213, rel=5e-4)  # four printed digits
     assert last["n"] < 256
     assert last["sigma"] == pytest.approx(1213, rel=sigma_error(last["n"]))
     assert last["sigma_all"] > 10 * last["sigma"]
-    assert np.all(rows["posterior_crb"] <= rows["exact_sigma"])
+    assert np.all(rows["posterior_crb"] <= rows["bound"])
 
 
 def test_locks_fall_along_the_windows(made):
