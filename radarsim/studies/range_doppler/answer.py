@@ -62,7 +62,7 @@ def _broken_model_sentences(results: Sequence[Result], tables_by_name: TablesByN
             for filter_rows in [rows[result.name, name]]
         ]
         text = tr(
-            "{case}, a target that breaks the filters' model, {since}: {filters}.",
+            "{case}, {since}: {filters}.",
             case=key_labels.plain_case_label(result),
             since=wording.since(*counted),
             filters=sentences.join("; ", clauses).text,
