@@ -18,6 +18,7 @@ from radarsim.report.page_sentences import count_visible_sentences, split_into_c
 from radarsim.report.page_tables import column_heading, page_table, page_tables, row_table, translated_table
 from radarsim.report.render_page import render_page
 from radarsim.report.settings_tables import settings_tables
+from radarsim.report.target_words import target_words
 from radarsim.report.typeset import cell_text, marked_up
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ def report_page(
         "report.html.j2",
         experiment=experiment,
         question=question,
+        target=target_words(experiment.cases),
         answer=sentences,
         visible_sentences=count_visible_sentences(sentences),
         inputs=None if inputs is None else translated_table(tr("inputs"), inputs),
