@@ -24,19 +24,27 @@ ERROR_SIGMAS = 4.0  # of the multiple
 MAX_ERROR = 0.2  # of the multiple, relative
 MAX_PLAUSIBLE_MULTIPLE = 1.5  # or one over it: nearer to 1 no unit is
 UNIT_TOLERANCE = 0.01  # of a multiple, relative: of units, and of a line of sight that is not that of the range
+MIN_FOREIGN_SHARE, MIN_FOREIGN_MPS = 0.5, 3.0  # by which velocities of another column miss the ranges
+FOREIGN_VELOCITY_SIGMAS, FOREIGN_RANGE_SIGMAS = 10.0, 3.0  # of noise that such a miss exceeds, in the median
+FOREIGN_CAUSE = term("they are no radial velocities: a column may be swapped")
 MIN_FOLDABLE, MAX_FOLDABLE = -1.05, 1 / 3  # multiples that folds may leave
 MAX_DRIFT_CHANGE = 0.2  # of such a multiple, relative, where a drift is allowed for
 FOOT_M, KNOT_MPS, KMH_MPS, MPH_MPS = 0.3048, 1852 / 3600, 1 / 3.6, 1609.344 / 3600
 CAUSES = {  # multiples, and what leaves them
     1 / KNOT_MPS: term("they are in knots (--column velocity_kn=NAME)"),
     1 / KMH_MPS: term("they are in km/h (--column velocity_kmh=NAME)"),
-    1 / FOOT_M: term("they are in feet per second"),
-    1 / MPH_MPS: term("they are in miles per hour"),
+    1 / FOOT_M: term("they are in feet per second (--column velocity_fps=NAME)"),
+    1 / MPH_MPS: term("they are in miles per hour (--column velocity_mph=NAME)"),
     KNOT_MPS: term("they are in m/s, not in knots"),
     KMH_MPS: term("they are in m/s, not in km/h"),
     FOOT_M: term("the ranges are in feet, not in m"),
     1.852: term("the ranges are in nautical miles, not in km"),
     1852.0: term("the ranges are in nautical miles, not in m"),
+    3000 * FOOT_M: term("the ranges are in kiloyards, not in m"),
+    6000 * FOOT_M: term("the ranges are in data miles, not in m"),
+    100 * FOOT_M: term("the ranges are in hundreds of feet, not in m"),
+    60 / FOOT_M: term("they are in feet per minute (--column velocity_fpm=NAME)"),
+    128.0: term("the times are in 128ths of a second"),
     10.0: term("they are in dm/s, or the times in tenths of a second"),
     100.0: term("they are in cm/s, or the times in hundredths of a second"),
     1e3: term("the times are in a unit a thousand times smaller, or the ranges in km"),
@@ -90,6 +98,30 @@ def detect_doppler_scale(tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerS
     if scale is None or scale.is_sign or not scale.is_foldable:
         return scale
     return replace(scale, is_certain=_holds_with_drift(slope, t, r, integral, number))
+
+
+def detect_foreign_velocities(tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerScale | None:
+    """Velocities that have nothing to do with the change of the range, as those of another column: most miss it by most
+    of their size over half of their track, far beyond noise. The multiple has no meaning."""
+    rows = [np.empty((3, 0))]
+    for columns in tracks:
+        track = np.stack([np.asarray(columns[name], dtype=float) for name in COLUMNS])
+        t, r, v = track[:, np.isfinite(track).all(axis=0)]
+        half = t.size // 2
+        if t.size < MIN_ROWS or not (np.diff(t) > 0).all():
+            continue
+        integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
+        spans = t[half:] - t[: t.size - half]
+        expected, actual = ((values[half:] - values[: t.size - half]) / spans for values in (integral, r))
+        sigma_v, sigma_r = (float(np.median(np.abs(np.diff(values, n=2)))) / (0.6745 * np.sqrt(6)) for values in (v, r))
+        noise = np.maximum(FOREIGN_VELOCITY_SIGMAS * sigma_v, FOREIGN_RANGE_SIGMAS * sigma_r / spans)
+        rows.append(np.stack([np.abs(expected - actual), np.maximum(np.abs(expected), np.abs(actual)), noise]))
+    joined = np.concatenate(rows, axis=1)
+    if not joined.shape[1]:
+        return None
+    miss, size, noise_mps = np.median(joined, axis=1).tolist()
+    is_foreign = miss > max(MIN_FOREIGN_SHARE * size, noise_mps, MIN_FOREIGN_MPS)
+    return DopplerScale(size / miss, False, (FOREIGN_CAUSE,)) if is_foreign else None
 
 
 def _wandering_m(stretch: np.ndarray) -> float:
@@ -163,6 +195,10 @@ def _scale(multiple: float, error: float) -> DopplerScale | None:
 
 def doppler_scale_message(scale: DopplerScale) -> str:
     """The message that velocities are a multiple of the change of the range, with its cause and cure."""
+    if scale.causes == (FOREIGN_CAUSE,):
+        return tr(
+            "the Doppler speeds have nothing to do with the change of the range: {cause}", cause=tr(FOREIGN_CAUSE)
+        )
     if scale.is_sign:
         return tr("the velocities have the opposite sign of the change of the range: import the recording with "
                   "--doppler-towards, or without it if it was given")  # fmt: skip

@@ -9,6 +9,7 @@ import pytest
 from radarsim.api.load_experiments import load_all
 from radarsim.recordings import csv_output, simulate_plots, study_part, track
 from radarsim.recordings.fit.folded_doppler import SPAN_SEARCH_STEPS, detect_folding, folding_message
+from radarsim.recordings.fit.velocity_faults import VelocityFault, detect_velocity_fault
 from radarsim.recordings.print_results import print_track
 from radarsim.recordings.report.innovation_tests import FITS, FOLD_LOST, MAYBE_TOO_SMALL, innovation_tests
 from tests.program import Terminal, command
@@ -157,6 +158,54 @@ def test_a_fold_at_any_speed_is_noticed_and_taken_for_no_turned_sign(spans):
     assert all(detect_folding([columns], BOAT["D"]) for columns in recordings)
     if spans >= 0.6:
         assert all(detect_folding([columns]) for columns in recordings)
+
+
+@pytest.mark.parametrize("velocity_mps", [0.0, 0.004])
+@pytest.mark.parametrize("spans", [1, 2, 5])
+def test_velocities_of_next_to_nothing_are_folded_by_whole_spans_or_none(spans, velocity_mps):
+    """An aircraft that shows 0, all of its plots: the span is the rate of the range, or a whole part of it."""
+    t, rng = 4.0 * np.arange(60), np.random.default_rng(spans)
+    aircraft = {"t_s": t, "range_m": 50e3 + 75.0 * spans * t + rng.normal(0, 60, 60),
+                "velocity_mps": np.full(60, velocity_mps)}  # fmt: skip
+    fault = detect_velocity_fault([aircraft])
+    assert 60 < fault.folding.rate_mps / spans < 90
+    assert "or they are no radial velocities in m/s" in folding_message(fault.folding)
+    assert detect_velocity_fault([aircraft], 75.0).folding.is_configured
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "spans", [0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0]
+)
+def test_a_fold_is_noticed_in_40_of_40(spans):
+    """With the span of the config and without."""
+    for seed in range(40):
+        columns = boat(spans, seed)
+        assert detect_velocity_fault([columns], BOAT["D"]).folding is not None
+        assert detect_velocity_fault([columns]).folding is not None
+
+
+def sound(seed):
+    """A recording without folds: of any speed, accuracy and rate, rounded or not; and a span that holds, or none."""
+    rng = np.random.default_rng(seed)
+    t = rng.choice([1, 2.5, 4, 10]) * np.flatnonzero(rng.random(rng.choice([12, 30, 60, 150])) < 0.9)
+    speed, acceleration = (
+        rng.choice([0, 0.3, 1, 3, 8, 20, 60, 150, 250]) * rng.choice([-1, 1]),
+        rng.choice([0, 0, 0.05, -0.3]),
+    )
+    v = speed + acceleration * t + rng.normal(0, rng.choice([0.05, 0.5, 3, 15]), t.size)
+    step = rng.choice([0, 0, 0.5, 1])
+    r = 50e3 + speed * t + acceleration * t**2 / 2 + rng.normal(0, rng.choice([1, 15, 60, 250]), t.size)
+    columns = {"t_s": t, "range_m": r, "velocity_mps": step * np.round(v / step) if step else v}
+    return columns, rng.choice([None, 4 * max(np.abs(v).max(), 1.0)])
+
+
+@pytest.mark.parametrize("first", [0, pytest.param(20, marks=pytest.mark.slow)])
+def test_sound_velocities_of_any_accuracy_are_not_noticed(first):
+    """20 of them, and 980 more."""
+    for seed in range(first, 1000 if first else 20):
+        columns, span = sound(seed)
+        assert detect_velocity_fault([columns], span) == VelocityFault()
 
 
 @pytest.mark.parametrize("spans", [0.1, 0.3, 0.45])

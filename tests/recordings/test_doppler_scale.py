@@ -162,3 +162,15 @@ def test_spans_that_do_not_meet_are_shown(positions, expected):
     text = meeting_text(TimeSpan(DAY, DAY + 480), TimeSpan(*positions))
     assert expected in text
     assert ("the plots are from 2026-11-28 00:00:00 to 00:08:00" in text) == bool(expected)
+
+
+@pytest.mark.parametrize("name", ["a range that stands", "an angle for a velocity"])
+def test_velocities_of_another_column_are_told(name):
+    t, rng = 4.0 * np.arange(60), np.random.default_rng(5)
+    moving = 20e3 + 120 * t + rng.normal(0, 30, 60)
+    range_m, velocity = {
+        "a range that stands": (120e3 + rng.normal(0, 800, 60), moving / 1000),
+        "an angle for a velocity": (20e3 - 12 * t + rng.normal(0, 30, 60), 200 + 0.1 * t + rng.normal(0, 0.5, 60)),
+    }[name]
+    fault = detect_velocity_fault([{"t_s": t, "range_m": range_m, "velocity_mps": velocity}])
+    assert "a column may be swapped" in doppler_scale_message(fault.scale)

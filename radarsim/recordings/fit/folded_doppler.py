@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.language.translate import tr
+from radarsim.language.translate import term, tr
 from radarsim.recordings.study_part import recording_interface
 from radarsim.report.wording import significant_digits
 
@@ -30,6 +30,10 @@ ANY_SPAN_SCORE = 3.0
 # A residue of the other sign is noise up to so many standard deviations, or up to this share of the differences.
 MAX_NOISE_SIGMAS, MAX_RESIDUE_SHARE = 3.5, 0.03
 MIN_SEGMENT_PLOTS = 6  # of a stretch of a track over which the residue is taken
+COARSEST_STEP_MPS = 1.0  # in which velocities are rounded
+MIN_RATE_SHARE = 0.5  # of the largest velocity, of the rate of the range at a folded one
+MIN_VELOCITY_SHARE = 0.02  # of the rate of the range, below which velocities may be none
+NO_VELOCITIES_CAUSE = term("they are no radial velocities in m/s")
 VELOCITY_COLUMN = "velocity_mps"
 SPAN_SEARCH_STEPS = 200  # of a search for the span, in which the phase of the largest velocity turns once
 
@@ -58,20 +62,25 @@ def detect_folding(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float |
     fastest = max((float(np.abs(array[2]).max()) for array in arrays if array.size), default=0.0)
     is_known = span_mps is not None and 2 * fastest <= span_mps * (1 + 1e-9)
     fits = _range_rates(arrays, span_mps if span_mps is not None and is_known else 2 * fastest)
+    if fits is None and not is_known:  # velocities far smaller than the rates: near whole spans, which may be as large
+        fits = _range_rates(arrays, max(2 * fastest, _typical_rate(arrays)))
     if fits is None:
         return None
     rates, velocities, sigma = fits
     differences = rates - velocities
-    is_beyond = np.abs(differences) > fastest + CLEAR_SIGMAS * sigma
+    least = span_mps / 2 if span_mps is not None and is_known else fastest + COARSEST_STEP_MPS
+    is_beyond = np.abs(differences) > np.maximum(fastest + CLEAR_SIGMAS * sigma, least)
+    is_beyond &= np.abs(rates) > MIN_RATE_SHARE * fastest  # else velocities are far apart by their noise
     if is_beyond.sum() < max(MIN_FOLDED_PLOTS, MIN_FOLDED_SHARE * differences.size):
         return None
     if _is_sign_turned(arrays, rates, velocities, span_mps if is_known else None):
         return None
-    span = _fit_span(differences, 2 * fastest)
+    span = _fit_span(differences, max(2 * fastest, float(np.median(sigma)) / RATE_ACCURACY))
     score = float(_whole_span_score(differences, np.array([span_mps]))[0]) if is_known else 0.0
     is_configured = is_known and (span is None or score > KNOWN_SPAN_SCORE)
     rate = float(np.abs(rates[is_beyond]).max())
-    return Folding(fastest, rate, span_mps if is_configured else span, is_configured, score > ANY_SPAN_SCORE)
+    causes = (NO_VELOCITIES_CAUSE,) if fastest < MIN_VELOCITY_SHARE * rate else ()
+    return Folding(fastest, rate, span_mps if is_configured else span, is_configured, score > ANY_SPAN_SCORE, causes)
 
 
 def folding_message(folding: Folding, case: Case | None = None) -> str:
@@ -105,6 +114,17 @@ def folding_message(folding: Folding, case: Case | None = None) -> str:
         options = " ".join(f"--set {setting}" for setting in settings)
         clauses.append(tr("for filters that unfold them: the same command with {settings}", settings=options))
     return "; ".join(clauses)
+
+
+def _typical_rate(tracks: Sequence[np.ndarray]) -> float:
+    """The median size of the rate of the range over half of each track (3, n), m/s; 0 of too few rows."""
+    rates = [np.empty(0)]
+    for t, r, _ in tracks:
+        half = t.size // 2
+        if half and (dt := t[half:] - t[: t.size - half]).all():
+            rates.append(np.abs((r[half:] - r[: t.size - half]) / dt))
+    rates_of_all = np.concatenate(rates)
+    return float(np.median(rates_of_all)) if rates_of_all.size else 0.0
 
 
 def _is_sign_turned(

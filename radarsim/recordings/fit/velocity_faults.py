@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.recordings.doppler_scale import COLUMNS, DopplerScale, detect_doppler_scale
+from radarsim.recordings.doppler_scale import COLUMNS, DopplerScale, detect_doppler_scale, detect_foreign_velocities
 from radarsim.recordings.fit.folded_doppler import Folding, detect_folding
 from radarsim.recordings.study_part import recording_interface
 
@@ -25,6 +25,16 @@ def detect_velocity_fault(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: 
     A constant speed that is folded is also a multiple of the change of the range. Where folds by the stated span
     explain it, they are taken; else a multiple that folds cannot leave."""
     scale = detect_doppler_scale(tracks)
+    fault = _explained_fault(scale, tracks, span_mps)
+    if fault == VelocityFault() and span_mps is None:
+        return VelocityFault(scale=detect_foreign_velocities(tracks))
+    return fault
+
+
+def _explained_fault(
+    scale: DopplerScale | None, tracks: Sequence[Mapping[str, np.ndarray]], span_mps: float | None
+) -> VelocityFault:
+    """The fault by folds, another unit or the other sign, if one explains the velocities."""
     if scale is not None and not scale.is_sign and not scale.is_foldable:
         return VelocityFault(scale=scale)
     folding = detect_folding(tracks, span_mps)
@@ -34,7 +44,9 @@ def detect_velocity_fault(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: 
         return VelocityFault(scale=scale)
     if folding is None:
         return VelocityFault()
-    return VelocityFault(replace(folding, other_causes=scale.causes if scale.multiple > 0 else ()))
+    return VelocityFault(
+        replace(folding, other_causes=scale.causes or folding.other_causes if scale.multiple > 0 else ())
+    )
 
 
 def detect_case_velocity_fault(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> VelocityFault:
