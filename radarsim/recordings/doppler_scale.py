@@ -202,8 +202,11 @@ def doppler_scale_message(scale: DopplerScale) -> str:
     if scale.is_sign:
         return tr("the velocities have the opposite sign of the change of the range: import the recording with "
                   "--doppler-towards, or without it if it was given")  # fmt: skip
-    sign = tr("; and the sign is opposite: --doppler-towards") if scale.multiple < 0 else ""
-    cause = tr(" or ").join(map(tr, scale.causes)) or tr("their unit, or that of ranges or times, is another")
+    is_opposite = scale.multiple < 0 and scale.causes
+    sign = tr("; and the sign is opposite: --doppler-towards") if is_opposite else ""
+    cause = tr(" or ").join(map(tr, scale.causes)) or tr(
+        "their unit, or that of ranges or times, is another, or a column is swapped"
+    )
     return tr(
         "the Doppler speeds miss the change of the range by a factor of {multiple}: {cause}{sign}",
         multiple=significant_digits(abs(scale.multiple), "#.3g"),
