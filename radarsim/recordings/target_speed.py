@@ -16,6 +16,8 @@ MAX_STEP_S = 1e8  # from row to row: years, as of a clock that was set
 MAX_JUMP_MPS = 3000.0  # from row to row, from which a row is examined: faster than aircraft
 MIN_JUMP_SCATTER = 30.0  # median distances of the rows of a track from those beside them
 MIN_JUMP_LEGS = 5.0  # median distances from row to row
+MIN_ORBIT_M = 150e3  # of a target at orbital speed, from a radar
+MIN_MOVING_SCATTER = 3.0  # of a track's rows, which half of it must cover: shorter legs may be noise
 NEIGHBOURS = 5  # rows of which a row's place is compared with the median
 MIN_ROWS = 5  # of a track
 LIKELY_MPS = (0.5, 1500.0)  # speeds that explain a wrong unit of time
@@ -93,6 +95,22 @@ def impossible_speed(tracks: Sequence[TrackPositions]) -> float | None:
     return speed if speed > MAX_SPEED_MPS else None
 
 
+def unlikely_speed(tracks: Sequence[TrackPositions]) -> float | None:
+    """The median speed of tracks, m/s, if it is one of orbits though the targets are too near for them; else None."""
+    speed = median_speed(tracks)
+    if not MAX_JUMP_MPS < speed <= MAX_SPEED_MPS:
+        return None
+    long_tracks = [track for track in tracks if len(track.t_s) >= MIN_ROWS]
+    distance = np.median([np.median(np.linalg.norm(track.positions, axis=1)) for track in long_tracks])
+    legs, scatters = [], []
+    for _, positions in long_tracks:
+        half = len(positions) // 2
+        legs.append(np.median(np.linalg.norm(positions[half:] - positions[: len(positions) - half], axis=1)))
+        scatters.append(np.median(np.linalg.norm(np.diff(positions, n=2, axis=0), axis=1)))
+    is_moving = np.median(legs) > MIN_MOVING_SCATTER * np.median(scatters)
+    return speed if is_moving and distance < MIN_ORBIT_M else None
+
+
 def impossible_column_speed(tracks: Sequence[Mapping[str, np.ndarray]]) -> float | None:
     """The same of tracks with columns (n,) of plots: t_s, and x_m, y_m, z_m or range_m; None without these."""
     names = next((names for names in POSITION_COLUMNS if tracks and set(names) <= set(tracks[0])), None)
@@ -108,8 +126,9 @@ def impossible_column_speed(tracks: Sequence[Mapping[str, np.ndarray]]) -> float
     )
 
 
-def speed_message(speed: float) -> str:
-    """The message that targets move at an impossible speed, m/s, with the units that would explain it."""
+def speed_message(speed: float, is_possible: bool = False) -> str:
+    """The message that targets move at a speed that none has, m/s, or none so near, with the units that would explain
+    it."""
     likely = [
         tr("{speed:.3g} m/s if they are in {unit}", speed=speed / unit_s, unit=tr(unit))
         for unit, unit_s in TIME_UNITS_S.items()
@@ -119,4 +138,7 @@ def speed_message(speed: float) -> str:
     if speed / 1000 <= LIKELY_MPS[1]:
         causes.append(tr("ranges may be a thousand times too large: {speed:.3g} m/s", speed=speed / 1000))
     cause = "; ".join(causes) or tr("a unit is wrong")
+    if is_possible:
+        return tr("the targets move at {speed:.3g} m/s (median), as none so near does: {cause}; or columns are swapped",
+                  speed=speed, cause=cause)  # fmt: skip
     return tr("the targets move at {speed:.3g} m/s (median), which none does: {cause}", speed=speed, cause=cause)

@@ -211,6 +211,8 @@ class _Import:
             if is_repeated or (~is_reachable).mean() > MAX_LOSS:
                 return batch
         self.impossible_speed = target_speed.impossible_speed(tracks)
+        if (speed := target_speed.unlikely_speed(tracks)) is not None:
+            self.result.notes.append(target_speed.speed_message(speed, is_possible=True))
         if not is_reachable.all():
             self.skipped[UNREACHABLE_REASON] += int((~is_reachable).sum())
             batch = batch.rows(np.flatnonzero(is_reachable).tolist())

@@ -119,6 +119,22 @@ def test_units_that_make_targets_too_fast_are_told(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("row", "cause"),
+    [
+        (lambda k: (f"{600 + k / 15:.6f}", 20_000 + 480 * k), "120 m/s if they are in minutes"),
+        (lambda k: (f"{(20_000 + 480 * k) / 1000}", 4000 * k + 8000), "or columns are swapped"),
+    ],
+)
+def test_targets_that_are_too_near_for_their_speed_are_told(tmp_path, row, cause):
+    """Minutes taken as seconds; times and ranges swapped."""
+    text = "time,track,range_m\n" + "".join("{},7,{}\n".format(*row(k)) for k in range(N))
+    done, *_ = imported(tmp_path, text.encode())
+    (note,) = done.notes
+    assert "as none so near does" in note
+    assert cause in note
+
+
+@pytest.mark.parametrize(
     ("row", "site", "cause"),
     [
         (lambda lat, lon: (lon, lat), SITE, "latitude and longitude are swapped"),
