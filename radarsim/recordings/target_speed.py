@@ -16,7 +16,7 @@ MAX_STEP_S = 1e8  # from row to row: years, as of a clock that was set
 MAX_JUMP_MPS = 3000.0  # from row to row, from which a row is examined: faster than aircraft
 MIN_JUMP_SCATTER = 30.0  # median distances of the rows of a track from those beside them
 MIN_JUMP_LEGS = 5.0  # median distances from row to row
-MIN_ORBIT_M = 150e3  # of a target at orbital speed, from a radar
+MIN_ORBIT_MPS, MIN_ORBIT_M = 5000.0, 150e3  # of a target in orbit, from a radar
 MIN_MOVING_SCATTER = 3.0  # of a track's rows, which half of it must cover: shorter legs may be noise
 NEIGHBOURS = 5  # rows of which a row's place is compared with the median
 MIN_ROWS = 5  # of a track
@@ -98,7 +98,7 @@ def impossible_speed(tracks: Sequence[TrackPositions]) -> float | None:
 def unlikely_speed(tracks: Sequence[TrackPositions]) -> float | None:
     """The median speed of tracks, m/s, if it is one of orbits though the targets are too near for them; else None."""
     speed = median_speed(tracks)
-    if not MAX_JUMP_MPS < speed <= MAX_SPEED_MPS:
+    if not MIN_ORBIT_MPS < speed <= MAX_SPEED_MPS:
         return None
     long_tracks = [track for track in tracks if len(track.t_s) >= MIN_ROWS]
     distance = np.median([np.median(np.linalg.norm(track.positions, axis=1)) for track in long_tracks])

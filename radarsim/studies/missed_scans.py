@@ -32,6 +32,13 @@ def with_missed_scans(t: np.ndarray, period: float) -> tuple[np.ndarray, np.ndar
     return np.array(times), rows
 
 
+def leading_empty_rows(columns: Mapping[str, np.ndarray]) -> int:
+    """How many rows of a track, columns (n,), stand before the first in which something was measured; 0 if none was."""
+    measured = [np.isfinite(column) for name, column in columns.items() if name != "t_s"]
+    has_number = np.any(measured, axis=0) if measured else np.ones(len(columns["t_s"]), dtype=bool)
+    return int(np.argmax(has_number))
+
+
 def without_empty_rows(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Columns (n,) of a track without the rows in which nothing was measured."""
     measured = [np.isfinite(column) for name, column in columns.items() if name != "t_s"]

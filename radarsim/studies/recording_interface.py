@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -44,6 +44,19 @@ class Track:
     numbers: "np.ndarray | None" = None
     score: "np.ndarray | None" = None
     residual_sigma: "np.ndarray | None" = None
+
+
+def with_rows_before(track: Track, t_s: "np.ndarray") -> Track:
+    """A track at times t_s (n,), of which it has the last ones: without estimates at the others."""
+    import numpy as np
+
+    count = len(t_s) - len(track.t_s)
+    rows = {}
+    for name in ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma"):
+        values = getattr(track, name)
+        if values is not None:
+            rows[name] = np.concatenate([np.full((len(values), count, *values.shape[2:]), np.nan), values], axis=1)
+    return replace(track, t_s=t_s, **rows)
 
 
 class Tracker(Protocol):

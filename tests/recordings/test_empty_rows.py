@@ -11,7 +11,7 @@ from radarsim.recordings import simulate_plots
 from radarsim.recordings.study_part import recording_interface
 from radarsim.studies import authoring, step_tracker
 from radarsim.studies.linear_recordings import LinearTracker
-from radarsim.studies.missed_scans import with_missed_scans
+from radarsim.studies.missed_scans import with_missed_scans, without_empty_rows
 
 CONFIGS = {
     "rls2": ("scans=40",),
@@ -57,11 +57,14 @@ def assert_same(first, second, kept):
 
 
 @pytest.mark.parametrize("config", CONFIGS)
-def test_empty_rows_change_no_estimate(config):
+@pytest.mark.parametrize("missed", [[6, 9, 10, 11, 14], [0, 1, 6]], ids=["within", "before the first plot"])
+def test_empty_rows_change_no_estimate(config, missed):
     case, columns = loaded(config, *CONFIGS[config]), recording(config, *CONFIGS[config])
-    empty, without, kept = with_and_without(columns, [6, 9, 10, 11, 14])
+    empty, without, kept = with_and_without(columns, missed)
     assert_same(tracked(case, empty), tracked(case, without), kept)
     interface = recording_interface(case)
+    if 0 in missed:  # likelihoods are asked without empty rows
+        empty = without_empty_rows(empty)
     for member in case.spec.members:
         one, other = (interface.likelihood(case, member.name, [track]) for track in (empty, without))
         if one is not None:

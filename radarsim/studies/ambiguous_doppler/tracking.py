@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.errors import PlotFault
 from radarsim.studies.ambiguous_doppler.axes import COMPONENTS
-from radarsim.studies.ambiguous_doppler.followers import RowResult, make_follower
+from radarsim.studies.ambiguous_doppler.followers import NO_ESTIMATE, RowResult, make_follower
 from radarsim.studies.ambiguous_doppler.kernels import realisations
 from radarsim.studies.ambiguous_doppler.study import prepare
 from radarsim.studies.missed_scans import missed_scan_times
@@ -58,7 +58,8 @@ class Tracker:
         Raises PlotFault for a row that leaves too many folds, or exceeds a filter's digits."""
         rows = plot_rows(columns)
         results_by_filter = [run_rows(follower, rows, self.last_t, self.period) for follower in self.followers]
-        self.last_t = rows[-1][0]
+        if not np.isnan(self.last_t) or not all(map(is_empty_row, rows)):
+            self.last_t = rows[-1][0]
         fields = {
             name: np.array([[getattr(result, name) for result in results] for results in results_by_filter])
             for name in RowResult._fields
@@ -83,12 +84,15 @@ def usable_filters(spec: Any) -> list[Any]:
 
 
 def run_rows(follower: Any, rows: Sequence[tuple[float, ...]], last_t: float, period: float) -> list[RowResult]:
-    """Run a filter over rows after one at last_t, and over the scans missed between them; a PlotFault carries the
-    number of its row."""
+    """Run a filter over rows after one at last_t, and over the scans missed between them; empty rows before the first
+    plot begin nothing. A PlotFault carries the number of its row."""
     results: list[RowResult] = []
     try:
         with np.errstate(invalid="ignore"):  # a variance lost in rounding: not-a-number, which the caller refuses
             for row in rows:
+                if np.isnan(last_t) and is_empty_row(row):
+                    results.append(NO_ESTIMATE)
+                    continue
                 for missed_t in missed_scan_times(last_t, row[0], period):
                     follower.step(missed_t, np.nan, np.nan)
                 results.append(follower.step(*row))
@@ -97,6 +101,11 @@ def run_rows(follower: Any, rows: Sequence[tuple[float, ...]], last_t: float, pe
         fault.row = len(results)
         raise
     return results
+
+
+def is_empty_row(row: Sequence[float]) -> bool:
+    """Whether a row has neither range nor velocity."""
+    return bool(np.isnan(row[1]) and np.isnan(row[2]))
 
 
 def plot_rows(columns: Mapping[str, np.ndarray]) -> list[tuple[float, ...]]:

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.studies.missed_scans import with_missed_scans
+from radarsim.studies.missed_scans import leading_empty_rows, with_missed_scans
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
-from radarsim.studies.recording_interface import Track
+from radarsim.studies.recording_interface import Track, with_rows_before
 from radarsim.studies.sonar import conversion, detector_arrays, filter_banks, filter_design, kernel_inputs, labels
 from radarsim.studies.sonar.config import Keys
 from radarsim.studies.sonar.kernels import chunks, detector, imm, realisation_gains, steps, windows
@@ -101,7 +101,11 @@ class Tracker:
         return DerivedQuantities((), no_quantities, no_quantities)
 
     def feed(self, columns: Mapping[str, np.ndarray]) -> Track:
-        """The estimates over all rows: columns (n,), NaN where a value is missing."""
+        """The estimates over all rows: columns (n,), NaN where a value is missing; empty rows before the first plot
+        begin nothing."""
+        if empty := leading_empty_rows(columns):
+            track = self.feed({name: column[empty:] for name, column in columns.items()})
+            return with_rows_before(track, columns["t_s"])
         spec, specs = self.spec, self.specs()
         t, period = columns["t_s"] - columns["t_s"][0], spec.sensor.scan_period_s
         z, weight, sigma = plots_in_filter_frame(spec, list(columns.values())[1:])
