@@ -51,7 +51,7 @@ def with_rows_before(track: Track, t_s: "np.ndarray") -> Track:
     import numpy as np
 
     count = len(t_s) - len(track.t_s)
-    rows = {}
+    rows: dict[str, Any] = {}
     for name in ("estimate", "sigma", "probability", "residual", "nis", "score", "residual_sigma"):
         values = getattr(track, name)
         if values is not None:
