@@ -27,7 +27,7 @@ SUMS = ("engine.results", "engine.sums")  # the engine's plain data, which studi
 CASE = ("config.experiment", "config.radial_keys", "config.rare_event_keys")
 SCHEMA = (
     *("config.cross_checks", "config.value_text", "config.key_types", "config.marks", "config.model"),
-    *("config.radial_keys", "config.rare_event_keys", "config.study_keys"),
+    *("config.quantity_phrase", "config.radial_keys", "config.rare_event_keys", "config.study_keys"),
 )
 ROOMS = {
     "errors": (),

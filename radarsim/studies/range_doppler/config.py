@@ -4,13 +4,14 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from radarsim.config import cross_checks, key_types, marks, radial_keys, study_keys
 from radarsim.config.cross_checks import CheckError, check_error, cross_check
 from radarsim.config.key_types import NonNegative, Number, Positive, key
 from radarsim.config.marks import LaterKeyMark
 from radarsim.config.model import Model
+from radarsim.config.quantity_phrase import OVER_SCANS, PhraseError, QuantityPhrase, parse_phrase
 from radarsim.config.radial_keys import MAX_SCANS
 
 FOLDED_STUDY = "study=ambiguous_doppler"  # takes the same config over
@@ -110,18 +111,56 @@ Target = Annotated[
 Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
 
 
+MINIMISED = "sigma_r", "sigma_Vr", "sigma_ar"  # the components of an error, with the key `over`
+
+
+def _checked_phrase(text: str) -> str:
+    """An error to minimise, or a phrase that says it with the scans. Raises ValueError."""
+    if text in MINIMISED:
+        return text
+    try:
+        phrase = parse_phrase(text)
+    except PhraseError:
+        phrase = QuantityPhrase("")
+    if f"{phrase.name}_{phrase.component}" not in MINIMISED:
+        raise ValueError(f"must be {', '.join(MINIMISED)}, or a phrase such as 'worst sigma r'")
+    if phrase.over == "long run" or (phrase.at_s, phrase.at_k, phrase.from_s) != (None, None, None):
+        raise ValueError("must be over scans, as 'worst sigma r' and 'mean sigma r', or 'at the end'; from_k is a key")
+    return text
+
+
 class Best(Model):
     """A manoeuvre variance that is looked for: the one with which this filter's exact error on this target is least."""
 
-    minimise: Literal["sigma_r", "sigma_Vr", "sigma_ar"] = key("error to minimise", "the error that is minimised")
-    over: Literal["worst", "mean", "last"] = key(
-        "taken over scans as", "value over the scans from from_k on: the greatest, their mean, or the last"
+    minimise: Annotated[str, AfterValidator(_checked_phrase)] = key(
+        "error to minimise",
+        "the error that is minimised: sigma_r, sigma_Vr or sigma_ar with `over`; or a phrase with the scans: worst "
+        "sigma r, mean sigma Vr, sigma r at the end",
+    )
+    over: Literal["worst", "mean", "last"] | None = key(
+        "taken over scans as", "value over the scans from from_k on: the greatest, their mean, or the last", None
     )
     from_k: Annotated[int, key_types.WholeNumber(1, MAX_SCANS)] | None = key(
         "first scan that counts",
         "first scan that counts; default: the one at which the target's manoeuvre begins, else the filters settle",
         None,
     )
+
+    @cross_check
+    def _says_scans_once(self) -> Iterator[CheckError]:
+        if self.minimise in MINIMISED and self.over is None:
+            yield check_error("over", "required key is missing: worst, mean or last")
+        elif self.minimise not in MINIMISED and self.over is not None:
+            yield check_error("over", f"stands in minimise already: {self.minimise!r}")
+
+    @model_validator(mode="after")
+    def _completed(self) -> Self:
+        """A phrase as the keys that it stands for, so that both are one case."""
+        if self.minimise in MINIMISED or self.over is not None:
+            return self
+        phrase = parse_phrase(self.minimise)
+        over = phrase.over if phrase.over in OVER_SCANS else "last"
+        return self.model_copy(update={"minimise": f"{phrase.name}_{phrase.component}", "over": over})
 
 
 class FilterKeys(Model):

@@ -295,7 +295,7 @@ def _optimised_gains(result: Result, case: str) -> list[Sentence]:
         values = best_variance.objective(criterion, sigma)
         sigmas = {variance: Estimate(*[float(v)] * 3) for variance, v in zip(variances, values, strict=True)}
         choices.append(FilterChoices(axes.filters[f], sigmas, (float(axes.manoeuvre_variance[f]),)))
-    return _gains_over(result, case, criterion.minimise, criterion.over, choices)
+    return _gains_over(result, case, criterion.minimise, str(criterion.over), choices)
 
 
 def _optimised_variance(result: Result, filter_name: str, objective: Best, variance: float) -> str:
@@ -304,7 +304,7 @@ def _optimised_variance(result: Result, filter_name: str, objective: Best, varia
         "filter": filter_name,
         "variance": key_labels.format_value(variance, powers=True),
         "rule": tr(
-            CRITERION_TEXTS[objective.over], error=objective.minimise, t_s=axes.t_s[(objective.from_k or 1) - 1]
+            CRITERION_TEXTS[str(objective.over)], error=objective.minimise, t_s=axes.t_s[(objective.from_k or 1) - 1]
         ),
     }
     if best_variance.is_at_limit(variance, len(axes.t_s), axes.sigma, axes.scan_period_s):

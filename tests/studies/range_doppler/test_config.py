@@ -154,7 +154,7 @@ def test_bad_value(good, said, key, value, message):
     line = message if message.startswith("config: ") else f"config: {key}: {message}"
     lines = said(spoil(good, key, value))
     if value == {} and key.endswith("manoeuvre_variance"):  # a mapping says what it is to make least
-        assert lines == [f"config: {key}.{missing}: required key is missing" for missing in ("minimise", "over")]
+        assert lines == [f"config: {key}.minimise: required key is missing"]
     elif value == {} and key == "realisations":  # a mapping has the numbers of each case
         assert lines == ["config: realisations: must hold at least 1, got {}"]
     elif key == "include":
@@ -305,6 +305,19 @@ BEYOND = [
     ({"target": {"kind": "recorded", "file": "none.csv"}}, "target.file: no such file: 'none.csv'"),
     ({"filters.0.process_noise": "jerk"}, "must be one of random_jerk, white_jerk, white_acceleration, got 'jerk'"),
     ({"filters.0.manoeuvre_variance": BEST | {"over": "most"}}, "over: must be one of worst, mean, last, got 'most'"),
+    ({"filters.0.manoeuvre_variance": {"minimise": "sigma_r"}}, "over: required key is missing: worst, mean or last"),
+    (
+        {"filters.0.manoeuvre_variance": BEST | {"minimise": "worst sigma r"}},
+        "over: stands in minimise already: 'worst sigma r', got 'worst'",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "worst gain r"}},
+        "minimise: must be sigma_r, sigma_Vr, sigma_ar, or a phrase such as 'worst sigma r', got 'worst gain r'",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "sigma r in the long run"}},
+        "minimise: must be over scans, as 'worst sigma r' and 'mean sigma r', or 'at the end'; from_k is a key, got",
+    ),
     ({"filters.0.manoeuvre_variance": BEST | {"from_k": 16}}, "from_k: must be <= the number of scans, 15, got 16"),
     ({"duration_s": 140}, "duration_s: stands in place of scans: give one of them, got 140"),
     ({"scans": None, "duration_s": 5}, "duration_s: must be 2 to 100000 scans of radar.scan_period_s, makes 1, got 5"),
@@ -322,6 +335,22 @@ def test_bad_value_of_a_new_key(good, said, changes, message):
             spoil(good, key, value)
     lines = said(good)
     assert any(message in line for line in lines), lines
+
+
+@pytest.mark.parametrize(
+    ("phrase", "keys"),
+    [
+        ("worst sigma r", {"minimise": "sigma_r", "over": "worst"}),
+        ("mean sigma Vr", {"minimise": "sigma_Vr", "over": "mean"}),
+        ("sigma ar at the end", {"minimise": "sigma_ar", "over": "last"}),
+    ],
+)
+def test_minimise_takes_the_phrase_of_the_commands_for_the_same_case(good, phrase, keys):
+    specs = []
+    for best in ({"minimise": phrase, "from_k": 5}, keys | {"from_k": 5}):
+        good["filters"][0]["manoeuvre_variance"] = best
+        specs.append(load(good).cases[0].spec)
+    assert specs[0] == specs[1]
 
 
 def test_letter_bands(good):
