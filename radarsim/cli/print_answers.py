@@ -5,6 +5,7 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
 from radarsim.cli.console import print_command, print_field, print_line, print_table
+from radarsim.language.numerals import numeral
 from radarsim.language.translate import term, tr
 from radarsim.report.wording import format_number, with_unit
 
@@ -14,6 +15,9 @@ if TYPE_CHECKING:
     from radarsim.api.design.tuning_result import TuningResult
     from radarsim.api.doppler_chart import DopplerChart
     from radarsim.report.quantities import Quantity
+
+
+SLIGHT_CHANGE = 0.01  # per cent or points; keys whose changes are all smaller are named below the table
 
 
 def print_answer(answer: "Answer") -> None:
@@ -87,9 +91,13 @@ def print_sensitivity(sensitivity: "Sensitivity") -> None:
         for filter_name in dict.fromkeys(row["filter"] for row in rows)
         if any(not math.isnan(row[quantity.changes[0]]) for row in rows if row["filter"] == filter_name)
     ]
-    cells = []
+    cells, slight_keys = [], []
     for key in dict.fromkeys(row["key"] for row in rows):
         rows_by_filter = {row["filter"]: row for row in rows if row["key"] == key}
+        changes = [row[quantity.changes[0]] for row in rows_by_filter.values() for quantity in sensitivity.of]
+        if max((abs(change) for change in changes if not math.isnan(change)), default=math.inf) < SLIGHT_CHANGE:
+            slight_keys.append(str(key))
+            continue
         first_row = next(iter(rows_by_filter.values()))
         changed = with_unit(first_row["changed_value"], sensitivity.labels[str(key)].unit)
         line = [
@@ -103,7 +111,11 @@ def print_sensitivity(sensitivity: "Sensitivity") -> None:
         for quantity, filter_name in quantity_columns
     ]
     columns = ["key", *(head if unit == "%" else f"{head}, {tr(unit)}" for head, unit in headings), "value"]
-    print_table(sensitivity.title, columns, cells, right=columns[1:], spare=columns[:1:-1])
+    if cells:
+        print_table(sensitivity.title, columns, cells, right=columns[1:], spare=columns[:1:-1])
+    if slight_keys:
+        limit = numeral(f"{SLIGHT_CHANGE:g}")
+        print_field("slight", tr("under {limit}: {keys}", limit=limit, keys=", ".join(slight_keys)))
     if sensitivity.without_effect:
         print_field("no effect", ", ".join(sensitivity.without_effect))
     if sensitivity.without_estimate:

@@ -9,7 +9,7 @@ LABELS = (  # of lines
     *(term("missing"), term("no rows"), term("untested"), term("gaps"), term("best"), term("advice")),
     *(term("again"), term("doubles")),
     *(term("more"), term("no effect"), term("no estimate"), term("no lock"), term("not paired"), term("left out")),
-    term("files"),
+    *(term("files"), term("slight")),
 )
 LONG_LABEL = 8  # letters of an English label from which it does not set the width of all
 

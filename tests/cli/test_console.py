@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from radarsim.cli import console, print_results
+import radarsim
+from radarsim.cli import console, print_answers, print_results
 from radarsim.cli import progress as cli_progress
 from radarsim.config import find_files
 from radarsim.papers.claims_table import CLASS_COLUMNS
@@ -270,3 +271,10 @@ def test_rows_without_a_lock_are_counted_and_a_bound_is_not_called_exact(capsys)
     assert "exact" not in table[1]
     assert "nan" not in "".join(table)
     assert no_lock.split() == ["no", "lock", "g", "(1", "row", "left", "out)"]
+
+
+def test_keys_of_no_weight_are_named_below_the_table(capsys):
+    print_answers.print_sensitivity(radarsim.sensitivity("rls2"))
+    table, _, below = capsys.readouterr().out.partition("slight")
+    assert "initial_scans" not in table
+    assert "filters.0.initial_scans, filters.1.initial_scans" in below

@@ -94,19 +94,18 @@ def _worst_errors(rows: "pd.DataFrame", filter_name: str) -> Sentence:
 
 
 def _ambiguity_sentences(results: Sequence[Result]) -> list[Sentence]:
-    """That velocities are not folded, where a config gives the repetition rate."""
+    """That velocities are not folded, where the repetition rate that a config gives would fold the target's."""
     spans: dict[str, str] = {}
     for result in results:
         if "repetition_rate_hz" in result.spec.radar.model_fields_set and (result.axes.observes == 2).any():
             span, speed = span_mps(result), result.axes.speed_mps
             if 2 * speed < span:
-                text = tr("an unambiguous interval of {span:.4g} m/s", span=span)
-            else:
-                text = tr(
-                    "an unambiguous interval of {span:.4g} m/s, which folds the target's {speed:.4g} m/s",
-                    span=span,
-                    speed=speed,
-                )
+                continue
+            text = tr(
+                "an unambiguous interval of {span:.4g} m/s, which folds the target's {speed:.4g} m/s",
+                span=span,
+                speed=speed,
+            )
             spans.setdefault(key_labels.without_markup(key_labels.config_device(result)), text)
     if not spans:
         return []

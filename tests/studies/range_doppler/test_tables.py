@@ -365,7 +365,7 @@ def test_answer_says_that_velocities_are_not_folded(expected_radar):
     (said,) = [one for one in told_of([rated]) if "unambiguous" in one]
     assert "an unambiguous interval of 75 m/s, which folds the target's 310 m/s" in said
     fast = expected_radar("rls2", radar={"repetition_rate_hz": 1e5})
-    assert any("an unambiguous interval of 7500 m/s)" in one for one in told_of([fast]))
+    assert not any("unambiguous" in one for one in told_of([fast]))
 
 
 def test_answer_gives_the_variance_that_was_looked_for(expected_radar):
