@@ -94,7 +94,8 @@ def test_the_settings_that_are_named_unfold_them(flown, tmp_path, monkeypatch, k
 
 def test_of_what_cannot_be_carried_over_no_settings_are_named(flown):
     (one,) = loaded("radar.bias_range_m=3").cases
-    assert folding_message(detect_folding([folded(flown)], SPAN), one).endswith("the config's unambiguous interval is 60.0 m/s")
+    message = folding_message(detect_folding([folded(flown)], SPAN), one)
+    assert message.endswith("the config's unambiguous interval is 60.0 m/s")
 
 
 def test_a_filter_that_lost_its_fold_is_not_taken_for_inaccurate_plots(tmp_path, monkeypatch):
