@@ -65,7 +65,7 @@ def asked_phrase(text: str) -> QuantityPhrase:
     except PhraseError as error:
         raise ConfigError(f"of: {error}") from None
     if phrase.over == "long run":
-        raise ConfigError(f"of: a run has no long run: give a time, got {text!r}")
+        raise ConfigError(f"of: a run ends at its last scan: give a time, or a longer run by scans: N, got {text!r}")
     return phrase
 
 

@@ -134,7 +134,7 @@ def fit(
     config: Config,
     recorded: RecordingSource,
     overrides: Overrides = (),
-    filter_name: str | None = None,
+    filter: str | None = None,
     allowing: Sequence[str] | None = None,
 ) -> "pd.DataFrame":
     """Fit σ and the manoeuvre variance to recorded plots (a file or a table), with 95 % intervals.
@@ -155,7 +155,7 @@ def fit(
     ):
         raise ConfigError(f"allowing: must be a list of {', '.join(fit_fit.FITTED_EXPLANATIONS)}, got {allowing!r}")
     experiment = load(config, overrides)
-    fitted = _with_file(recorded, lambda path: fit_fit.fit_plots(experiment, path, filter_name, allowing))
+    fitted = _with_file(recorded, lambda path: fit_fit.fit_plots(experiment, path, filter, allowing))
     return pd.DataFrame(fit_fit.fit_rows(fitted))
 
 

@@ -160,7 +160,7 @@ def test_a_precision_is_asked_of_a_phrase():
     assert set(late["t_s"]) == {100.0, 110.0, 120.0, 130.0, 140.0}
     assert set(at_60_s["component"]) == set(late["component"]) == {"r"}
     assert (last["k"].tolist(), last["component"].tolist()) == ([15], ["Vr"])
-    with pytest.raises(ConfigError, match="a run has no long run"):
+    with pytest.raises(ConfigError, match="a run ends at its last scan"):
         asked_table(case, "sigma r in the long run")
 
 

@@ -123,7 +123,7 @@ def test_fit_and_track_ask_before_they_advise(tmp_path, multiple, expected, caps
     )
     with pytest.raises(ConfigError, match=expected):
         radarsim.fit("rls2", str(path))
-    fitted = radarsim.fit("rls2", str(path), filter_name="r")  # the ranges are sound
+    fitted = radarsim.fit("rls2", str(path), filter="r")  # the ranges are sound
     assert fitted["key"].tolist() == ["radar.sigma_range_m", "manoeuvre_variance"]
     from radarsim.cli.command_group import main
 
