@@ -74,13 +74,13 @@ def meanings(table: re.Match) -> str:
 
 def untranslated(words: str, names: set[str]) -> list[str]:
     """English words in a text: Latin ones that are no names, symbols, keys or formulas."""
-    bare = re.sub(r"--set \S+|\$[^$]*\$|`[^`]*`|\w+[._]\w[\w.]*|«[^»]*»|\b[a-z]+:", " ", words)  # option: what it does
+    bare = re.sub(r"--(?:set|out) \S+|\$[^$]*\$|`[^`]*`|\w+[._]\w[\w.]*|«[^»]*»|\b[a-z]+:", " ", words)
     return [word for word in re.findall(r"[A-Za-z]{3,}", bare) if word not in names]
 
 
 def latin(words: str, stems: set[str]) -> list[str]:
     """Latin words in a sentence that are no symbols, formulas, keys or names of config files."""
-    bare = re.sub(r"\$[^$]*\$|`[^`]*`|--set \S+|\w+[._]\w[\w.]*", " ", words)
+    bare = re.sub(r"\$[^$]*\$|`[^`]*`|--(?:set|out) \S+|\w+[._]\w[\w.]*", " ", words)
     return [word for word in re.findall(r"[A-Za-z][A-Za-z\d]+", bare) if word not in SYMBOLS | stems]
 
 
