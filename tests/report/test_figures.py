@@ -100,6 +100,13 @@ def test_few_lines_are_named_at_their_ends_many_in_a_legend():
     assert keyed.figure.legends[0].get_title().get_text() == "what"
 
 
+def test_a_legend_has_the_order_of_the_lines_at_their_ends():
+    x, ends = np.arange(3.0), {"low": 1.0, "high": 9.0, "middle": 5.0}
+    lines = (Line(x, np.full(3, end), name, Style(n, n), exact=x) for n, (name, end) in enumerate(ends.items()))
+    (legend,) = drawn(one(*lines, direct=False)).figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["high", "middle", "low", "exact"]
+
+
 def curves(*values, names="abc", **more):
     """A panel of lines with these values over the same places."""
     marks = (

@@ -76,6 +76,15 @@ def test_notes_along_the_top_that_would_meet_stand_in_rows():
         assert axes._left_title.get_window_extent().y0 >= max(box.y1 for box in boxes)
 
 
+@pytest.mark.parametrize("count", [1, 5, 6, 12])
+def test_a_figure_of_a_column_is_lower_than_a_page(count):
+    x = np.arange(3.0)
+    panel = Panel(Axis("x"), Axis("y"), tuple(Line(x, x, f"filter {n}") for n in range(9)), direct=False)
+    figure = Figure("f", "F", "A flight.", (panel,) * count, 3, PAGE_MM)
+    canvas = drawing_canvas.render(drawing_canvas.at_width(figure, COLUMN_MM))
+    assert canvas.get_figheight() / MM < 297 or count > 6
+
+
 def test_a_width_at_which_words_would_be_cut_is_increased_and_said(tmp_path):
     result = run("rls2", realisations=64, overrides={"figures": ["sigma_r"]})
     written = result.write(tmp_path, figures="png", width_mm=20)

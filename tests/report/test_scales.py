@@ -34,4 +34,26 @@ def test_maps_with_the_same_label_share_a_scale_which_is_logarithmic_over_a_wide
         Panel(Axis("x"), Axis("y"), (Heat(np.arange(2.0), np.arange(1.0), np.array([values]), label),))
         for values, label in (([1.0, 2.0], "σ"), ([np.nan, 50.0], "σ"), ([0.0, 50.0], "share"), ([np.nan, np.nan], "n"))
     ]
-    assert heat_scales(panels) == {"σ": (1.0, 50.0, True), "share": (0.0, 50.0, False), "n": (0.0, 1.0, False)}
+    expected = {"σ": (1.0, 50.0, True, 0.0), "share": (0.0, 50.0, False, 0.0), "n": (0.0, 1.0, False, 0.0)}
+    assert heat_scales(panels) == {(label, ""): scale for label, scale in expected.items()}
+
+
+def test_shares_near_one_are_told_apart_by_their_colours():
+    shares = np.array([[1.0, 0.9975, 0.975], [0.75, 0.999, 0.99]])
+    axis = Axis("x")
+    panel = Panel(axis, axis, (Heat(np.arange(3.0), np.arange(2.0), shares, "share locked"),))
+    (scale,) = heat_scales([panel]).values()
+    decades = scale.loss_decades(shares)
+    assert np.array_equal(np.argsort(decades.ravel()), np.argsort(shares.ravel()))
+    assert decades[0, 1] - decades[0, 2] > 0.8  # nearly a decade, over a fortieth of the shares
+    np.testing.assert_allclose(scale.share(decades), shares, atol=1e-12)
+    assert [text for _, text in scale.loss_ticks()] == ["0.9", "0.99", "0.999", "1"]
+
+
+def test_maps_of_each_group_have_their_own_colours():
+    axis, cells = Axis("x"), (np.arange(2.0), np.arange(1.0))
+    maps = [
+        Heat(*cells, np.array([values]), "σ", group) for values, group in (((1, 2), "a"), ((3, 4), "a"), ((9, 10), "b"))
+    ]
+    scales = heat_scales([Panel(axis, axis, (heat,)) for heat in maps])
+    assert {group: (scale.low, scale.high) for (_, group), scale in scales.items()} == {"a": (1, 4), "b": (9, 10)}

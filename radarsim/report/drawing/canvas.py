@@ -40,6 +40,7 @@ from radarsim.report.drawing.style import (
     wrap_label,
 )
 from radarsim.report.math_text import plain_text, with_formulas
+from radarsim.report.wording import with_unbroken_units
 
 FILE_STYLE: Any = {name: STYLE[name] for name in ("pdf.fonttype", "ps.fonttype", "svg.fonttype")}
 WIDTH_STEP_MM = 5.0  # by which a width is increased at which something would be cut
@@ -169,7 +170,7 @@ def _layout(figure: Figure, plan: LegendPlan) -> Canvas:
     columns = min(figure.columns, len(plan.panels))
     rows = -(-len(plan.panels) // columns)
     heights = [panel.height_mm or figure.panel_height_mm for panel in plan.panels[::columns]]
-    headline = wrap(with_formulas(figure.headline), HEADLINE_LETTERS_PER_MM * figure.width_mm, " ")
+    headline = wrap(with_formulas(with_unbroken_units(figure.headline)), HEADLINE_LETTERS_PER_MM * figure.width_mm, " ")
     in_cell = _legend_fits_cell(figure, plan, rows, columns)
     height_mm = sum(heights) + _legends_height_mm(figure, plan, rows, columns, in_cell)
     height_mm += HEADLINE_MM * (headline.count("\n") + 1) if headline else 0.0

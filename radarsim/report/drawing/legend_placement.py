@@ -18,6 +18,7 @@ MAX_END_NAME_LETTERS = 28  # of a name at a line's end
 MAX_END_NAMES_SHARE = 0.3  # of a panel's cell, for names at the ends of its lines
 END_NAME_MM = 4.4  # of a panel's height for each name at a line's end
 MIN_PANEL_MM = 55.0  # width, in a figure of a chosen width
+MAX_FIGURE_MM, MIN_PANEL_HEIGHT_MM = 245.0, 40.0  # of panels together, under the height of A4; of each
 MAX_NAMES_BESIDE = 16  # in one column beside a panel
 
 LegendKeys = Mapping[str, Style | None]  # names and the styles that they explain; None for the crosses of exact values
@@ -72,9 +73,31 @@ def plan_legends(figure: Figure) -> LegendPlan:
         legends = [Legend(own_keys, title) if own_keys else None for own_keys, title in zip(keys, titles, strict=True)]
         return LegendPlan(panels, at_ends, tuple(legends), None, False)
     stands_beside = len(panels) == 1 and panels[0].legend == "right" and len(merged) <= MAX_NAMES_BESIDE
-    ordered = dict(sorted(merged.items(), key=lambda key: key[1] is None))  # crosses explain all curves: they come last
+    ranks = _end_ranks(panels)
+
+    def place(key: tuple[str, Style | None]) -> tuple[bool, bool, float]:
+        """Lines from the highest to the lowest; rough points and crosses are of all of them."""
+        name, style = key
+        return style is None, style == ROUGH_KEY, ranks.get(name, float(len(ranks)))
+
+    ordered = dict(sorted(merged.items(), key=place))
     common = Legend(ordered, next(iter(all_titles), "")) if merged else None
     return LegendPlan(panels, at_ends, (None,) * len(panels), common, stands_beside)
+
+
+def _end_ranks(panels: Sequence[Panel]) -> dict[str, float]:
+    """The mean place of each named line among the lines of its panels, from the highest at its end to the lowest.
+
+    Empty for points, and for lines that a panel draws for each value of a key."""
+    ranks: dict[str, list[int]] = {}
+    for panel in panels:
+        lines = named_lines(panel)
+        if any(isinstance(line.style.colour, float) or line.style.dash is None for line in lines):
+            return {}
+        ends = {line.label: float(line.y[np.isfinite(line.y)][-1]) for line in lines}
+        for rank, name in enumerate(sorted(ends, key=lambda name: -ends[name])):
+            ranks.setdefault(name, []).append(rank)
+    return {name: float(np.mean(places)) for name, places in ranks.items()}
 
 
 def _merge_keys(panel_keys: Sequence[LegendKeys]) -> LegendKeys | None:
@@ -145,4 +168,7 @@ def at_width(figure: Figure, width_mm: float | None) -> Figure:
     """The figure at a width, with as many columns as leave enough width for a panel; unchanged without a width."""
     if width_mm is None or width_mm == figure.width_mm:
         return figure
-    return replace(figure, width_mm=width_mm, columns=max(1, min(figure.columns, int(width_mm // MIN_PANEL_MM))))
+    columns = max(1, min(figure.columns, int(width_mm // MIN_PANEL_MM)))
+    rows = -(-sum(bool(panel.marks) for panel in figure.panels) // columns)
+    height = max(MIN_PANEL_HEIGHT_MM, min(figure.panel_height_mm, MAX_FIGURE_MM / max(rows, 1)))
+    return replace(figure, width_mm=width_mm, columns=columns, panel_height_mm=height)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import FuncNorm, LogNorm, Normalize
 
 from radarsim.language.translate import tr
 from radarsim.report.drawing import scales
@@ -27,7 +27,7 @@ from radarsim.report.drawing.style import (
 from radarsim.report.drawing.ticks import set_ticks
 from radarsim.report.wording import number
 
-MapColours = dict[str, Normalize]  # colour scales of maps, by the label of their bar
+MapColours = dict[tuple[str, str], Normalize]  # colour scales of maps, by the label of their bar and their group
 MAX_WRITTEN_CELLS = 100  # of a map, whose values are written in
 SHARE_LIMITS = (0, 1)
 
@@ -140,22 +140,34 @@ def _draw_bars(axes: Axes, bars: Bars) -> None:
 
 
 def common_map_colours(panels: Sequence[Panel]) -> MapColours:
-    """The colours of maps: one scale for all maps of a figure whose bars have the same label."""
-    return {
-        label: LogNorm(scale.low, scale.high) if scale.log else Normalize(scale.low, scale.high)
-        for label, scale in scales.heat_scales(panels).items()
-    }
+    """The colours of maps: one scale for all maps of a figure of a group whose bars have the same label."""
+    return {key: _colours(scale) for key, scale in scales.heat_scales(panels).items()}
+
+
+class LossNorm(FuncNorm):
+    """Colours of shares near one, by the logarithm of their difference from it."""
+
+    def __init__(self, scale: scales.HeatScale):
+        super().__init__((scale.loss_decades, scale.share), scale.low, scale.high)
+        self.ticks = scale.loss_ticks()
+
+
+def _colours(scale: scales.HeatScale) -> Normalize:
+    if scale.least_loss:
+        return LossNorm(scale)
+    return LogNorm(scale.low, scale.high) if scale.log else Normalize(scale.low, scale.high)
 
 
 def _draw_map(axes: Axes, heat: Heat, map_colours: MapColours) -> None:
-    norm = map_colours[heat.label]
+    norm = map_colours[heat.label, heat.group]
     centres = np.arange(len(heat.x)), np.arange(len(heat.y))
     mesh = axes.pcolormesh(*centres, heat.values, cmap="viridis", norm=norm, shading="nearest")
     axes.set_xticks(centres[0], [tick_text(float(v)) for v in heat.x])
     axes.set_yticks(centres[1], [tick_text(float(v)) for v in heat.y])
     axes.grid(False)
     bar = axes.figure.colorbar(mesh, ax=axes, label=heat.label)
-    set_ticks(bar.ax.yaxis, AxisSpec("", "log" if isinstance(norm, LogNorm) else "linear"), False)
+    ticks = norm.ticks if isinstance(norm, LossNorm) else ()
+    set_ticks(bar.ax.yaxis, AxisSpec("", "log" if isinstance(norm, LogNorm) else "linear", ticks=ticks), False)
     if heat.values.size <= MAX_WRITTEN_CELLS:
         for (i, j), value in np.ndenumerate(heat.values):
             if np.isfinite(value):

@@ -82,12 +82,14 @@ class Bars:
 class Heat:
     """A map of values (len(y), len(x)) over the centres of its cells, with the label of its colour bar.
 
-    Where there are few values, they are written into the cells."""
+    Where there are few values, they are written into the cells. Maps of a figure with the same label and group share
+    their colours."""
 
     x: np.ndarray
     y: np.ndarray
     values: np.ndarray
     label: str
+    group: str = ""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ WIDE_RATIO = 20.0  # of the values of a map, from which its colours are logarith
 MIN_SCANS = 5  # from which ticks stand at scans
 MIN_LAST_GAP = 0.5  # between the last two ticks at scans, in intervals
 MAX_EXTRA_TICKS = 3  # more than asked for, on a logarithmic axis
+MIN_HIGH_SHARE = 0.9  # median of shares whose differences from one matter
 MAX_DECADES = 7  # labelled on a logarithmic axis
 
 
@@ -114,21 +115,46 @@ def scan_ticks(scans: Scans, intervals: int) -> list[tuple[float, str]]:
 
 
 class HeatScale(NamedTuple):
-    """Least and largest value of the maps that share their colours, and whether the colours are logarithmic."""
+    """Least and largest value of the maps that share their colours, and whether the colours are logarithmic.
+
+    least_loss: of shares near one, half the least difference from one, to which the colours are logarithmic in that
+    difference; else zero."""
 
     low: float
     high: float
     log: bool
+    least_loss: float = 0.0
+
+    def loss_decades(self, values: ArrayLike) -> np.ndarray:
+        """How many decades shares are from one."""
+        return -np.log10(np.maximum(1 - np.asarray(values, float), 0) + self.least_loss)
+
+    def share(self, decades: ArrayLike) -> np.ndarray:
+        """The shares that are so many decades from one."""
+        return 1 + self.least_loss - 10.0 ** -np.asarray(decades, float)
+
+    def loss_ticks(self) -> tuple[tuple[float, str], ...]:
+        """Ticks of a bar of such colours."""
+        values = (0.0, 0.5, *(1 - 10.0**-n for n in range(1, MAX_DECADES)), 1.0)
+        return tuple(
+            (v, tick_text(v)) for v in values if self.low <= v <= min(self.high, 1 - self.least_loss) or v == 1
+        )
 
 
-def heat_scales(panels: Sequence[Panel]) -> dict[str, HeatScale]:
-    """The colour scales of maps by the label of their bar; maps of a figure with the same label share a scale."""
+def heat_scales(panels: Sequence[Panel]) -> dict[tuple[str, str], HeatScale]:
+    """The colour scales of maps by the label of their bar and their group."""
     maps = [mark for panel in panels for mark in panel.marks if isinstance(mark, Heat)]
-    return {label: _heat_scale([m.values for m in maps if m.label == label]) for label in {m.label: None for m in maps}}
+    groups: dict[tuple[str, str], list[np.ndarray]] = {}
+    for heat in maps:
+        groups.setdefault((heat.label, heat.group), []).append(heat.values)
+    return {key: _heat_scale(values) for key, values in groups.items()}
 
 
 def _heat_scale(maps: Sequence[np.ndarray]) -> HeatScale:
     values = np.concatenate([np.zeros(0), *map(np.ravel, maps)])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
+    if values.size and low >= 0 and MIN_HIGH_SHARE <= high <= 1 and np.median(values) > MIN_HIGH_SHARE:
+        losses = 1 - values[values < 1]
+        return HeatScale(low, high, False, float(losses.min()) / 2 if losses.size else 0.0)
     return HeatScale(low, high, bool(low > 0 and high > WIDE_RATIO * low))

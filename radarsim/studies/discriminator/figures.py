@@ -22,6 +22,10 @@ SYMBOLS = {  # of errors, with the unit
     "f3": ("$|\\Delta f_3|$", "Hz/s³"),
     "f4": ("$|\\Delta f_4|$", "Hz/s⁴"),
 }
+QUANTITIES = {  # as titles of panels
+    **{"phi0": term("initial phase"), "f0": term("frequency"), "f1": term("rate of the frequency")},
+    **{f"f{n}": term("{n}th derivative of the frequency") for n in (2, 3, 4)},
+}
 NAMES = {"phi0": "$\\varphi_0$"} | {f"f{n}": f"$f_{n}$" for n in range(5)}
 INTEGER_KEYS = ("density", "steps")  # keys that take whole numbers
 WINDOW_LABEL = term("window length, s")
@@ -87,7 +91,7 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
             Axis(tr("window $k$"), ticks=thinned_ticks(k)),
             Axis("$T_k$, s", "log"),
             (Line(k, t, "", Style(0, 0, 0)),),
-            "a",
+            f"a  {tr('windows')}",
             direct=False,
         )
     ]
@@ -103,7 +107,8 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
             Line(t, burst[:, n], tr("one burst"), Style(2, 2, 2, size_pt=2.4)),
         )
         y = Axis(key_labels.label_with_unit(*SYMBOLS[component]), "log")
-        panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), y, marks, letter, direct=False))
+        title = f"{letter}  {tr(QUANTITIES[component], n=component[1:])}"
+        panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), y, marks, title, direct=False))
     caption = tr(
         "Windows of {name!r} and absolute error of each component: median and band from 5 to 95 % of {count:,} "
         "bursts, locked or not. Dashed: three times the Cramér–Rao bound, prior included. Dotted: the first burst.",

@@ -218,7 +218,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
                         filter_rows, figure_lines.SIGMA[:4], key_labels.escape_dollars(f), replace(style, marker=None)
                     )
                 )
-        y = Axis(key_labels.sigma_axis_label(symbol, unit), "log")
+        y = Axis(key_labels.label_with_unit(tr("full r.m.s. error of {symbol}", symbol=symbol), unit), "log")
         sigma_panels.append(
             Panel(panel_layout.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1)
         )
@@ -284,8 +284,8 @@ def probabilities(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figur
         probability_panels = panel_layout.with_legend_cell(probability_panels)
     caption = (
         tr(
-            "Mean posterior probabilities of the models; the numbers after the motions are the standard deviations of "
-            "the random acceleration, m/s². Dotted: ends of the stages."
+            "Mean posterior probabilities of the models, each with σ of its random acceleration. Dotted: ends of the "
+            "stages."
         )
         + left_out
     )
@@ -318,7 +318,12 @@ def families(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure |
             y = Axis(tr("family"), ticks=tuple(enumerate(map(tr, FAMILIES.values()))))
             title = ": ".join(filter(None, (_title(result, results), tr(str(stage)))))
             heat_panels.append(
-                Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, key_labels.sigma_axis_label("$y$", "m")),), title)
+                Panel(
+                    x,
+                    y,
+                    (Heat(np.arange(4), np.arange(3), grid, key_labels.sigma_axis_label("$y$", "m"), case),),
+                    title,
+                )
             )
     caption = tr(
         "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
@@ -360,8 +365,11 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
 
 
 def _motions(models: Sequence) -> list[str]:
-    """The models of a bank in the user's language: motion and spread of the acceleration in m/s²."""
-    return [f"{tr(MOTIONS[model.motion])} {numeral(f'{model.sigma_acceleration_mps2:g}')}" for model in models]
+    """The models of a bank in the language in use: motion and σ of the random acceleration."""
+    return [
+        f"{tr(MOTIONS[model.motion])}, $\\sigma_a$ = {numeral(f'{model.sigma_acceleration_mps2:g}')} {tr('m/s²')}"
+        for model in models
+    ]
 
 
 MOTIONS = {"uniform": term("constant velocity"), "accelerated": term("constant acceleration"), "still": term("still")}

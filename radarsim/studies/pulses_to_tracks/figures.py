@@ -1,6 +1,7 @@
 """The study's figures: σ and gains, locks by scan, errors of the bursts' estimates, the cost of a lost burst."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MIN_REALISATIONS_OF_POINT = 30  # for a point to be drawn
+ROOM = 0.06  # of an axis' length, beside its points
 DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
 
@@ -59,6 +61,7 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
             members[0], keys[0], [dict(result.swept_values)[keys[0]] for result in members]
         )
         if len(keys) == 1 and not axis.ticks:
+            axis = _with_room(axis, x)
             threshold_panels += _threshold_panels([members[i] for i in np.argsort(x)], np.sort(x), axis, tables_by_name)
     if not any(panel.marks for panel in threshold_panels):
         return {}
@@ -76,6 +79,14 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
         60,
     )
     return {"threshold": figure}
+
+
+def _with_room(axis: Axis, x: np.ndarray) -> Axis:
+    """The axis with room beside the first and the last of the values x (n,): whiskers lie on no other axis."""
+    low, high = (np.log(x.min()), np.log(x.max())) if axis.scale == "log" else (x.min(), x.max())
+    ends = np.array([low, high]) + np.array([-ROOM, ROOM]) * (high - low)
+    left, right = np.exp(ends) if axis.scale == "log" else ends
+    return replace(axis, limits=(float(left), float(right)))
 
 
 def _threshold_panels(

@@ -122,8 +122,8 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
             realisations=case_selection.realisations_text(results),
         )
     ) + case_selection.cases_left_out_remark(results, shown_results)
-    title = tr("Probability of a confirmed track")
-    return Figure("confirmation", title, caption, tuple(figure_panels), min(2, len(figure_panels)), PAGE_MM)
+    title, columns = tr("Probability of a confirmed track"), min(3, len(figure_panels))
+    return Figure("confirmation", title, caption, tuple(figure_panels), columns, PAGE_MM, 50.0)
 
 
 def _swept_values(result: CaseResult[ClutterAxes]) -> str:

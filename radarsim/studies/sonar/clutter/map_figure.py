@@ -6,7 +6,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import tr
-from radarsim.report import key_labels, panel_layout
+from radarsim.report import key_labels
 from radarsim.report.drawing.model import GREY, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
 from radarsim.studies.sonar.clutter.multi_tracker import confirmed_tracks
@@ -57,7 +57,7 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     x_axis = Axis(tr("distance east, km"), limits=(west / 1e3, east / 1e3))
     y_axis = Axis(tr("distance north, km"), limits=(south / 1e3, north / 1e3))
     panel, title = Panel(x_axis, y_axis, tuple(marks), direct=False, equal=True), tr("Plots, gates and tracks")
-    return Figure("track_map", title, caption, (panel,), width_mm=panel_layout.WIDE_MM, panel_height_mm=100)
+    return Figure("track_map", title, caption, (panel,), panel_height_mm=100)
 
 
 def _plots_within(
