@@ -24,7 +24,7 @@ SYMBOLS = {  # of errors, with the unit
 }
 QUANTITIES = {  # as titles of panels
     **{"phi0": term("initial phase"), "f0": term("frequency"), "f1": term("rate of the frequency")},
-    **{f"f{n}": term("{n}th derivative of the frequency") for n in (2, 3, 4)},
+    **{"f2": term("its 2nd derivative"), "f3": term("its 3rd derivative"), "f4": term("its 4th derivative")},
 }
 NAMES = {"phi0": "$\\varphi_0$"} | {f"f{n}": f"$f_{n}$" for n in range(5)}
 INTEGER_KEYS = ("density", "steps")  # keys that take whole numbers
@@ -107,7 +107,7 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
             Line(t, burst[:, n], tr("one burst"), Style(2, 2, 2, size_pt=2.4)),
         )
         y = Axis(key_labels.label_with_unit(*SYMBOLS[component]), "log")
-        title = f"{letter}  {tr(QUANTITIES[component], n=component[1:])}"
+        title = f"{letter}  {tr(QUANTITIES[component])}"
         panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), y, marks, title, direct=False))
     caption = tr(
         "Windows of {name!r} and absolute error of each component: median and band from 5 to 95 % of {count:,} "
