@@ -49,8 +49,8 @@ def _shift_warning(name: str, shift: int, factor: float) -> str:
     if shift < 0:
         return tr("{name}: the estimates fit the truth of {scans} earlier: their errors are then {factor} "
                   "times smaller; they may stand too late", **fields)  # fmt: skip
-    return tr("{name}: the estimates fit the truth of {scans} later: their errors are then {factor} times smaller; they "
-              "may stand too early", **fields)  # fmt: skip
+    return tr("{name}: the estimates fit the truth of {scans} later: their errors are then {factor} times smaller; "
+              "they may stand too early", **fields)  # fmt: skip
 
 
 def _examined_scans(first: int, stop: int) -> np.ndarray:
