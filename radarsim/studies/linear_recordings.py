@@ -155,6 +155,7 @@ class PlotLikelihood:
     def __init__(self, study: "LinearStudy", spec: Any, track: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.spec, self.filter, self.model = spec, track.name, RowModel(study, spec, track)
         self.outlier_kinds = tuple(self.model.columns)
+        self.far_kinds: tuple[str, ...] = ()
         self.tracks, self.rows = len(tracks), sum(len(track["t_s"]) for track in tracks)
         self.keys = study.fitted
         stated = [attrgetter(key)(spec) for key in self.keys]

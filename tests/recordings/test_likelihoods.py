@@ -454,6 +454,20 @@ def test_the_span_beside_a_velocity_counts_before_that_of_the_config():
         assert abs(likelihood(other, filter_name, columns)(plain.stated) - plain(plain.stated)) > 1  # e times as likely
 
 
+def test_an_outlier_among_folded_velocities_is_anywhere_in_the_span():
+    """Some σ off are as good as another fold: a share of near outliers is one of far ones; of ranges it is not."""
+    case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")
+    one, none = likelihood(case, "memory", columns), outlier_law(0.0, 0.0)
+
+    def value(range_law, velocity_law):
+        return one(one.stated, ErrorLaw(outlier_laws=(range_law, velocity_law)))
+
+    near, far = outlier_law(0.05, 0.0), outlier_law(0.0, 0.05)
+    assert one.far_kinds == ("velocity_mps",)
+    assert value(none, near) == value(none, far)
+    assert value(near, none) != value(far, none)
+
+
 def test_a_velocity_whose_error_is_a_span_tells_nothing():
     """It is as likely as any other, whatever the filter knew: one over the span; the ranges as without it."""
     case, columns = loaded("ambiguous_rls4"), recording("ambiguous_rls4")

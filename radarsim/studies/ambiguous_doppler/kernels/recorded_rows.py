@@ -21,14 +21,18 @@ from radarsim.kernels.likelihood import FAR, LAW_COUNT, LOG_DENSITY, MEAN, NEAR,
 FARTHEST = 9.0  # standard deviations of the velocity's innovation within which folds are tried
 START_RANGES = 3  # of a track, among which gross errors are left out
 NEGLIGIBLE = 80.0  # below the logarithm of the greatest weight
+INVISIBLE = 45.0  # the same, in a sum of weights: thousands of such change no digit
 MAX_SEQUENCES = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
 
 
 @kernel
 def log_sum_exp(w):
     """The logarithm of Σ exp(w), of logarithms of weights w (…)."""
-    greatest = w.max()
-    return greatest + np.log(np.exp(w - greatest).sum())
+    greatest, total = w.max(), 0.0
+    for x in w.flat:
+        if not x < greatest - INVISIBLE:
+            total += np.exp(x - greatest)
+    return greatest + np.log(total)
 
 
 @kernel
@@ -112,12 +116,13 @@ def likeliest(w, max_count, min_ratio):
 
     w (n,) are logarithms, the best one's 0."""
     threshold, ties_left = w.min(), max_count
-    if w.size > max_count:
+    floor = np.log(min_ratio) - 1e-9 if min_ratio > 0.0 else -np.inf  # spares the exponentials of most
+    if (w >= floor).sum() > max_count:
         threshold = np.partition(w, w.size - max_count)[w.size - max_count]
         ties_left = max_count - (w > threshold).sum()
     indices, count = np.empty(min(w.size, max_count), dtype=np.int64), 0
     for i in range(w.size):
-        if w[i] >= threshold and np.exp(w[i]) >= min_ratio:
+        if w[i] >= threshold and w[i] >= floor and np.exp(w[i]) >= min_ratio:
             if w[i] == threshold:
                 ties_left -= 1
             if (w[i] > threshold or ties_left >= 0) and count < indices.size:
@@ -148,38 +153,46 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outli
         for j in range(folds):
             e[i, j] = innovation + D * (j - folds // 2)
             weight[i, j] = w[i] - e[i, j] * e[i, j] / (2.0 * S)
-    log_norm, factor, soundness, spread = 0.5 * np.log(2.0 * np.pi * S), 1.0, 1.0, 0.0
+    log_norm, soundness = 0.5 * np.log(2.0 * np.pi * S), 1.0
     if outliers[NEAR] + outliers[FAR] > 0.0:
         T = S + (outliers[OFFSET] * outliers[OFFSET] + outliers[SPREAD] * outliers[SPREAD]) * R
         width = D if max_fold >= 0 else max(span, math.sqrt(T))
-        far, near, factor, sound, square = outliers[FAR] * math.exp(log_norm) / (width * folds), 0.0, 0.0, 0.0, 0.0
-        best, total, near_share = w.max(), 0.0, outliers[NEAR] * math.sqrt(S / T)
+        far, near_share = outliers[FAR] * math.exp(log_norm) / width, outliers[NEAR] * math.sqrt(S / T)
+        best, total, factor, sound, spread = w.max(), 0.0, 0.0, 0.0, 0.0
         for i in range(n):
-            prior = math.exp(w[i] - best)
+            regular, close, square = 0.0, 0.0, 0.0
             for j in range(folds):
                 e2 = e[i, j] * e[i, j]
-                regular = (1.0 - outliers[NEAR] - outliers[FAR]) * math.exp(-0.5 * e2 / S)
-                near = near_share * math.exp(-0.5 * e2 / T) if near_share > 0.0 else 0.0
-                total += prior * (regular + near + far)
-                sound += prior * regular
-                factor += prior * (regular + near * S / T)
-                square += prior * (regular + near * S / T) * e2
-                weight[i, j] = w[i] + math.log(regular + near + far) if regular + near + far > 0.0 else -1e300
-        factor, soundness = factor / total, sound / total
-        spread = (1.0 - factor) * square / total
+                r = (1.0 - outliers[NEAR] - outliers[FAR]) * math.exp(-0.5 * e2 / S)
+                c = near_share * math.exp(-0.5 * e2 / T) if near_share > 0.0 else 0.0
+                weight[i, j] = r + c
+                regular += r
+                close += c
+                square += (r + c * S / T) * e2
+            # A far outlier says nothing of the fold. Were it divided among the folds, all of them would live on.
+            for j in range(folds):
+                part = weight[i, j] / (regular + close) if regular + close > 0.0 else (1.0 if j == folds // 2 else 0.0)
+                part *= regular + close + far
+                weight[i, j] = w[i] + math.log(part) if part > 0.0 else -1e300
+            prior, mass = math.exp(w[i] - best), regular + close + far
+            pull = (regular + close * S / T) / mass if mass > 0.0 else 0.0
+            e[i] *= pull
+            total += prior * mass
+            sound += prior * regular
+            factor += prior * mass * pull
+            spread += prior * (1.0 - pull) * square
+        soundness = sound / total
         P_before = (P[0], P[1], P[2], P[3], P[4], P[5])
-        updated_P = add_outer(P_before, spread - factor * S, gain)
+        updated_P = add_outer(P_before, (spread - factor * S) / total, gain)
     density = log_sum_exp(weight) - log_sum_exp(w) - log_norm
     best = weight.max()
     if merge:
-        e *= factor
         p = np.exp(weight[0] - best)
         p /= p.sum()
         mean = (p * e[0]).sum()
         updated_P = add_outer(updated_P, (p * (e[0] - mean) ** 2).sum(), gain)
         order, e[0, 0], weight[0, 0] = np.zeros(1, dtype=np.int64), mean, best
     else:
-        e *= factor
         order = likeliest(weight.ravel() - best, max_count, min_ratio)
     for i in range(6):
         P[i] = updated_P[i]
