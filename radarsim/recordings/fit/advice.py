@@ -24,6 +24,7 @@ from radarsim.recordings.fit.likelihood_slice import (
     Rival,
     climb,
     half_chi2,
+    is_least_share,
     log_likelihood,
     maximise,
     no_progress,
@@ -144,6 +145,9 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
     value_so_far, results = log_likelihood(counted, {}), []
     while len(chosen_names) < min(MAX_FINDINGS, len(names)):
         trials = {name: maximise(counted, [*chosen_names, name], start) for name in names if name not in chosen_names}
+        trials = {name: maximum for name, maximum in trials.items() if not is_least_share(name, maximum[0][name])}
+        if not trials:
+            break
         best_name = max(trials, key=lambda name: trials[name][1])
         values, top = trials[best_name]
         if top - value_so_far < needed:
@@ -151,7 +155,8 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
         rival = rival_of_outliers(counted, values) if best_name == OUTLIERS else None
         if rival is not None and rival.is_clear:
             if rival.gain > 0:
-                names = [MANOEUVRES if name == OUTLIERS else name for name in names]
+                # Where errors last they are states, whose noise a hard manoeuvre would raise too.
+                names = [MANOEUVRES if name == OUTLIERS else name for name in names if name != CORRELATION]
                 best_name = MANOEUVRES
                 values, top = maximise(counted, [*chosen_names, best_name], start)
             rival = None

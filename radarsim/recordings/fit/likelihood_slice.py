@@ -19,6 +19,7 @@ SHARE_LIMITS = {
     CORRELATION: (1e-3, 0.99, 0.0),
     MANOEUVRES: (1e-3, 0.4, 3.0),
 }  # least, most, logit at the start of the search
+LEAST_SHARE_MARGIN = 1.5  # times the least: a share below it explains nothing, whatever else has moved with it
 FAR_FROM_ZERO = 1e4  # times the value of a key that counts as zero
 IMPOSSIBLE_LOG_LIKELIHOOD = -1e300  # stands for the logarithm of zero likelihood: a search needs a number
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
@@ -35,6 +36,11 @@ def half_chi2(probability: float) -> float:
 
 def no_progress(evaluations: int, expected: int | None = None) -> None:
     """Ignore progress."""
+
+
+def is_least_share(name: str, value: float) -> bool:
+    """Whether the value of an explanation is the least that is tried: then others explain the plots."""
+    return name in SHARE_LIMITS and value < LEAST_SHARE_MARGIN * SHARE_LIMITS[name][0]
 
 
 def starting_values(likelihood: Likelihood) -> np.ndarray:

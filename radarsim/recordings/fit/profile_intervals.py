@@ -94,7 +94,7 @@ class ProfileIntervals:
             return raised
         start = end.point.copy()
         start[i] = log_key = end.log_key + direction * OUTSIDE_STEP
-        for j in self.search.law_starts:
+        for j in self.search.near_starts:
             point, value = self.search.climb_to_near_outliers(start, j, i, limit - MAX_CLIMB_GAIN)
             if value > limit:
                 return ProfilePoint(log_key, value, point)

@@ -67,6 +67,8 @@ class LikelihoodSearch:
         self.highest = start + math.log(INTERVAL_REACH)
         self.zero_reach = np.full(start.size, NEAR_ZERO_LOG)
         self.law_starts = range(start.size, start.size + LAW_SIZE * len(likelihood.outlier_kinds) * robust, LAW_SIZE)
+        kinds = zip(self.law_starts, likelihood.outlier_kinds, strict=False)
+        self.near_starts = [i for i, kind in kinds if kind not in likelihood.far_kinds]
         for _ in self.law_starts:
             none, width = _logit(MIN_OUTLIER_SHARE), math.log(MIN_NEAR_SIGMAS)
             first = [none - FIRST_STEP, _logit(FIRST_OUTLIER_SHARE), width - FIRST_STEP, math.log(NEAR_STARTS[0][2])]
@@ -97,7 +99,7 @@ class LikelihoodSearch:
     def _try_near_outliers(self) -> None:
         """Take near outliers into the best point if they clearly raise the likelihood; else, as sound errors may have
         that shape by chance, keep the point as a rival, whose keys the intervals hold too."""
-        for i in self.law_starts:
+        for i in self.near_starts:
             candidate, value = self.climb_to_near_outliers(self.best, i, None)
             self.near_points[i] = candidate
             if value > self.top + CLEAR_NEAR_GAIN:
