@@ -3,8 +3,9 @@
 The steps come as programs (`radarsim.kernels.tracing`), so a kernel holds the study's own formulas and no call. All
 arrays are flat; rows are eights of realisations. Of `groups` eights and K scans: known (K · width,) numbers known at a
 scan, its first is the time since the scan before, s; numbers (n,) numbers of a case, or of a filter; plots (groups · K
-· PLOT) rows: of a scan 1 where there is a plot, else 0, the numbers of the plot, the truth; errors (groups · K · C)
-rows: errors of the components, zero beyond the block's last realisation.
+· PLOT) rows: of a scan 1 where there is a plot, else 0, the numbers of the plot, the truth, and the same two of each
+false plot; errors (groups · K · C) rows: errors of the components, zero beyond the block's last realisation and of
+lost tracks.
 
 Layout of the noise: the normals 2 j and 2 j + 1 of scan k are those of pair `pairs` · k + j of the stream of plots;
 whether there is one, the uniform number k of the stream of detections."""
@@ -20,7 +21,7 @@ from radarsim.kernels.tracing import Program
 STRIP = 16  # scans whose noise is drawn at once
 # Arrays of a program of the world, and of one of a filter.
 STATE, KNOWN, NUMBERS, FIRST_NORMALS, SECOND_NORMALS, PLOT = range(6)
-COUNTED, ERRORS, TESTED = 3, 4, 6
+COUNTED, ERRORS, TESTED, EVENTS = 3, 4, 6, 7
 
 
 def truth_kernel(first: Program, following: Program, pairs: int, rows: int):
@@ -60,7 +61,7 @@ def truth_kernel(first: Program, following: Program, pairs: int, rows: int):
     return draw
 
 
-def filter_kernel(first: Program, following: Program, rows: int, components: int, tested: bool):
+def filter_kernel(first: Program, following: Program, rows: int, components: int, tested: bool, events: int):
     """The kernel that runs a filter over plots of `rows` rows a scan, and adds up its errors.
 
     error (K, C, 4) takes the sums of e … e⁴, paired (K, C) those of e² times the baseline's e²; where tested, believed
@@ -68,10 +69,13 @@ def filter_kernel(first: Program, following: Program, rows: int, components: int
     begin, step = emit_program(first), emit_program(following)
 
     @kernel
-    def follow(groups, count, scan_numbers, width, numbers, plots, state, errors, base, error, paired, believed, nees):
+    def follow(
+        groups, count, scan_numbers, width, numbers, plots, state, errors, base, error, paired, believed, nees, counts
+    ):
         scans = scan_numbers.size // width
         sums, products, variances, squares = address(error), address(paired), address(believed), address(nees)
-        is_counted, extra = np.empty(WIDTH), np.zeros((components + 1) * WIDTH)
+        totals = address(counts)
+        is_counted, extra, marks = np.empty(WIDTH), np.zeros((components + 1) * WIDTH), np.zeros((events + 1) * WIDTH)
         for g in range(groups):
             for lane in range(WIDTH):
                 is_counted[lane] = 1.0 if g * WIDTH + lane < count else 0.0
@@ -87,11 +91,14 @@ def filter_kernel(first: Program, following: Program, rows: int, components: int
                     error_row,
                     plot_row,
                     address(extra),
+                    address(marks),
                 )
                 if k == 0:
                     begin(addresses)
                 else:
                     step(addresses)
+                for event in range(events):
+                    totals[k * events + event] += total(get(address(marks), event))
                 for c in range(components):
                     e, b = get(error_row, c), get(baseline_row, c)
                     square = e * e

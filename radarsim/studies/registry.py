@@ -38,6 +38,7 @@ SHIPPED = {  # in the order of the papers, then extensions
     "discriminator": "radarsim.studies.discriminator",
     "ambiguous_doppler": "radarsim.studies.ambiguous_doppler",
     "pulses_to_tracks": "radarsim.studies.pulses_to_tracks",
+    "plane": "radarsim.studies.plane",
 }
 
 

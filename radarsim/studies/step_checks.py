@@ -89,3 +89,12 @@ def shape(value: Any) -> str:
     if isinstance(value, tuple):
         return f"({', '.join(map(shape, value))})"
     return "·" if tracing.is_number(value) else f"a {type(value).__name__}" if isinstance(value, list) else repr(value)
+
+
+def check_candidates(function: Callable[..., Any], values: Any, count: int) -> None:
+    """Raise ConfigError where a function does not give places for plots: a number and a plot of this many each."""
+    for place in values if isinstance(values, tuple) else (None,):
+        if not isinstance(place, tuple) or len(place) != 2 or shape(place) != f"(·, {shape((0.0,) * count)})":
+            raise user_code_error(
+                function, f"must give places (there, {shape((0.0,) * count)}) for plots, got {shape(place)}"
+            )

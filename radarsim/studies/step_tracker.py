@@ -14,24 +14,29 @@ from radarsim.studies.step_checks import check_length, check_same_shape, record,
 from radarsim.user_code.errors import study_context, user_code_error
 
 if TYPE_CHECKING:
-    from radarsim.studies.stepwise import StepStudy
+    from radarsim.studies.stepwise import Steps, StepStudy
 
 
 class Tracker:
     """The filters of a case over recorded plots, in plain Python, chunk by chunk: each begins with the first plot.
 
     Over missed scans they predict scan by scan, as they do over empty rows; where rows hold known quantities, which a
-    missed one lacks, in one step."""
+    missed one lacks, in one step. Among false plots rows of one time are the plots of a scan: a filter begins with the
+    first, and takes a scan without plots too."""
 
     most_rows: int | None = None
-    several = False
 
     def __init__(self, study: "StepStudy", spec: Any):
         self.study, self.names = study, tuple(filter_keys.name for filter_keys in spec.filters)
-        filter_steps = [study.kinds[filter_keys.kind] for filter_keys in spec.filters]
+        self.several = study.false_normals(spec) > 0
+        measured = [number.column for number in study.measured]
         self.filters = [
-            (steps, record(steps.design, spec, filter_keys))
-            for steps, filter_keys in zip(filter_steps, spec.filters, strict=True)
+            (
+                study.kinds[filter_keys.kind],
+                record(study.kinds[filter_keys.kind].design, spec, filter_keys),
+                [measured.index(name) for name in study.columns(spec, filter_keys) if name in measured],
+            )
+            for filter_keys in spec.filters
         ]
         self.states: list[Any] = [None] * len(self.filters)
         self.last, self.scan_period_s = math.nan, study.scan_period_s(spec)
@@ -42,35 +47,46 @@ class Tracker:
 
     def _follow(self, columns: "Mapping[str, np.ndarray]") -> Track:
         study, t = self.study, columns["t_s"]
-        plots = np.transpose([columns[number.column] for number in study.measured])
+        unknown = np.full(t.size, np.nan)
+        plots = np.transpose([columns.get(number.column, unknown) for number in study.measured])
         known_quantities = np.reshape([columns[name] for name in study.known_columns], (-1, t.size)).T
-        values = np.full((len(self.filters), t.size, 2, len(study.components)), np.nan)
-        for n in range(t.size):
-            z, u = tuple(map(float, plots[n])), tuple(map(float, known_quantities[n]))
-            for f, (steps, c) in enumerate(self.filters):
-                s = previous = self.states[f]
-                if s is not None:
-                    time = self.last
-                    missed = () if u else missed_scan_times(self.last, float(t[n]), self.scan_period_s)
-                    for scan_time in (*missed, float(t[n])):
-                        s = self._next(n, steps.predict, previous, s, scan_time - time, u, c)
-                        time = scan_time
-                if not any(map(math.isnan, z)):
-                    step, step_arguments = (steps.start, (z, u, c)) if s is None else (steps.update, (s, z, u, c))
-                    s = self._next(n, step, previous, *step_arguments)
-                self.states[f] = s
+        first_rows = np.flatnonzero(np.diff(t, prepend=math.nan) != 0) if self.several else np.arange(t.size)
+        scans = np.split(np.arange(t.size), first_rows[1:])
+        values = np.full((len(self.filters), len(scans), 2, len(study.components)), np.nan)
+        for n, rows in enumerate(scans):
+            row, time = int(rows[0]), float(t[rows[0]])
+            u = tuple(map(float, known_quantities[row]))
+            for f, (steps, c, used) in enumerate(self.filters):
+                scan_plots = [tuple(map(float, plots[i])) for i in rows if np.isfinite(plots[i, used]).all()]
+                s = self.states[f] = self._next_scan(row, time, steps, self.states[f], scan_plots, u, c)
                 if s is not None:
                     m = len(study.components)
-                    values[f, n, 0] = self._numbers(n, steps.estimate, m, "components", s, u, c)
+                    values[f, n, 0] = self._numbers(row, steps.estimate, m, "components", s, u, c)
                     if steps.covariance is not None:
                         description = "elements of a packed covariance"
-                        P = self._numbers(n, steps.covariance, m * (m + 1) // 2, description, s, u, c)
+                        P = self._numbers(row, steps.covariance, m * (m + 1) // 2, description, s, u, c)
                         if min(variance := variances(P, m)) < 0:
-                            raise refusal(n, steps.covariance, f"gives a variance of {min(variance):g}")
+                            raise refusal(row, steps.covariance, f"gives a variance of {min(variance):g}")
                         values[f, n, 1] = np.sqrt(variance)
-            self.last = float(t[n])
+            self.last = time
         components = tuple((component.name, component.unit) for component in study.components)
-        return Track(self.names, components, t, values[:, :, 0], values[:, :, 1])
+        return Track(self.names, components, t[first_rows], values[:, :, 0], values[:, :, 1])
+
+    def _next_scan(
+        self, row: int, t: float, steps: "type[Steps]", s: Any, scan_plots: list[tuple[float, ...]], u: Any, c: Any
+    ) -> Any:
+        """The state of a filter after a scan at time t whose plots begin at a row, None before its first plot."""
+        if s is None:
+            return self._next(row, steps.start, None, scan_plots[0], u, c) if scan_plots else None
+        missed = () if u else missed_scan_times(self.last, t, self.scan_period_s)
+        time, previous = self.last, s
+        for scan_time in (*missed, t):
+            s = self._next(row, steps.predict, previous, s, scan_time - time, u, c)
+            time = scan_time
+            if self.several:
+                places = tuple((1.0, z) for z in scan_plots) if scan_time == t else ()
+                s = self._next(row, steps.update, previous, s, places, u, c)
+        return s if self.several or not scan_plots else self._next(row, steps.update, previous, s, scan_plots[0], u, c)
 
     def _next(self, row: int, step: Callable[..., Any], previous: Any, *step_arguments: Any) -> Any:
         """The state after a step at a row, of the shape of the one before, if any."""

@@ -11,6 +11,7 @@
         def move(self, x, dt, c, w): …              # the state after dt seconds; (self, x, dt, c, w, t): at time t, s
         def plot(self, x, u, c, w): …               # the numbers of a plot; u: what is known at the scan
         def truth(self, x, u, c): …                 # the components of the state; where not given, the state itself
+        def difference(self, estimate, true): …     # the errors of the components; where not given, less the truth
 
     class Ekf(Steps):
         def design(spec, filter_keys): …            # the numbers of a filter by its keys, a record
@@ -28,12 +29,23 @@ and whole numbers of a record are no numbers of a realisation, and each of their
 
 The first plot is always there; `detection` is the probability of each later one. Where a filter gives a covariance,
 `believed_sigma` in `curves` and the table `consistency` say how it agrees with the errors. A study that knows σ exactly
-gives `exact_sigma`."""
+gives `exact_sigma`.
 
-import inspect
+Among false plots a study gives more:
+
+    false_quantities = 1                            # numbers of a scan after those that are known, for its plots alone
+    counted = ("confirmed",)                        # what is counted of kept tracks
+
+    def false_normals(self, spec): …                # how many unit normals the false plots of a scan take; 0: none
+    def false_plots(self, x, u, c, w): …            # places for them, each whether there is one (1.0), and its numbers
+    def kept(self, e, u, c): …                      # whether a track with these errors is still the target's
+
+and each filter `counts(s, u, c)`, what is counted of a track: 1.0 or 0.0 each. An update then takes, in place of a
+plot, a tuple of places for plots, of which that of the target is the first, at missed scans too. Lost tracks stay lost,
+their errors do not count; the table `tracks` says how many are kept."""
+
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,18 +54,18 @@ from radarsim.config.study_keys import possible_kinds
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.engine.sums import Layout
 from radarsim.errors import ConfigError
-from radarsim.kernels import small_matrices, tracing
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import OneFile
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
-from radarsim.studies.step_checks import (
-    DIFFERENT_FORMULA,
-    check_length,
-    check_same_shape,
-    record,
-    to_array,
-    traced_step,
-    variances,
+from radarsim.studies.step_checks import DIFFERENT_FORMULA, record, to_array
+from radarsim.studies.step_programs import (
+    NO_COVARIANCE,
+    CompiledFilter,
+    Scene,
+    cached_kernel,
+    compile_filter,
+    to_numbers,
+    trace_scene,
 )
 from radarsim.studies.step_tracker import Tracker
 from radarsim.user_code.errors import study_context, user_code_error
@@ -66,8 +78,6 @@ if TYPE_CHECKING:
 
 
 MAX_DIFFERENCE = 1e-9  # of the largest truth: permitted difference between plain Python and the kernel
-NO_COVARIANCE = -1e100  # stands for the variances and the NEES of a matrix that is not positive
-MOVE_PARAMETERS = 4  # of `move` without the time: x, dt, c, w
 BLOCK = 512  # realisations in a block
 MAX_ROWS = 20_000  # rows of plots and errors at once, 1.3 MB: fits a processor's cache
 
@@ -81,16 +91,7 @@ class Steps:
     update: Callable[[Any, Any, Any, Any], Any]
     estimate: Callable[[Any, Any, Any], tuple[Any, ...]]
     covariance: Callable[[Any, Any, Any], tuple[Any, ...]] | None = None
-
-
-@dataclass(frozen=True)
-class CompiledFilter:
-    """A filter of a case: its kernel, its numbers (n,), the rows of its state, and whether it has a covariance."""
-
-    kernel: Callable[..., None]
-    numbers: np.ndarray
-    rows: int
-    tested: bool
+    counts: Callable[[Any, Any, Any], tuple[Any, ...]]
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class Plan:
     width: int
     draw: Callable[..., None]
     numbers: np.ndarray
-    shape: tuple[int, int, int]  # rows of the state and of a plot, pairs of normals of a scan
+    scene: Scene
     filters: tuple[CompiledFilter, ...]
     case: "Case"
     checked: dict[str, np.ndarray] = field(default_factory=dict)
@@ -119,20 +120,34 @@ class StepStudy(OneFile):
     kinds: Mapping[str, type[Steps]]
     normals: tuple[int, int, int]
     known_columns: tuple[str, ...] = ()
-    extra_figures = ("consistency",)
+    false_quantities: int = 0
+    counted: tuple[str, ...] = ()
+    extra_figures = ("consistency", "tracks")
 
     world: Callable[..., Any]
     begin: Callable[..., Any]
     move: Callable[..., Any]
     plot: Callable[..., Any]
 
+    kept: Callable[..., Any]
+    false_plots: Callable[..., Any]
+
     def known_quantities(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
-        """Quantities known at times t_s (K,) s: columns (K,), in the order of `known_columns`. Default: nothing."""
+        """Quantities known at times t_s (K,) s: columns (K,), in the order of `known_columns`, and those of false
+        plots. Default: nothing."""
         return ()
+
+    def false_normals(self, spec: Any) -> int:
+        """How many unit normals the false plots of a scan take. Default: 0, there are none."""
+        return 0
 
     def truth(self, x: Any, u: Any, c: Any) -> tuple[Any, ...]:
         """The components of a true state. Default: the state."""
         return tuple(x)
+
+    def difference(self, estimate: Sequence[Any], true: Sequence[Any]) -> tuple[Any, ...]:
+        """The errors of the components, of their estimates. Default: these less the truth; an angle wraps."""
+        return tuple(a - b for a, b in zip(estimate, true, strict=True))
 
     def detection(self, spec: Any) -> float:
         """The probability of a plot after the first. Default: certain."""
@@ -185,15 +200,17 @@ class StepStudy(OneFile):
         axes, sums = self.axes(spec, self._exact(spec)), self.sums(spec)
         known_quantities = self._checked_known_quantities(spec, axes.t_s)
         world, detection = record(self.world, spec), self._probability(spec)
-        scene = self._scene(world)
-        filters = tuple(self._compiled(spec, keys, scene, detection < 1) for keys in spec.filters)
+        scene = trace_scene(self, spec, world)
+        filters = tuple(compile_filter(self, spec, keys, scene, detection < 1) for keys in spec.filters)
+        f, k, c = sums.shapes["paired"]
         if any(member.tested for member in filters):
-            f, k, c = sums.shapes["paired"]
             sums = Layout(**sums.shapes, believed=(f, k, c), nees=(f, k, 2))
+        if scene.false:
+            sums = Layout(**sums.shapes, estimates=(f, k, c), counts=(f, k, 1 + len(self.counted)))
         keys = np.stack([noise_key(case, "plots"), noise_key(case, "detections")])
-        draw = cached_kernel(steps.truth_kernel, scene.first, scene.following, scene.shape[2], scene.shape[1])
+        draw = cached_kernel(steps.truth_kernel, scene.first, scene.following, scene.pairs, scene.plot_rows)
         kernel_arguments = known_quantities.ravel(), known_quantities.shape[1], draw, to_numbers(world)
-        return Plan(sums, axes, keys, detection, *kernel_arguments, scene.shape, filters, case)
+        return Plan(sums, axes, keys, detection, *kernel_arguments, scene, filters, case)
 
     def _probability(self, spec: Any) -> float:
         """The probability of a plot."""
@@ -214,14 +231,13 @@ class StepStudy(OneFile):
 
     def _checked_known_quantities(self, spec: Any, t_s: np.ndarray) -> np.ndarray:
         """The time since the scan before, and the known quantities at each, (K, whole eights)."""
-        required = (
-            f"must give {len(self.known_columns)} columns of {t_s.size} finite numbers, as known_columns says; got "
-        )
+        count = len(self.known_columns) + self.false_quantities
+        required = f"must give {count} columns of {t_s.size} finite numbers, as known_columns says; got "
         known_quantities, repeated = (self.call(self.known_quantities, spec, t_s) for _ in range(2))
         if (
             not isinstance(known_quantities, Sequence | np.ndarray)
             or isinstance(known_quantities, str)
-            or len(known_quantities) != len(self.known_columns)
+            or len(known_quantities) != count
         ):
             size = f"{len(known_quantities)}" if isinstance(known_quantities, tuple | list) else repr(known_quantities)
             raise user_code_error(self.known_quantities, f"{required}{size}"[:200])
@@ -237,114 +253,18 @@ class StepStudy(OneFile):
             raise user_code_error(
                 self.known_quantities, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals"
             )
-        columns = [np.diff(t_s, prepend=t_s[0]), *values, *([t_s] if self._moves_by_time else [])]
+        columns = [np.diff(t_s, prepend=t_s[0]), *values, t_s]
         padded = np.zeros((t_s.size, -(-len(columns) // 8) * 8))
         padded[:, : len(columns)] = np.transpose(columns)
         return padded
-
-    def _scene(self, world: Any) -> "Scene":
-        """The programs of truth and plots."""
-        from radarsim.kernels import steps
-
-        first, move, plot = self.normals
-        programs = []
-        state: Any = None
-        for count in (first, move):
-            trace = tracing.Trace()
-            c, dt, u = trace.plain(steps.NUMBERS, world, stated=True), *self._at_a_scan(trace)
-            w = [unit_normal(trace, n) for n in range(count + plot)]
-            state_normals, plot_normals = tuple(w[:count]), tuple(w[count:])
-            if state is None:
-                x = traced_step(self.begin, c, state_normals)
-            else:
-                time = [self._time(trace)] if self._moves_by_time else []
-                x = traced_step(self.move, trace.rows(steps.STATE, state), dt, c, state_normals, *time)
-                check_same_shape(self.move, x, state)
-            state = x
-            z, true = traced_step(self.plot, x, u, c, plot_normals), traced_step(self.truth, x, u, c)
-            check_length(self.plot, z, len(self.measured), "measured")
-            check_length(self.truth, true, len(self.components), "components")
-            trace.write(steps.STATE, x)
-            trace.write(steps.PLOT, (z, true), 1)
-            programs.append(trace.program())
-        pairs = -(-(max(first, move) + plot) // 2)
-        shape = tracing.count_numbers(state), 1 + len(self.measured) + len(self.components), pairs
-        return Scene(programs[0], programs[1], shape)
-
-    def _at_a_scan(self, trace: tracing.Trace) -> tuple[Any, tuple[Any, ...]]:
-        """The time since the scan before, and the known quantities at a scan."""
-        from radarsim.kernels import steps
-
-        dt, *u = trace.plain(steps.KNOWN, (0.0,) * (1 + len(self.known_columns)))
-        return dt, tuple(u)
-
-    def _time(self, trace: tracing.Trace) -> Any:
-        """The time of a scan, in the column after the known quantities."""
-        from radarsim.kernels import steps
-
-        return trace.plain(steps.KNOWN, (0.0,) * (2 + len(self.known_columns)))[-1]
-
-    @property
-    def _moves_by_time(self) -> bool:
-        """Whether `move` takes the time."""
-        return len(inspect.signature(self.move).parameters) > MOVE_PARAMETERS
-
-    def _compiled(self, spec: Any, filter_keys: Any, scene: "Scene", missed: bool) -> CompiledFilter:
-        """A filter's kernel and numbers."""
-        from radarsim.kernels import steps as kernels_steps
-
-        steps = self.kinds[filter_keys.kind]
-        numbers = record(steps.design, spec, filter_keys)
-        first, following, rows = self._filter_programs(steps, numbers, scene, missed)
-        tested, rows_of_plot = steps.covariance is not None, scene.shape[1]
-        compiled = cached_kernel(
-            kernels_steps.filter_kernel, first, following, rows_of_plot, len(self.components), tested
-        )
-        return CompiledFilter(compiled, to_numbers(numbers), rows, tested)
-
-    def _filter_programs(self, steps: type[Steps], numbers: Any, scene: "Scene", missed: bool) -> tuple[Any, Any, int]:
-        """The programs of a filter's first scan and of later ones, and the rows of its state."""
-        from radarsim.kernels import steps as kernels_steps
-
-        programs, state = [], None
-        for begins in (True, False):
-            trace = tracing.Trace()
-            c, dt, u = trace.plain(kernels_steps.NUMBERS, numbers, stated=True), *self._at_a_scan(trace)
-            z = trace.rows(kernels_steps.PLOT, (0.0,) * len(self.measured), 1)
-            if begins:
-                s = traced_step(steps.start, z, u, c)
-            else:
-                predicted = traced_step(steps.predict, trace.rows(kernels_steps.STATE, state), dt, u, c)
-                check_same_shape(steps.predict, predicted, state)
-                s = traced_step(steps.update, predicted, z, u, c)
-                check_same_shape(steps.update, s, state)
-                if missed:
-                    s = tracing.where(trace.rows(kernels_steps.PLOT, 0.0) > 0.5, s, predicted)
-            state = s
-            trace.write(kernels_steps.STATE, s)
-            components = (0.0,) * len(self.components)
-            true = trace.rows(kernels_steps.PLOT, components, 1 + len(self.measured))
-            estimate = traced_step(steps.estimate, s, u, c)
-            check_length(steps.estimate, estimate, len(components), "components")
-            e = tuple(a - b for a, b in zip(estimate, true, strict=True))
-            counts = trace.rows(kernels_steps.COUNTED, 0.0) > 0.5
-            trace.write(kernels_steps.ERRORS, tracing.where(counts, e, (0.0,) * len(e)))
-            if steps.covariance is not None:
-                P = traced_step(steps.covariance, s, u, c)
-                n = len(components)
-                check_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
-                nees, pivot = small_matrices.eliminate(P, e)
-                tests = tracing.where(pivot > 0.0, (*variances(P, n), nees), (NO_COVARIANCE,) * (n + 1))
-                trace.write(kernels_steps.TESTED, tracing.where(counts, tests, (0.0,) * (n + 1)))
-            programs.append(trace.program())
-        return programs[0], programs[1], tracing.count_numbers(state)
 
     def simulate(self, plan: Plan, first: int, count: int) -> np.ndarray:
         values = np.zeros(plan.layout.size)
         sums = plan.layout.unpack(values)
         for _ in self._followers(plan, first, count, sums):
             pass
-        if (is_zero := sums["error"][..., 1] == 0).any():
+        is_zero = (sums["error"][..., 1] == 0) & (sums["estimates"] > 0 if "estimates" in sums else True)
+        if is_zero.any():
             sums["error"][is_zero & ~self._free_of_error(plan)] = np.nan
         if "believed" in sums and (has_no_covariance := (sums["believed"] < 0).any(axis=2)).any():
             sums["believed"][has_no_covariance] = sums["nees"][has_no_covariance] = np.nan
@@ -371,7 +291,7 @@ class StepStudy(OneFile):
 
         nothing = np.zeros((1, 2))
         scans, components = plan.axes.k.size, len(plan.axes.components)
-        max_groups = max(1, MAX_ROWS // (scans * (plan.shape[1] + 2 * components)))
+        max_groups = max(1, MAX_ROWS // (scans * (plan.scene.plot_rows + 2 * components)))
         work = aligned_zeros(max(member.rows for member in plan.filters) * WIDTH)
         baseline_errors, own_errors = (aligned_zeros(max_groups * scans * components * WIDTH) for _ in range(2))
         order = sorted(range(len(plan.filters)), key=lambda f: f != plan.axes.baseline)
@@ -382,7 +302,8 @@ class StepStudy(OneFile):
             for f in order:
                 member, errors = plan.filters[f], baseline_errors if f == plan.axes.baseline else own_errors
                 tested = [sums[name][f] if member.tested else nothing for name in ("believed", "nees")]
-                filter_sums = sums["error"][f], sums["paired"][f], *tested
+                counts = sums["counts"][f] if "counts" in sums else nothing
+                filter_sums = sums["error"][f], sums["paired"][f], *tested, counts
                 member.kernel(
                     groups,
                     used,
@@ -395,6 +316,8 @@ class StepStudy(OneFile):
                     baseline_errors,
                     *filter_sums,
                 )
+                if "counts" in sums:
+                    sums["estimates"][f] = counts[:, :1]
                 values = errors.reshape(max_groups, scans, components, WIDTH)[:groups]
                 yield f, start, used, values.transpose(0, 3, 1, 2).reshape(-1, scans, components)
 
@@ -404,58 +327,37 @@ class StepStudy(OneFile):
         Compiled code assumes finite numbers: a NaN error may be stored as zero."""
         if "free" not in plan.checked:
             plots = self._drawing(plan)(0, 1)
-            columns, truth = {name: column[0] for name, column in plots.columns.items()}, plots.truth[0]
+            columns, truth = plots.rows(0), plots.truth[0]
             try:
                 with np.errstate(all="ignore"):
-                    estimate = self.tracker(plan.case).feed({"t_s": plan.axes.t_s, **columns}).estimate
+                    estimate = self.tracker(plan.case).feed(columns).estimate
             except ConfigError:  # a division by zero
                 estimate = np.full_like(plan.axes.exact_sigma, np.nan)
-            plan.checked["free"] = np.abs(estimate - truth) <= MAX_DIFFERENCE * np.abs(truth).max(axis=0)
+            errors = np.stack(self.difference(np.moveaxis(estimate, -1, 0), truth.T), axis=-1)
+            plan.checked["free"] = np.abs(errors) <= MAX_DIFFERENCE * np.abs(truth).max(axis=0)
         return plan.checked["free"]
 
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         from radarsim.report import tables
+        from radarsim.studies import step_tables
 
         tables_of_study = super().tables(results)
-        if any("nees" in result.sums for result in results):
-            tested = [result for result in results if "nees" in result.sums]
+        made = {
+            "consistency": (step_tables.consistency_columns, "nees"),
+            "tracks": (step_tables.track_columns, "counts"),
+        }
+        for name, (columns, sums) in made.items():
+            if with_sums := [result for result in results if sums in result.sums]:
+                tables_of_study[name] = tables.join_columns([columns(self, result) for result in with_sums])
+        if "consistency" in tables_of_study:
             tables_of_study["curves"] = self.curves(results)
-            tables_of_study["consistency"] = tables.join_columns(map(self._consistency, tested))
         return tables_of_study
 
     def curves(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
         from radarsim.report import tables
+        from radarsim.studies import step_tables
 
-        return tables.join_columns(map(self._curves, results))
-
-    def _curves(self, result: CaseResult) -> Mapping[str, Any]:
-        """The curves, with the σ that filters with a covariance predict: the root of its mean variance."""
-        from radarsim.report import tables
-
-        if "believed" not in result.sums:
-            return tables.curve_columns(result)
-        sigma = np.sqrt(np.asarray(result.sums["believed"]) / result.count)
-        predicts = np.array([self.kinds[member.kind].covariance is not None for member in result.spec.filters])
-        return tables.curve_columns(result, np.where(predicts[:, None, None], sigma, np.nan))
-
-    def _consistency(self, result: CaseResult) -> Mapping[str, Any]:
-        """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""
-        from radarsim.report import consistency_tables, statistics, tables
-
-        tested = [
-            f
-            for f, filter_keys in enumerate(result.spec.filters)
-            if self.kinds[filter_keys.kind].covariance is not None
-        ]
-        scans, freedom, n = result.axes.k.size, len(self.components), result.count
-        sums = np.asarray(result.sums["nees"])[tested].reshape(-1, 2) / [freedom, freedom**2]
-        bounds = consistency_tables.bounds_from_spread(sums[:, 0], sums[:, 1], n, len(sums))
-        means = [statistics.mean_square(total, square, n) for total, square in sums]
-        return {
-            **tables.label_columns(result, np.repeat(tested, scans), np.tile(np.arange(scans), len(tested))),
-            "n": np.full(len(sums), n),
-            **consistency_tables.normalised_square_columns("nees", statistics.Estimate(*np.transpose(means)), bounds),
-        }
+        return tables.join_columns([step_tables.curve_columns(self, result) for result in results])
 
     def figures(
         self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
@@ -478,7 +380,8 @@ class StepStudy(OneFile):
     def _drawing(self, plan: Plan) -> DrawPlots:
         from radarsim.kernels.lanes import WIDTH
 
-        scans, rows, numbers = plan.axes.k.size, plan.shape[1], len(self.measured)
+        scans, rows, numbers = plan.axes.k.size, plan.scene.plot_rows, len(self.measured)
+        components, places = len(self.components), plan.scene.false
         known_quantities = plan.known_quantities.reshape(scans, -1)[:, 1 : 1 + len(self.known_columns)].T
         size = max(1, MAX_ROWS // (scans * rows))
 
@@ -489,15 +392,18 @@ class StepStudy(OneFile):
                 group_count = min(size, groups - start)
                 block = draw_plots(plan, first + start * WIDTH, group_count).reshape(group_count, scans, rows, WIDTH)
                 plots[:, :, start : start + group_count] = block.transpose(2, 1, 0, 3)
-            plots[1 : 1 + numbers, plots[0] < 0.5] = np.nan
             values = plots.reshape(rows, scans, -1)[..., :count].swapaxes(1, 2)
-            columns = dict(zip((number.column for number in self.measured), values[1:], strict=False))
+            truth = values[1 + numbers : 1 + numbers + components].transpose(1, 2, 0)
+            measured, false = values[: 1 + numbers], values[1 + numbers + components :]
+            if places:
+                measured = all_plots(np.stack([measured, *np.split(false, places)], axis=-1))
+            measured[1:, measured[0] < 0.5] = np.nan
+            columns = dict(zip((number.column for number in self.measured), measured[1:], strict=True))
             columns |= {
-                name: np.broadcast_to(row, values[0].shape)
+                name: np.broadcast_to(row.reshape(-1, *(1,) * bool(places)), measured[0].shape)
                 for name, row in zip(self.known_columns, known_quantities, strict=True)
             }
-            truth = values[1 + numbers :].transpose(1, 2, 0)
-            return SimulatedPlots(plan.axes.t_s, columns, plan.axes.components, truth, first=first)
+            return SimulatedPlots(plan.axes.t_s, columns, plan.axes.components, truth, {}, first)
 
         return draw
 
@@ -506,19 +412,11 @@ class StepStudy(OneFile):
             return Tracker(self, case.spec)
 
 
-@dataclass(frozen=True)
-class Scene:
-    """The programs of truth and plots, and `Plan.shape`."""
-
-    first: tracing.Program
-    following: tracing.Program
-    shape: tuple[int, int, int]
-
-
-@cache
-def cached_kernel(make: Callable[..., Any], *programs: Any) -> Callable[..., None]:
-    """The kernel that a function of `radarsim.kernels.steps` makes of programs, cached."""
-    return make(*programs)
+def all_plots(plots: np.ndarray) -> np.ndarray:
+    """The places for plots (1 + measured, n, K, M), with the plots first, by their first number: nothing tells that of
+    the target; without places that no scan needs."""
+    order = np.argsort(np.where(plots[0] > 0.5, plots[1], np.inf), axis=-1)[..., : int(plots[0].sum(axis=-1).max())]
+    return np.take_along_axis(plots, order[None], axis=-1)
 
 
 def draw_plots(plan: Plan, first: int, groups: int) -> np.ndarray:
@@ -527,22 +425,8 @@ def draw_plots(plan: Plan, first: int, groups: int) -> np.ndarray:
     from radarsim.kernels.lanes import WIDTH
     from radarsim.kernels.steps import STRIP
 
-    state, rows, pairs = plan.shape
-    room = [aligned_zeros(n * WIDTH) for n in (state, STRIP * pairs, STRIP * pairs, 2)]
-    plots = aligned_zeros(groups * plan.axes.k.size * rows * WIDTH)
+    scene = plan.scene
+    room = [aligned_zeros(n * WIDTH) for n in (scene.rows, STRIP * scene.pairs, STRIP * scene.pairs, 2)]
+    plots = aligned_zeros(groups * plan.axes.k.size * scene.plot_rows * WIDTH)
     plan.draw(plan.keys, first, groups, plan.known_quantities, plan.width, plan.numbers, plan.detection, *room, plots)
     return plots
-
-
-def unit_normal(trace: tracing.Trace, n: int) -> tracing.Lane:
-    """The unit normal n of a scan."""
-    from radarsim.kernels import steps
-
-    array = (steps.FIRST_NORMALS, steps.SECOND_NORMALS)[n % 2]
-    lane: tracing.Lane = trace.rows(array, 0.0, n // 2)
-    return lane
-
-
-def to_numbers(numbers: Any) -> np.ndarray:
-    """The numbers (n,) of a record and a zero, so that there is at least one."""
-    return np.array([*tracing.leaves(numbers), 0.0], dtype=float)

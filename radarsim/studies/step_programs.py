@@ -1,0 +1,188 @@
+"""The programs of a step study's case: of its truth and plots, and of each filter; see `radarsim.kernels.steps`."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.kernels import small_matrices, tracing
+from radarsim.studies.step_checks import (
+    check_candidates,
+    check_length,
+    check_same_shape,
+    record,
+    traced_step,
+    variances,
+)
+
+if TYPE_CHECKING:
+    from radarsim.studies.stepwise import Steps, StepStudy
+
+NO_COVARIANCE = -1e100  # stands for the variances and the NEES of a matrix that is not positive
+MOVE_PARAMETERS = 4  # of `move` without the time: x, dt, c, w
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The programs of truth and plots: those of the first scan, and of later ones.
+
+    rows: of the state; plot_rows: of a plot with the truth and the false plots; pairs: of normals of a scan; false: the
+    places for false plots."""
+
+    first: tracing.Program
+    following: tracing.Program
+    rows: int
+    plot_rows: int
+    pairs: int
+    false: int
+
+
+@dataclass(frozen=True)
+class CompiledFilter:
+    """A filter of a case: its kernel, its numbers (n,), the rows of its state, and whether it has a covariance."""
+
+    kernel: Callable[..., None]
+    numbers: np.ndarray
+    rows: int
+    tested: bool
+
+
+def trace_scene(study: "StepStudy", spec: Any, world: Any) -> Scene:
+    """The programs of truth and plots."""
+    from radarsim.kernels import steps
+
+    first, move, plot = study.normals
+    false = study.false_normals(spec)
+    programs, places = [], 0
+    state: Any = None
+    for count in (first, move):
+        trace = tracing.Trace()
+        c, (dt, *u, time) = trace.plain(steps.NUMBERS, world, stated=True), numbers_at_a_scan(study, spec, trace)
+        w = [unit_normal(trace, n) for n in range(count + plot + false)]
+        state_normals, plot_normals, false_normals = (
+            tuple(w[i:j]) for i, j in ((0, count), (count, count + plot), (count + plot, len(w)))
+        )
+        if state is None:
+            x = traced_step(study.begin, c, state_normals)
+        else:
+            times = [time] if moves_by_time(study) else []
+            x = traced_step(study.move, trace.rows(steps.STATE, state), dt, c, state_normals, *times)
+            check_same_shape(study.move, x, state)
+        state = x
+        z, true = traced_step(study.plot, x, tuple(u), c, plot_normals), traced_step(study.truth, x, tuple(u), c)
+        check_length(study.plot, z, len(study.measured), "measured")
+        check_length(study.truth, true, len(study.components), "components")
+        false_plots: tuple[Any, ...] = ()
+        if false:
+            false_plots = traced_step(study.false_plots, x, tuple(u), c, false_normals)
+            check_candidates(study.false_plots, false_plots, len(study.measured))
+        places = len(false_plots)
+        trace.write(steps.STATE, x)
+        trace.write(steps.PLOT, (z, true, false_plots), 1)
+        programs.append(trace.program())
+    plot_rows = 1 + len(study.measured) + len(study.components) + places * (1 + len(study.measured))
+    pairs = -(-(max(first, move) + plot + false) // 2)
+    return Scene(programs[0], programs[1], tracing.count_numbers(state), plot_rows, pairs, places)
+
+
+def compile_filter(study: "StepStudy", spec: Any, filter_keys: Any, scene: Scene, missed: bool) -> CompiledFilter:
+    """A filter's kernel and numbers. missed: whether plots may be missed."""
+    from radarsim.kernels import steps as kernels_steps
+
+    steps = study.kinds[filter_keys.kind]
+    numbers = record(steps.design, spec, filter_keys)
+    first, following, rows = trace_filter(study, spec, steps, numbers, scene, missed)
+    tested = steps.covariance is not None
+    events = 1 + len(study.counted) if scene.false else 0
+    kernel = cached_kernel(
+        kernels_steps.filter_kernel, first, following, scene.plot_rows, len(study.components), tested, events
+    )
+    return CompiledFilter(kernel, to_numbers(numbers), rows, tested)
+
+
+def trace_filter(
+    study: "StepStudy", spec: Any, steps: "type[Steps]", numbers: Any, scene: Scene, missed: bool
+) -> tuple[tracing.Program, tracing.Program, int]:
+    """The programs of a filter's first scan and of later ones, and the rows of its state."""
+    from radarsim.kernels import steps as kernels_steps
+
+    programs, state, n, m = [], None, len(study.components), len(study.measured)
+    for begins in (True, False):
+        trace = tracing.Trace()
+        c, (dt, *u, _) = trace.plain(kernels_steps.NUMBERS, numbers, stated=True), numbers_at_a_scan(study, spec, trace)
+        u, known_of_false = tuple(u[: len(study.known_columns)]), tuple(u)
+        present, z, true = trace.rows(kernels_steps.PLOT, (0.0, (0.0,) * m, (0.0,) * n))
+        if begins:
+            s = traced_step(steps.start, z, u, c)
+        else:
+            predicted = traced_step(steps.predict, trace.rows(kernels_steps.STATE, state), dt, u, c)
+            check_same_shape(steps.predict, predicted, state)
+            if scene.false:
+                z = ((present, z), *trace.rows(kernels_steps.PLOT, ((0.0, (0.0,) * m),) * scene.false, 1 + m + n))
+            s = traced_step(steps.update, predicted, z, u, c)
+            check_same_shape(steps.update, s, state)
+            if missed and not scene.false:
+                s = tracing.where(present > 0.5, s, predicted)
+        state = s
+        trace.write(kernels_steps.STATE, s)
+        estimate = traced_step(steps.estimate, s, u, c)
+        check_length(steps.estimate, estimate, n, "components")
+        e = traced_step(study.difference, estimate, true)
+        check_length(study.difference, e, n, "components")
+        counts = trace.rows(kernels_steps.COUNTED, 0.0) > 0.5
+        rows = tracing.count_numbers(s)
+        if scene.false:
+            was_kept = True if begins else trace.rows(kernels_steps.STATE, 0.0, rows) > 0.5
+            is_kept = study.kept(e, known_of_false, c) & was_kept
+            trace.write(kernels_steps.STATE, tracing.where(is_kept, 1.0, 0.0), rows)
+            counts, rows = counts & is_kept, rows + 1
+            events = traced_step(steps.counts, s, u, c)
+            check_length(steps.counts, events, len(study.counted), "counted")
+            trace.write(kernels_steps.EVENTS, tracing.where(counts, (1.0, *events), (0.0,) * (1 + len(events))))
+        trace.write(kernels_steps.ERRORS, tracing.where(counts, e, (0.0,) * n))
+        if steps.covariance is not None:
+            P = traced_step(steps.covariance, s, u, c)
+            check_length(steps.covariance, P, n * (n + 1) // 2, "elements of a packed covariance")
+            nees, pivot = small_matrices.eliminate(P, e)
+            tests = tracing.where(pivot > 0.0, (*variances(P, n), nees), (NO_COVARIANCE,) * (n + 1))
+            trace.write(kernels_steps.TESTED, tracing.where(counts, tests, (0.0,) * (n + 1)))
+        programs.append(trace.program())
+    return programs[0], programs[1], rows
+
+
+def numbers_at_a_scan(study: "StepStudy", spec: Any, trace: tracing.Trace) -> tuple[Any, ...]:
+    """The time since the scan before, the quantities known at a scan, those of false plots after them, and the time."""
+    from radarsim.kernels import steps
+
+    count = 2 + len(study.known_columns) + study.false_quantities
+    numbers: tuple[Any, ...] = trace.plain(steps.KNOWN, (0.0,) * count)
+    return numbers
+
+
+def moves_by_time(study: "StepStudy") -> bool:
+    """Whether `move` takes the time."""
+    return len(inspect.signature(study.move).parameters) > MOVE_PARAMETERS
+
+
+@cache
+def cached_kernel(make: Callable[..., Any], *programs: Any) -> Callable[..., None]:
+    """The kernel that a function of `radarsim.kernels.steps` makes of programs, cached."""
+    kernel: Callable[..., None] = make(*programs)
+    return kernel
+
+
+def unit_normal(trace: tracing.Trace, n: int) -> tracing.Lane:
+    """The unit normal n of a scan."""
+    from radarsim.kernels import steps
+
+    array = (steps.FIRST_NORMALS, steps.SECOND_NORMALS)[n % 2]
+    lane: tracing.Lane = trace.rows(array, 0.0, n // 2)
+    return lane
+
+
+def to_numbers(numbers: Any) -> np.ndarray:
+    """The numbers (n,) of a record and a zero, so that there is at least one."""
+    return np.array([*tracing.leaves(numbers), 0.0], dtype=float)
