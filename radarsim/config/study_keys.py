@@ -1,5 +1,6 @@
 """The keys of a study: its filters, baseline and length of a run."""
 
+import types
 import typing
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping
@@ -163,14 +164,26 @@ class Member(Model):
     name: Annotated[Name, DisplayMark()] = key("name", "label; every filter has its own")
 
 
+def part_models(part: Any) -> tuple[Any, ...]:
+    """The models of a part of a config: it alone, or those of a choice `A | B`."""
+    return get_args(part) if isinstance(part, types.UnionType) else (part,)
+
+
 def make_study_keys(
-    name: str, module: str, parts: Mapping[str, type[Model]], filters: type[Member], max_scans: int
+    name: str, module: str, parts: Mapping[str, Any], filters: type[Member], max_scans: int
 ) -> type[StudyKeys]:
-    """The keys of a study: these mappings by name, and `filters`, `baseline` and `scans`.
+    """The keys of a study: these mappings by name, each of one model or of several `A | B` that differ in their key
+    `kind`, and `filters`, `baseline` and `scans`.
 
     name, module: those of the class."""
-    descriptions = {name: (part.__doc__ or name).strip().partition("\n")[0].rstrip(".") for name, part in parts.items()}
-    fields: Any = {name: (part, key(name.replace("_", " "), descriptions[name])) for name, part in parts.items()}
+    fields: Any = {}
+    for part_name, part in parts.items():
+        models = part_models(part)
+        about = (
+            (models[0].__doc__ or part_name).strip().partition("\n")[0].rstrip(".") if len(models) == 1 else part_name
+        )
+        choice = part if len(models) == 1 else Annotated[part, Field(discriminator="kind")]
+        fields[part_name] = (choice, key(part_name.replace("_", " "), about))
     fields |= {
         "filters": (Members[filters], key("filters", "the filters; all see the same world")),  # type: ignore[valid-type]
         "baseline": (Baseline, BASELINE),

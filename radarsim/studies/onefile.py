@@ -1,4 +1,4 @@
-"""A study in one file: a class declares keys, filters and claims; the rest of a study follows from it.
+r"""A study in one file: a class declares keys, filters and claims; the rest of a study follows from it.
 
     class Walk(LinearStudy):  # or another base that computes
         name, about = "walk", "Random walk (textbook)."  # as of every study
@@ -16,7 +16,7 @@
 |---|---|
 | `asks` | the question, one sentence |
 | `components` | the errors that are shown, the leading one first |
-| `parts`, `Filter` | the keys: by name the model of each part, and of a filter, a subclass of `Member` |
+| `parts`, `Filter` | the keys: by name the model of each part, `A \| B` by its key `kind`; of a filter, a `Member` |
 | `scan_period` | the key of the time between two plots |
 | `measured` | the numbers of a recorded plot, where there is such |
 | `paper`, `claims_yaml` | whose claims are judged: a text as claims.yaml, and under `choices` as interpretations.yaml |
@@ -42,7 +42,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.config.model import Model
-from radarsim.config.study_keys import Member, make_study_keys
+from radarsim.config.study_keys import Member, make_study_keys, part_models
 from radarsim.errors import ConfigError
 from radarsim.language.translate import Term, join_names, shorten_names, term, tr
 from radarsim.report.quantities import COMMON, Component, Quantity
@@ -97,7 +97,7 @@ class OneFile(Study):
 
     asks: str
     components: tuple[Component, ...]
-    parts: Mapping[str, type[Model]]
+    parts: Mapping[str, Any]
     Filter: type[Member]
     scan_period: str
     measured: tuple[MeasuredColumn, ...] = ()
@@ -165,7 +165,8 @@ class OneFile(Study):
                 yield f"components: {component!r} must be Component(name, unit, symbol, words), with a unit"
         for name, part in (*cls.parts.items(), ("Filter", cls.Filter)):
             base = Member if name == "Filter" else Model
-            if not (isinstance(part, type) and issubclass(part, base)):
+            models = (part,) if name == "Filter" else part_models(part)
+            if not all(isinstance(model, type) and issubclass(model, base) for model in models):
                 yield f"{name} must be a subclass of {base.__module__}.{base.__name__}, got {part!r}"
         for number in cls.measured:
             if not isinstance(number, MeasuredColumn):
@@ -206,8 +207,11 @@ class OneFile(Study):
         part, _, subkey = key.partition(".")
         if part in ("filters", "scans", "baseline"):
             return True
-        model, first = cls.parts.get(part, Model) if subkey else cls.Filter, (subkey or part).partition(".")[0]
-        return first in model.model_fields or isinstance(getattr(model, first, None), property)
+        models, first = (
+            part_models(cls.parts.get(part, Model) if subkey else cls.Filter),
+            (subkey or part).split(".")[0],
+        )
+        return any(first in model.model_fields or isinstance(getattr(model, first, None), property) for model in models)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """The value of one of the study's functions; ConfigError with its place and the study's name if it fails."""

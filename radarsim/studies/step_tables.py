@@ -1,4 +1,4 @@
-"""The tables of a step study: the σ that filters predict beside the true one, whole states, tracks among false plots."""
+"""The tables of a step study: predicted σ beside the true one, whole states, tracks among false plots."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any

@@ -58,15 +58,7 @@ from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import OneFile
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
 from radarsim.studies.step_checks import DIFFERENT_FORMULA, record, to_array
-from radarsim.studies.step_programs import (
-    NO_COVARIANCE,
-    CompiledFilter,
-    Scene,
-    cached_kernel,
-    compile_filter,
-    to_numbers,
-    trace_scene,
-)
+from radarsim.studies.step_programs import CompiledFilter, Scene, cached_kernel, compile_filter, to_numbers, trace_scene
 from radarsim.studies.step_tracker import Tracker
 from radarsim.user_code.errors import study_context, user_code_error
 

@@ -1,0 +1,136 @@
+"""Steps of Kalman filters for floats, arrays and lanes: plots whose law is a formula, several plots, two models.
+
+A state is (x, P), its covariance packed row by row. A law of a plot is (mean, S, C): its mean, its packed covariance,
+and that with the state, a row for each number.
+
+BLK: Bar-Shalom, Li & Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001.
+JUD: Julier, Uhlmann & Durrant-Whyte, IEEE Trans. AC 45 (2000), 477: sigma points.
+BST: Bar-Shalom & Tse, Automatica 11 (1975), 451: probabilistic data association (PDA)."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from radarsim.kernels.formula_functions import exp, log
+from radarsim.kernels.small_matrices import add, cholesky, congruence, dot, invert, outer_square, row_of, times
+from radarsim.kernels.tracing import maximum, minimum, sqrt, where
+
+CENTRE = 1 / 3  # weight of the central sigma point
+LEAST_DENSITY = 1e-290  # of plots: in place of zero, where a filter expects no false plot and has none in its gate
+LEAST_PROBABILITY = 1e-9  # of a model
+
+State = tuple[Sequence[Any], Sequence[Any]]
+Law = tuple[Sequence[Any], Sequence[Any], Sequence[Sequence[Any]]]
+
+
+def linearised_law(P: Sequence[Any], mean: Sequence[Any], rows: Sequence[Sequence[Any]]) -> Law:
+    """The law of a plot by its derivatives, rows (m, n), at a state with the covariance P; BLK 10.3."""
+    C, m = tuple(times(P, row) for row in rows), len(rows)
+    return mean, tuple(dot(rows[j], C[k]) for k in range(m) for j in range(k, m)), C
+
+
+def unscented_law(
+    state: State, plot: Callable[[Sequence[Any]], Sequence[Any]], difference: Callable[[Any, Any], Sequence[Any]]
+) -> Law:
+    """The law of a plot by sigma points, JUD eq. 12. plot: its numbers of a state; difference: of two plots."""
+    (x, P), centre = state, plot(state[0])
+    n, L = len(x), cholesky(P, len(x))
+    scale, weight = math.sqrt(n / (1 - CENTRE)), (1 - CENTRE) / (2 * n)
+    columns = [tuple(scale * L[i][j] if i >= j else 0.0 for i in range(n)) for j in range(n)]
+    points = [tuple(sign * a for a in column) for column in columns for sign in (1.0, -1.0)]
+    apart = [difference(plot(tuple(a + b for a, b in zip(x, point, strict=True))), centre) for point in points]
+    m = len(centre)
+    mean = tuple(weight * sum(e[k] for e in apart) for k in range(m))
+    S = tuple(weight * sum(e[k] * e[j] for e in apart) - mean[k] * mean[j] for k in range(m) for j in range(k, m))
+    C = tuple(
+        tuple(weight * sum(p[i] * e[k] for p, e in zip(points, apart, strict=True)) for i in range(n)) for k in range(m)
+    )
+    return tuple(a + b for a, b in zip(centre, mean, strict=True)), S, C
+
+
+class Association(NamedTuple):
+    """What a filter makes of the plots of a scan.
+
+    e (m,): their innovation; weight: the probability that one of them is the target's; spread: packed, of its
+    innovation about e, or None; density: the logarithm of their density, times -2 but for a constant; has_plot: 1.0 if
+    the gate has one; is_wrong: 1.0 if the likeliest is not the first."""
+
+    e: Sequence[Any]
+    weight: Any
+    spread: Sequence[Any] | None
+    density: Any
+    has_plot: Any
+    is_wrong: Any
+
+
+def take_plot(e: Sequence[Any], S: Sequence[Any]) -> Association:
+    """The association of the only plot, with an innovation e of the packed covariance S."""
+    S_inverse, determinant = invert(S, len(e))
+    return Association(e, 1.0, None, dot(e, times(S_inverse, e)) + log(determinant), 1.0, 0.0)
+
+
+def associate(
+    plots: Sequence[tuple[Any, Sequence[Any]]], S: Sequence[Any], rule: str, gate: Any, false_to_missed: Any
+) -> Association:
+    """The association of plots, each whether it is there (1.0) and its innovation (m,), of packed covariance S.
+
+    rule: `known`, the first is the target's; `nearest` in the gate; `pda`, all of the gate by their probabilities, BST
+    eq. 3.4 to 3.11. gate: χ² of its bound. false_to_missed: density of false plots times 1 - P_D P_G over P_D."""
+    m = 3 if len(S) == 6 else 2
+    S_inverse, determinant = invert(S, m)
+    nothing = 0.0 if rule == "known" else false_to_missed * math.tau ** (m / 2) * sqrt(determinant)
+    total, best, first, e, second = nothing, 0.0, 0.0, (0.0,) * m, (0.0,) * len(S)
+    for number, (there, d) in enumerate(plots[:1] if rule == "known" else plots):
+        square = dot(d, times(S_inverse, d))
+        likelihood = where((there > 0.5) & (rule == "known" or square < gate), exp(-maximum(square, 0.0) / 2), 0.0)
+        if rule == "pda":
+            e = tuple(a + likelihood * b for a, b in zip(e, d, strict=True))
+            second = tuple(a + likelihood * b for a, b in zip(second, outer_square(d), strict=True))
+        else:
+            e = tuple(where(likelihood > best, b, a) for a, b in zip(e, d, strict=True))
+        total, best, first = total + likelihood, maximum(best, likelihood), first if number else likelihood
+    has_plot, is_wrong = where(best > 0.0, 1.0, 0.0), where(best > first, 1.0, 0.0)
+    if rule == "pda":
+        some, total = total - nothing, maximum(total, LEAST_DENSITY)
+        e = tuple(a / total for a in e)
+        spread = tuple(a / total - b for a, b in zip(second, outer_square(e), strict=True))
+        return Association(e, some / total, spread, log(determinant) - 2 * log(total), has_plot, is_wrong)
+    density = log(determinant) - 2 * log(maximum(best + nothing, LEAST_DENSITY))
+    if rule == "known":  # that it is missed says nothing of the model
+        density = where(best > 0.0, density, 0.0)
+    return Association(e, has_plot, None, density, has_plot, is_wrong)
+
+
+def take(state: State, law: Law, association: Association) -> State:
+    """A state after plots of a law, whose covariance includes that of their errors; BST eq. 3.13 to 3.16."""
+    (x, P), (_, S, C) = state, law
+    n, m = len(x), len(C)
+    S_inverse, columns = invert(S, m)[0], tuple(tuple(C[k][i] for k in range(m)) for i in range(n))
+    K = tuple(times(S_inverse, column) for column in columns)
+    after = tuple(
+        row_of(P, n, i)[j] - association.weight * dot(K[i], columns[j]) for i in range(n) for j in range(i, n)
+    )
+    if association.spread is not None:
+        after = add(after, congruence(K, association.spread))
+    return tuple(a + dot(k, association.e) for a, k in zip(x, K, strict=True)), after
+
+
+def mix(first: State, second: State, p: Any) -> State:
+    """The mean and covariance of two states with the probabilities p and 1 - p; BLK 11.6.6."""
+    (a, P), (b, Q) = first, second
+    d, q = tuple(i - j for i, j in zip(a, b, strict=True)), 1 - p
+    x = tuple(p * i + q * j for i, j in zip(a, b, strict=True))
+    return x, tuple(p * i + q * j + p * q * k for i, j, k in zip(P, Q, outer_square(d), strict=True))
+
+
+def share_states(first: State, second: State, p: Any, stay: Any) -> tuple[State, State, Any]:
+    """The states with which two models go on that change with the probability 1 - stay, and that of the first."""
+    own = stay * p + (1 - stay) * (1 - p)
+    return mix(first, second, stay * p / own), mix(first, second, (1 - stay) * p / (1 - own)), own
+
+
+def probability_after(p: Any, one: Association, other: Association) -> Any:
+    """The probability of the first of two models after a scan."""
+    least = minimum(one.density, other.density)
+    a, b = p * exp((least - one.density) / 2), (1 - p) * exp((least - other.density) / 2)
+    return minimum(maximum(a / (a + b), LEAST_PROBABILITY), 1 - LEAST_PROBABILITY)
