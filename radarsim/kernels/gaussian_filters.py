@@ -63,10 +63,15 @@ class Association(NamedTuple):
     is_wrong: Any
 
 
+def certain(e: Sequence[Any]) -> Association:
+    """The association of a plot that is the target's, with an innovation e."""
+    return Association(e, 1.0, None, 0.0, 1.0, 0.0)
+
+
 def take_plot(e: Sequence[Any], S: Sequence[Any]) -> Association:
     """The association of the only plot, with an innovation e of the packed covariance S."""
     S_inverse, determinant = invert(S, len(e))
-    return Association(e, 1.0, None, dot(e, times(S_inverse, e)) + log(determinant), 1.0, 0.0)
+    return certain(e)._replace(density=dot(e, times(S_inverse, e)) + log(determinant))
 
 
 def associate(

@@ -2,19 +2,15 @@
 
 Letters: x north, y east, m; a bearing b and a course from north to the east, rad; r range, v radial velocity outwards.
 n: numbers of a state; m: numbers of a plot that a filter uses, 2 or 3. A covariance P is packed row by row.
-
-LXYKB: Longbin, Xiaoquan, Yiyu, Kang & Bar-Shalom, IEEE Trans. AES 34 (1998), 1074: unbiased converted measurements.
 """
 
-import functools
 import math
 from collections import namedtuple
 from types import MappingProxyType
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
-from scipy.special import chdtri, pdtrik
+from scipy.special import chdtri
 
 from radarsim.config import radial_keys
 from radarsim.config.cross_checks import check_error, cross_check
@@ -22,24 +18,31 @@ from radarsim.config.key_types import Correlation, Flag, NonNegative, Number, Po
 from radarsim.config.model import Model
 from radarsim.config.study_keys import Member
 from radarsim.constants import STANDARD_GRAVITY_MPS2
-from radarsim.errors import ConfigError
 from radarsim.kernels import gaussian_filters
-from radarsim.kernels.formula_functions import atan2, cos, exp, sin, uniform_pairs, wrap_angle
-from radarsim.kernels.gaussian_filters import Association
-from radarsim.kernels.planar_motion import SIZES, predict
-from radarsim.kernels.small_matrices import add, congruence, dot, row_of, times, update
+from radarsim.kernels.formula_functions import atan2, cos, sin, uniform_pairs, wrap_angle
+from radarsim.kernels.planar_motion import predict
+from radarsim.kernels.polar_plots import (
+    converted,
+    errors_covariance,
+    fold,
+    law_of_position,
+    polar,
+    polar_rows,
+    speed_and_course_rows,
+    state_of_plot,
+)
+from radarsim.kernels.small_matrices import add, congruence, dot, times, update
 from radarsim.kernels.tracing import maximum, minimum, sqrt, where
 from radarsim.report.quantities import Component
 from radarsim.studies.onefile import MeasuredColumn
-from radarsim.studies.stepwise import Steps, StepStudy
+from radarsim.studies.step_clutter import ClutteredStudy
+from radarsim.studies.stepwise import Steps
 
 RESOLVED = (
     6  # standard deviations of a predicted velocity in the unambiguous interval: with fewer its fold is not known
 )
 UNFOLDED_MPS = 2 * radial_keys.MAX_SPEED_MPS  # the interval where none is stated
 LOST = 10  # standard deviations of a plot: a track that errs by more is lost
-MARGIN = 2.0  # widths of the window in which false plots are drawn, in those of the widest gate
-MAX_PLACES, MAX_CUT = 60, 1e-6  # for false plots of a scan; the probability of more than are drawn
 MIDDLE = math.sqrt(2 * math.log(2)), 0.0  # normals of a course in the middle of its spread
 
 
@@ -193,32 +196,13 @@ def design(spec, keys):
         *c[:4], c.density > 0, m, keys, keys.model, keys.kind,
         (noise, keys.sigma_turn_rate_radps or 0.0), keys.quiet_sigma_acceleration_mps2 or 0.0, stay,
         keys.doppler and c.span >= RESOLVED * keys.sigma_start_velocity_mps,
-        (keys.sigma_start_velocity_mps, *start.get(keys.model, ())),
+        (keys.sigma_start_velocity_mps, start.get(keys.model, ())),
         float(chdtri(m, 1 - keys.gate_probability)), missed, radar.false_plots_from_s / radar.scan_period_s,
     )  # fmt: skip
 
 
-def fold(v, span):
-    """A velocity folded into the unambiguous interval about zero."""
-    return wrap_angle(v * (math.tau / span)) * (span / math.tau)
-
-
-def polar(x):
-    """Range, bearing and radial velocity of a state."""
-    r = sqrt(x[0] * x[0] + x[1] * x[1])
-    return r, atan2(x[1], x[0]), (x[0] * x[2] + x[1] * x[3]) / r
-
-
-def polar_rows(x):
-    """Their derivatives, rows (3, n)."""
-    r, _, v = polar(x)
-    north, east, rest = x[0] / r, x[1] / r, (0.0,) * (len(x) - 4)
-    along = (x[2] - v * north) / r, (x[3] - v * east) / r
-    return (north, east, 0.0, 0.0, *rest), (-east / r, north / r, 0.0, 0.0, *rest), (*along, north, east, *rest)
-
-
 def apart(z, mean, c):
-    """A plot, or the expected plot of a state, less another: the numbers that the filter uses."""
+    """A plot less another, or less the expected one: the numbers that the filter uses."""
     position = z[0] - mean[0], wrap_angle(z[1] - mean[1])
     return (*position, fold(z[2] - mean[2], c.span)) if c.m == 3 else position
 
@@ -226,89 +210,51 @@ def apart(z, mean, c):
 def law_of_plot(state, c):
     """The law of a plot under a state, with nothing of the velocity where its fold is not known."""
     if c.kind == "unscented":
-        law = gaussian_filters.unscented_law(state, lambda x: polar(x)[: c.m], lambda a, b: apart(a, b, c))
+        mean, S, C = gaussian_filters.unscented_law(state, lambda x: polar(x)[: c.m], lambda a, b: apart(a, b, c))
     else:
-        law = gaussian_filters.linearised_law(state[1], polar(state[0])[: c.m], polar_rows(state[0])[: c.m])
-    (mean, S, C), (r, b, v) = law, c.sigma
+        mean, S, C = gaussian_filters.linearised_law(state[1], polar(state[0])[: c.m], polar_rows(state[0])[: c.m])
+    R = errors_covariance(c.sigma, c.rho)
     if c.m == 2:
-        return mean, add(S, (r * r, 0.0, b * b)), C
-    S = add(S, (r * r, 0.0, c.rho * r * v, b * b, 0.0, v * v))
+        return mean, add(S, (R[0], R[1], R[3])), C
+    S = add(S, R)
     known = S[5] * RESOLVED**2 < c.span * c.span
     with_r, with_b, *with_state = where(known, (S[2], S[4], *C[2]), (0.0,) * (2 + len(C[2])))
     return mean, (S[0], S[1], with_r, S[3], with_b, S[5]), (C[0], C[1], tuple(with_state))
 
 
-def associated(law, z, density, c):
-    """The association of a plot, or among false plots, of a density per m², of the places for plots."""
-    mean, S, _ = law
-    if not c.in_clutter:
-        return gaussian_filters.take_plot(apart(z, mean, c), S)
-    false = c.missed * density * mean[0] / (c.span if c.m == 3 else 1.0)  # per m, rad and m/s
-    plots = [(there, apart(plot, mean, c)) for there, plot in z]
-    return gaussian_filters.associate(plots, S, c.keys.association, c.gate, false)
-
-
 def taken(state, z, density, c):
-    """A state after the plots of a scan, and their association."""
-    law = law_of_plot(state, c)
-    association = associated(law, z, density, c)
+    """A state after the plots of a scan, and their association. z: the plot, or among false plots, of a density per m²,
+    the places for plots."""
+    mean, S, _ = law = law_of_plot(state, c)
+    if c.in_clutter:
+        false_to_missed = c.missed * density * mean[0] / (c.span if c.m == 3 else 1.0)  # per m, rad and m/s
+        plots = [(there, apart(plot, mean, c)) for there, plot in z]
+        association = gaussian_filters.associate(plots, S, c.keys.association, c.gate, false_to_missed)
+    else:
+        association = gaussian_filters.take_plot(apart(z, mean, c), S)
     if c.kind != "converted":
         return gaussian_filters.take(state, law, association), association
     if c.in_clutter:
-        z = tuple(a + b for a, b in zip(law[0], association.e, strict=True))
+        z = tuple(a + b for a, b in zip(mean, association.e, strict=True))
     return where(association.has_plot > 0.5, taken_converted(state, z, c), state), association
 
 
 def taken_converted(state, z, c):
     """A state after a plot that is converted to x and y, then after its radial velocity."""
-    (x, P), n, (_, b, v) = state, len(state[0]), c.sigma
-    position, R = converted(z, c)
-    rows = row_of(P, n, 0), row_of(P, n, 1)
-    law = position, add((rows[0][0], rows[0][1], rows[1][1]), R), rows
-    e = position[0] - x[0], position[1] - x[1]
-    x, P = gaussian_filters.take(state, law, Association(e, 1.0, None, 0.0, 1.0, 0.0))
+    position, R = converted(z, c.sigma, c.keys.unbiased)
+    e = position[0] - state[0][0], position[1] - state[0][1]
+    x, P = gaussian_filters.take(state, law_of_position(state, position, R), gaussian_filters.certain(e))
     if c.m == 2:
         return x, P
+    v = c.sigma[2]
     if c.keys.doppler_update == "linear":
-        h = 0.0, 0.0, cos(z[1]), sin(z[1]), *(0.0,) * (n - 4)
+        h = 0.0, 0.0, cos(z[1]), sin(z[1]), *(0.0,) * (len(x) - 4)
         across = x[3] * h[2] - x[2] * h[3]
-        e, variance = z[2] - dot(h, x), v * v + across * across * b * b
+        e, variance = z[2] - dot(h, x), v * v + (across * c.sigma[1]) ** 2
     else:
-        h = polar_rows(x)[2]
-        e, variance = z[2] - polar(x)[2], v * v
+        h, e, variance = polar_rows(x)[2], z[2] - polar(x)[2], v * v
     known = (dot(h, times(P, h)) + variance) * RESOLVED**2 < c.span * c.span
     return where(known, update(x, P, h, fold(e, c.span), variance), (x, P))
-
-
-def converted(z, c):
-    """Position and packed covariance of a plot: LXYKB eq. 10, 11 if unbiased, else linearised at the plot."""
-    s, o, (r, b, _) = sin(z[1]), cos(z[1]), c.sigma
-    if not c.keys.unbiased:
-        along, across = r * r, (z[0] * b) ** 2
-        R = along * o * o + across * s * s, (along - across) * s * o, along * s * s + across * o * o
-        return (z[0] * o, z[0] * s), R
-    shrink, twice = exp(-b * b / 2), exp(-2 * b * b)
-    square, both = z[0] * z[0] * (1 / (shrink * shrink) - 2), (z[0] * z[0] + r * r) / 2
-    varying = both * twice * (o * o - s * s)
-    R = square * o * o + both + varying, (square + 2 * both * twice) * s * o, square * s * s + both - varying
-    return (z[0] * o / shrink, z[0] * s / shrink), R
-
-
-def begun(z, c):
-    """The state after the first plot: what it does not tell, with the standard deviations of the config."""
-    s, o, (r, b, v), n = sin(z[1]), cos(z[1]), c.sigma, SIZES[c.model]
-    radial, first = (v, z[2]) if c.first else (c.start[0], 0.0)
-    along, across = (r * r, radial * radial), ((z[0] * b) ** 2, c.start[0] ** 2)
-    with_range = c.rho * r * v if c.first else 0.0
-    P = [[0.0] * n for _ in range(n)]
-    for i, (a, d) in enumerate(zip(along, across, strict=True)):
-        P[2 * i][2 * i], P[2 * i + 1][2 * i + 1] = a * o * o + d * s * s, a * s * s + d * o * o
-        P[2 * i][2 * i + 1] = (a - d) * s * o
-    P[0][2], P[1][3], P[0][3], P[1][2] = (with_range * a for a in (o * o, s * s, s * o, s * o))
-    for i, sigma in enumerate(c.start[1:], 4):
-        P[i][i] = sigma * sigma
-    packed = tuple(P[i][j] for i in range(n) for j in range(i, n))
-    return (z[0] * o, z[0] * s, first * o, first * s, *(0.0,) * (n - 4)), packed
 
 
 class Tracking(Steps):
@@ -319,7 +265,8 @@ class Tracking(Steps):
     design = design
 
     def start(z, u, c):
-        state, seen = begun(z, c), (1.0, *(0.0,) * (c.keys.confirming_scans - 2))
+        velocity, sigma, rho = (z[2], c.sigma, c.rho) if c.first else (0.0, (*c.sigma[:2], c.start[0]), 0.0)
+        state, seen = state_of_plot(z, velocity, sigma, rho, *c.start), (1.0, *(0.0,) * (c.keys.confirming_scans - 2))
         history = (0.0, 0.0, seen, 1.0) if c.in_clutter else ()
         return ((state, state, 0.5) if c.kind == "imm" else state), history
 
@@ -352,11 +299,12 @@ class Tracking(Steps):
 
     def covariance(s, u, c):
         x, P = moments(s, c)
-        vx, vy, rest = where(x[2] == 0.0, 1.0, x[2]), x[3], (0.0,) * (len(x) - 4)  # at first it may stand still
-        speed = sqrt(vx * vx + vy * vy)
-        north, east = vx / speed, vy / speed
-        rows = (0.0, 0.0, north, east, *rest), (0.0, 0.0, -east / speed, north / speed, *rest)
-        return congruence((*polar_rows(x)[:2], *rows), P)
+        moving = (*x[:2], where(x[2] == 0.0, 1.0, x[2]), *x[3:])  # before the second plot it may stand still
+        return congruence((*polar_rows(x)[:2], *speed_and_course_rows(moving)), P)
+
+    def gate(s, u, c):
+        S = law_of_plot(moments(s, c), c)[1]
+        return math.sqrt(c.gate * S[0]), math.sqrt(c.gate * S[3 if c.m == 3 else 2])
 
     def counts(s, u, c):
         return s[1][:2]
@@ -367,7 +315,7 @@ def moments(s, c):
     return gaussian_filters.mix(*s[0]) if c.kind == "imm" else s[0]
 
 
-class Plane(StepStudy):
+class Plane(ClutteredStudy):
     """A target in the plane."""
 
     name, about = "plane", "Range, bearing and radial velocity in the plane, among false plots."
@@ -390,7 +338,7 @@ class Plane(StepStudy):
     )
     kinds = dict.fromkeys(("extended", "unscented", "converted", "imm"), Tracking)
     normals, world = (2, 0, 3), staticmethod(world)
-    false_quantities, counted = 2, ("confirmed", "wrong_plot")
+    window, middle, counted = ("range_m", "bearing_rad"), MIDDLE, ("confirmed", "wrong_plot")
 
     def detection(self, spec):
         return spec.radar.detection_probability
@@ -426,58 +374,16 @@ class Plane(StepStudy):
         r, b, v, course = (a - b for a, b in zip(estimate, true, strict=True))
         return r, wrap_angle(b), v, wrap_angle(course)
 
-    def known_quantities(self, spec, t_s):
-        return self.windows(spec) if spec.radar.false_plots_per_km2 else np.zeros((2, t_s.size))
+    def false_plots_from_s(self, spec):
+        return spec.radar.false_plots_from_s if spec.radar.false_plots_per_km2 else None
 
-    def false_normals(self, spec):
-        if not spec.radar.false_plots_per_km2:
-            return 0
-        along, across = self.windows(spec)
-        r = np.array([polar(x)[0] for x in self.nominal_flight(spec)])
-        places = int(np.ceil(pdtrik(1 - MAX_CUT, (4e-6 * spec.radar.false_plots_per_km2 * r * along * across).max())))
-        if places > MAX_PLACES:
-            raise ConfigError(
-                f"radar.false_plots_per_km2: a scan may have {places} false plots about the widest gate, at most "
-                f"{MAX_PLACES} are drawn: give a smaller density, or a later radar.false_plots_from_s"
-            )
-        return 2 * -(-(1 + 3 * places) // 2)
+    def expected(self, x, halves, c):
+        return 4 * c.density * polar((*x[:2], 0.0, 0.0))[0] * halves[0] * halves[1]
 
-    def nominal_flight(self, spec):
-        """The states (x, y, vx, vy) of the target at each scan, its course in the middle of its spread."""
-        c, dt = world(spec), spec.radar.scan_period_s
-        states = [self.begin(c, MIDDLE)]
-        for k in range(1, spec.scans):
-            states.append(self.move(states[-1], dt, c, (), k * dt))
-        return [(x[0], x[1], c.speed * math.cos(x[2]), c.speed * math.sin(x[2])) for x in states]
-
-    @functools.lru_cache(maxsize=16)  # noqa: B019  there is one object of the class
-    def windows(self, spec):
-        """Half the widths (2, K) in range, m, and bearing, rad, of the window about the target in which false plots are
-        drawn: MARGIN times those of the widest gate of any filter whose estimates are true."""
-        variances, dt = np.zeros((2, spec.scans)), spec.radar.scan_period_s
-        for keys in spec.filters:
-            c, s = design(spec, keys.model_copy(update={"association": "known"})), None
-            for k, x in enumerate(self.nominal_flight(spec)):
-                s = Tracking.start(polar(x), (), c) if s is None else Tracking.predict(s, dt, (), c)
-                if k > 0:
-                    S = law_of_plot(moments(s, c), c)[1]
-                    variances[:, k] = np.maximum(variances[:, k], [S[0], S[3] if c.m == 3 else S[2]])
-                    s = Tracking.update(s, ((1.0, polar(x)),), (), c)
-        variances[:, dt * np.arange(spec.scans) < spec.radar.false_plots_from_s] = 0.0
-        return MARGIN * np.sqrt(max(design(spec, keys).gate for keys in spec.filters) * variances)
-
-    def false_plots(self, x, u, c, w):
-        (along, across), (r, b, _) = u, polar((x[0], x[1], 0.0, 0.0))
-        number, *rest = uniform_pairs(w)
-        expected = 4 * c.density * r * along * across
-        term = below = exp(-expected)
-        places = []
-        for place, (q, turn, v) in enumerate(zip(rest[::3], rest[1::3], rest[2::3], strict=False)):
-            position = sqrt((r - along) ** 2 + q * 4 * r * along), wrap_angle(b + across * (2 * turn - 1))
-            places.append((where(number > below, 1.0, 0.0), (*position, c.span * (v - 0.5))))
-            term = term * expected / (place + 1)
-            below = below + term
-        return tuple(places)
+    def false_plot(self, x, halves, even, c):
+        r, b, _ = polar((*x[:2], 0.0, 0.0))
+        square = (r - halves[0]) ** 2 + 4 * r * halves[0] * even[0]  # even in area
+        return sqrt(square), wrap_angle(b + halves[1] * (2 * even[1] - 1)), c.span * (even[2] - 0.5)
 
     def kept(self, e, u, c):
         return (u[0] <= 0.0) | ((abs(e[0]) < LOST * c.sigma[0]) & (abs(e[1]) < LOST * c.sigma[1]))

@@ -1,0 +1,148 @@
+"""A step study among false plots.
+
+False plots are drawn in a window about the target's plot: wide enough for the gates of all filters that follow it, so
+that their tracks see the plots that they would see of a field without bounds.
+
+    class Plane(ClutteredStudy):                    # besides what `radarsim.studies.stepwise` needs
+        window = ("range_m", "bearing_rad")         # the measured numbers in which the window has bounds
+        middle = (…)                                # the normals of the first state of a typical flight
+
+        def false_plots_from_s(self, spec): …       # from which time on there are false plots, s; None: never
+        def expected(self, x, halves, c): …         # their mean number in a window of half the widths `halves` about x
+        def false_plot(self, x, halves, even, c): … # one, of numbers `even` from 0 to 1, as many as are measured
+
+    class Tracking(Steps):
+        def gate(s, u, c): …                        # half the widths of the gate of a state before a plot
+
+In the first state of its track a filter is given the target's plot."""
+
+import functools
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from radarsim.errors import ConfigError
+from radarsim.kernels.formula_functions import exp, uniform_pairs
+from radarsim.kernels.tracing import where
+from radarsim.language.translate import join_names, tr
+from radarsim.studies.step_checks import record
+from radarsim.studies.stepwise import StepStudy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    import pandas as pd
+
+    from radarsim.engine.results import CaseResult
+    from radarsim.report.sentences import Sentence
+
+MARGIN = 2.0  # widths of the window in those of the widest gate
+MAX_PLACES, CUT = 60, 1e-6  # places for false plots of a scan; the probability of more
+
+
+class ClutteredStudy(StepStudy):
+    """A step study among false plots; the module's docstring lists what a subclass gives."""
+
+    window: tuple[str, ...]
+    middle: tuple[float, ...]
+
+    def false_plots_from_s(self, spec: Any) -> float | None:
+        """From which time on there are false plots, s. Default: None, there are none."""
+        return None
+
+    def expected(self, x: Any, halves: Sequence[Any], c: Any) -> Any:
+        """The mean number of false plots in a window of half the widths `halves` about a true state."""
+        raise NotImplementedError
+
+    def false_plot(self, x: Any, halves: Sequence[Any], even: Sequence[Any], c: Any) -> tuple[Any, ...]:
+        """A false plot of that window, of independent numbers from 0 to 1, as many as are measured."""
+        raise NotImplementedError
+
+    @property
+    def false_quantities(self) -> int:  # type: ignore[override]
+        return len(self.window)
+
+    def known_quantities(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
+        return [np.zeros(t_s.size) for _ in self.window] if self.false_plots_from_s(spec) is None else self.halves(spec)
+
+    def false_normals(self, spec: Any) -> int:
+        if self.false_plots_from_s(spec) is None:
+            return 0
+        return 2 * math.ceil((1 + len(self.measured) * self._places(spec)) / 2)
+
+    def _places(self, spec: Any) -> int:
+        """How many places a scan has for false plots."""
+        from scipy.special import pdtrik
+
+        c = record(self.world, spec)
+        flight, halves = self.typical_flight(spec), np.transpose(self.halves(spec))
+        expected = max(float(self.expected(x, half, c)) for x, half in zip(flight, halves, strict=True))
+        places = max(1, math.ceil(pdtrik(1 - CUT, expected)))
+        if places > MAX_PLACES:
+            raise ConfigError(
+                f"study {self.name}: up to {places} false plots in and about the widest gate, at most {MAX_PLACES} "
+                "are drawn: give a smaller density, or let them begin when tracks are accurate"
+            )
+        return places
+
+    def typical_flight(self, spec: Any) -> list[Any]:
+        """The true states of the scans without noise."""
+        from radarsim.studies.step_programs import moves_by_time
+
+        c, dt, no_noise = record(self.world, spec), self.scan_period_s(spec), (0.0,) * self.normals[1]
+        states = [self.begin(c, self.middle)]
+        for k in range(1, spec.scans):
+            times = (k * dt,) if moves_by_time(self) else ()
+            states.append(self.move(states[-1], dt, c, no_noise, *times))
+        return states
+
+    @functools.lru_cache(maxsize=16)  # noqa: B019  there is one object of the class
+    def halves(self, spec: Any) -> np.ndarray:
+        """Half the widths (W, K) of the window, zero while there are no false plots."""
+        halves, dt, c = np.zeros((len(self.window), spec.scans)), self.scan_period_s(spec), record(self.world, spec)
+        u, no_noise = (), (0.0,) * self.normals[2]
+        for keys in spec.filters:
+            steps, numbers = self.kinds[keys.kind], record(self.kinds[keys.kind].design, spec, keys)
+            flight = [self.plot(x, u, c, no_noise) for x in self.typical_flight(spec)]
+            s = steps.start(flight[0], u, numbers)
+            for k, z in enumerate(flight[1:], 1):
+                s = steps.predict(s, dt, u, numbers)
+                halves[:, k] = np.maximum(halves[:, k], MARGIN * np.array(steps.gate(s, u, numbers)))
+                s = steps.update(s, ((1.0, z),), u, numbers)
+        halves[:, dt * np.arange(spec.scans) < self.false_plots_from_s(spec)] = 0.0
+        return halves
+
+    def false_plots(self, x: Any, u: Any, c: Any, w: Sequence[Any]) -> tuple[Any, ...]:
+        (number, *even), measured = uniform_pairs(w), len(self.measured)
+        expected = self.expected(x, u, c)
+        probability = at_most = exp(-expected)
+        places = []
+        for place in range(len(even) // measured):
+            plot = self.false_plot(x, u, even[place * measured : (place + 1) * measured], c)
+            places.append((where(number > at_most, 1.0, 0.0), plot))
+            probability = probability * expected / (place + 1)
+            at_most = at_most + probability
+        return tuple(places)
+
+    def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
+        """How many tracks are kept, then σ and gain of these."""
+        from radarsim.report import case_selection, sentences, tables, wording
+
+        if "tracks" in tables_by_name:
+            rows = tables.select_rows(tables_by_name["tracks"], case=result.name)
+            rows = rows[rows["k"] == rows["k"].max()] if len(rows) else rows
+            texts = [
+                f"{row['filter']} {wording.share(row['kept_share'], row['kept_share_lo'], row['kept_share_hi'])}"
+                for _, row in rows.iterrows()
+            ]
+            if texts:
+                text = tr(
+                    "Tracks kept for {t:g} s: {filters}; σ is of these.",
+                    t=float(result.axes.t_s[-1]),
+                    filters=join_names(texts),
+                )
+                intervals = sentences.intervals("tracks", "kept_share", rows)
+                yield sentences.Sentence(case_selection.after_swept_values(result, text), intervals)
+        yield from super()._sentences(result, tables_by_name)
