@@ -6,9 +6,11 @@ n: numbers of a state; m: numbers of a plot that a filter uses, 2 or 3. A covari
 
 import math
 from collections import namedtuple
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 from scipy.special import chdtri
 
@@ -44,6 +46,9 @@ RESOLVED = (
 UNFOLDED_MPS = 2 * radial_keys.MAX_SPEED_MPS  # the interval where none is stated
 LOST = 10  # standard deviations of a plot: a track that errs by more is lost
 MIDDLE = math.sqrt(2 * math.log(2)), 0.0  # normals of a course in the middle of its spread
+
+
+ACROSS = Component("across", "m", "$\\perp$", "position across the line of sight")
 
 
 class Radar(radial_keys.Radar):
@@ -329,6 +334,7 @@ class Plane(ClutteredStudy):
         Component("v", "m/s", "$v$", "speed"),
         Component("course", "rad", "$\\psi$", "course"),
     )
+    extra_figures = (*ClutteredStudy.extra_figures, "sigma_across")
     parts, Filter = {"radar": Radar, "target": Straight | Turn | FlyBy}, Filter
     scan_period = "radar.scan_period_s"
     measured = (
@@ -345,6 +351,56 @@ class Plane(ClutteredStudy):
 
     def columns(self, spec, filter_keys):
         return super().columns(spec, filter_keys)[: 3 if filter_keys.doppler else 2]
+
+    def floor(self, spec, axes):
+        """As `Study.floor`, of straight flights on one course; among false plots the bound with known origins."""
+        from radarsim.studies.floors.bound import CRB, Floor
+        from radarsim.studies.floors.straight_flight import straight_flight_bound
+
+        c = world(spec)
+        if c.turns or c.spread or not c.speed:
+            return None
+        flight = [(*x[:2], c.speed * math.cos(x[2]), c.speed * math.sin(x[2])) for x in self.typical_flight(spec)]
+        bounds = {
+            m: straight_flight_bound(axes.t_s, flight, c.sigma, c.rho, m, spec.radar.detection_probability)
+            for m in (2, 3)
+        }
+        return Floor(CRB, tuple(bounds[3 if keys.doppler else 2] for keys in spec.filters), bounds[3])
+
+    def tables(self, results):
+        from radarsim.report import tables
+
+        position = tables.join_columns(map(self._position, results))
+        return {**super().tables(results), "position": position}
+
+    def _position(self, result):
+        """The rms error of position at a scan along the line of sight and across it: that of the bearing times the
+        range of the flight in the middle of its spread, `range_m`."""
+        from radarsim.report import statistics, tables
+
+        f, k, c = np.nonzero(result.axes.available[:, :, :2])
+        r = np.array([polar((*x[:2], 0.0, 0.0))[0] for x in self.typical_flight(result.spec)])[k]
+        n = tables.realisation_counts(result)[f, k, c]
+        sigma = statistics.errors(np.asarray(result.sums["error"])[f, k, c], n).sigma
+        factor = np.where(c == 1, r, 1.0)
+        return {
+            **tables.label_columns(result, f, k, component=np.array(["along", "across"], dtype=object)[c]),
+            "n": n.astype(int),
+            "range_m": r,
+            **tables.interval_columns("sigma_m", statistics.Estimate(*(factor * end for end in sigma))),
+        }
+
+    def figures(self, results, tables_by_name, experiment):
+        from radarsim.report import case_selection, tables, time_figures
+
+        figures = super().figures(results, tables_by_name, experiment)
+        columns = {"sigma_m": "sigma", "sigma_m_lo": "sigma_lo", "sigma_m_hi": "sigma_hi"}
+        rows = tables_by_name["position"].rename(columns=columns).assign(exact_sigma=np.nan)
+        groups = tables.group_by(rows, "case", "filter", "component")
+        names = case_selection.cases_for_figure(experiment, "sigma_across")
+        visible, remark = case_selection.select_cases_by_panel(results, names)
+        across = time_figures.sigma_figure("sigma_across", visible, groups, ACROSS)
+        return {**figures, "sigma_across": replace(across, caption=across.caption + remark)}
 
     def begin(self, c, w):
         even, _ = uniform_pairs(w)
