@@ -35,7 +35,9 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from radarsim.config.experiment import Experiment
     from radarsim.engine.results import CaseResult
+    from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
 
 MARGIN = 2.0  # widths of the window in those of the widest gate
@@ -126,6 +128,32 @@ class ClutteredStudy(StepStudy):
             at_most = at_most + probability
         return tuple(places)
 
+    def figures(
+        self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"
+    ) -> "dict[str, Figure]":
+        from radarsim.report import case_selection, figure_lines, panel_layout
+        from radarsim.report import tables as common
+        from radarsim.report.drawing.model import Axis, Figure, Panel
+
+        figures = super().figures(results, tables, experiment)
+        if "tracks" not in tables:
+            return figures
+        names = case_selection.cases_for_figure(experiment, "tracks")
+        visible, remark = case_selection.select_cases_by_panel(results, names)
+        rows = common.group_by(tables["tracks"].assign(component=""), "case", "filter", "component")
+        filters, panels = figure_lines.all_filters(visible), []
+        for title, members in case_selection.group_by_panel(visible).items():
+            columns = "t_s", "kept_share", "kept_share_lo", "kept_share_hi"
+            marks = tuple(figure_lines.case_lines(members, rows, "", columns, filters))
+            panel = Panel(panel_layout.time_axis(), Axis(tr("share of tracks kept")), marks, title)
+            panels.append(panel_layout.with_keys(panel, members, filters))
+        caption = tr(
+            "Share of tracks that are still the target's, of {realisations}. Bands: 95 % intervals.",
+            realisations=case_selection.realisations_text(visible),
+        )
+        figure = Figure("tracks", tr("Tracks kept among false plots"), caption + remark, tuple(panels))
+        return {**figures, "tracks": panel_layout.arrange_columns(figure)}
+
     def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """How many tracks are kept, then σ and gain of these."""
         from radarsim.report import case_selection, sentences, tables, wording
@@ -133,8 +161,9 @@ class ClutteredStudy(StepStudy):
         if "tracks" in tables_by_name:
             rows = tables.select_rows(tables_by_name["tracks"], case=result.name)
             rows = rows[rows["k"] == rows["k"].max()] if len(rows) else rows
+            ends = ("kept_share", "kept_share_lo", "kept_share_hi")
             texts = [
-                f"{row['filter']} {wording.share(row['kept_share'], row['kept_share_lo'], row['kept_share_hi'])}"
+                f"{row['filter']} {wording.share(*(100 * float(row[end]) for end in ends))}"
                 for _, row in rows.iterrows()
             ]
             if texts:

@@ -8,15 +8,14 @@ import math
 from collections import namedtuple
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field
 from scipy.special import chdtri
 
 from radarsim.config import radial_keys
 from radarsim.config.cross_checks import check_error, cross_check
-from radarsim.config.key_types import Correlation, Flag, NonNegative, Number, Positive, Probability, WholeNumber, key
+from radarsim.config.key_types import Correlation, Flag, NonNegative, Number, Positive, Probability, key, whole_number
 from radarsim.config.model import Model
 from radarsim.config.study_keys import Member
 from radarsim.constants import STANDARD_GRAVITY_MPS2
@@ -54,8 +53,8 @@ ACROSS = Component("across", "m", "$\\perp$", "position across the line of sight
 class Radar(radial_keys.Radar):
     """A surveillance radar that measures range, bearing and radial velocity."""
 
-    sigma_bearing_rad: Annotated[Positive, Field(le=0.5)] = key(
-        "σ of the measured bearing", "standard deviation of a measured bearing, rad", symbol="σ_β"
+    sigma_bearing_rad: Positive = key(
+        "σ of the measured bearing", "standard deviation of a measured bearing, rad", symbol="σ_β", le=0.5
     )
     range_velocity_correlation: Correlation = key(
         "correlation of range and velocity", "of the errors of one plot, as a chirp couples them", 0.0
@@ -66,8 +65,8 @@ class Radar(radial_keys.Radar):
         None,
         symbol="F_r",
     )
-    detection_probability: Annotated[Probability, Field(gt=0)] = key(
-        "detection probability", "probability of a plot of the target after the first", 1.0, symbol="P_D"
+    detection_probability: Probability = key(
+        "detection probability", "probability of a plot of the target after the first", 1.0, symbol="P_D", gt=0
     )
     false_plots_per_km2: NonNegative = key(
         "false plots per scan", "mean number per scan and km², of any velocity", 0.0, symbol="λ", unit="km⁻²"
@@ -91,8 +90,11 @@ class Flight(Model):
     """Where a flight begins, and how its course varies."""
 
     bearing_rad: Number = key("bearing", "bearing at the first plot, from north to the east, rad", 0.0)
-    course_spread_rad: Annotated[NonNegative, Field(le=math.pi)] = key(
-        "spread of the course", "each realisation draws its course evenly up to this angle to either side, rad", 0.0
+    course_spread_rad: NonNegative = key(
+        "spread of the course",
+        "courses are even, by realisation, up to this angle to either side, rad",
+        0.0,
+        le=math.pi,
     )
 
 
@@ -153,13 +155,13 @@ class Filter(Member):
     association: Literal["known", "nearest", "pda"] = key(
         "association", "takes the target's plot, the nearest in the gate, or all in the gate, weighed (pda)", "nearest"
     )
-    gate_probability: Annotated[Probability, Field(gt=0.5, lt=1)] = key(
-        "gate probability", "probability of the target's plot in the gate", 0.99, symbol="P_G"
+    gate_probability: Probability = key(
+        "gate probability", "probability that the gate contains the target's plot", 0.99, symbol="P_G", gt=0.5, lt=1
     )
-    confirming_plots: Annotated[int, WholeNumber(2, 8)] = key(
-        "plots that confirm", "scans with a plot in the gate, among confirming_scans, that confirm a track", 3
+    confirming_plots: whole_number(2, 8) = key(
+        "plots that confirm", "number of scans with a plot in the gate that confirm a track", 3
     )
-    confirming_scans: Annotated[int, WholeNumber(2, 8)] = key("scans that confirm", "scans that are looked at", 4)
+    confirming_scans: whole_number(2, 8) = key("scans that confirm", "number of last scans that count for it", 4)
 
     @cross_check
     def _check_association(self):
@@ -361,10 +363,12 @@ class Plane(ClutteredStudy):
         if c.turns or c.spread or not c.speed:
             return None
         flight = [(*x[:2], c.speed * math.cos(x[2]), c.speed * math.sin(x[2])) for x in self.typical_flight(spec)]
-        bounds = {
-            m: straight_flight_bound(axes.t_s, flight, c.sigma, c.rho, m, spec.radar.detection_probability)
-            for m in (2, 3)
-        }
+        rows, R = np.array([polar_rows(x) for x in flight]), np.zeros((3, 3))
+        R[np.triu_indices(3)] = errors_covariance(c.sigma, c.rho)
+        R = R + np.triu(R, 1).T
+        maps = np.concatenate([rows[:, :2], [speed_and_course_rows(x) for x in flight]], axis=1)
+        detection = spec.radar.detection_probability
+        bounds = {m: straight_flight_bound(axes.t_s, rows[:, :m], R[:m, :m], maps, detection) for m in (2, 3)}
         return Floor(CRB, tuple(bounds[3 if keys.doppler else 2] for keys in spec.filters), bounds[3])
 
     def tables(self, results):
