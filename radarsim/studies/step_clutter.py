@@ -67,7 +67,8 @@ class ClutteredStudy(StepStudy):
         return len(self.window)
 
     def known_quantities(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
-        return [np.zeros(t_s.size) for _ in self.window] if self.false_plots_from_s(spec) is None else self.halves(spec)
+        is_clear = self.false_plots_from_s(spec) is None
+        return list(np.zeros((len(self.window), t_s.size)) if is_clear else self.halves(spec))
 
     def false_normals(self, spec: Any) -> int:
         if self.false_plots_from_s(spec) is None:
@@ -113,7 +114,7 @@ class ClutteredStudy(StepStudy):
                 s = steps.predict(s, dt, u, numbers)
                 halves[:, k] = np.maximum(halves[:, k], MARGIN * np.array(steps.gate(s, u, numbers)))
                 s = steps.update(s, ((1.0, z),), u, numbers)
-        halves[:, dt * np.arange(spec.scans) < self.false_plots_from_s(spec)] = 0.0
+        halves[:, dt * np.arange(spec.scans) < (self.false_plots_from_s(spec) or 0.0)] = 0.0
         return halves
 
     def false_plots(self, x: Any, u: Any, c: Any, w: Sequence[Any]) -> tuple[Any, ...]:

@@ -60,7 +60,7 @@ def trace_scene(study: "StepStudy", spec: Any, world: Any) -> Scene:
     state: Any = None
     for count in (first, move):
         trace = tracing.Trace()
-        c, (dt, *u, time) = trace.plain(steps.NUMBERS, world, stated=True), numbers_at_a_scan(study, spec, trace)
+        c, (dt, *u, time) = trace.plain(steps.NUMBERS, world, stated=True), numbers_at_a_scan(study, trace)
         w = [unit_normal(trace, n) for n in range(count + plot + false)]
         state_normals, plot_normals, false_normals = (
             tuple(w[i:j]) for i, j in ((0, count), (count, count + plot), (count + plot, len(w)))
@@ -112,8 +112,8 @@ def trace_filter(
     programs, state, n, m = [], None, len(study.components), len(study.measured)
     for begins in (True, False):
         trace = tracing.Trace()
-        c, (dt, *u, _) = trace.plain(kernels_steps.NUMBERS, numbers, stated=True), numbers_at_a_scan(study, spec, trace)
-        u, known_of_false = tuple(u[: len(study.known_columns)]), tuple(u)
+        c, (dt, *known, _) = trace.plain(kernels_steps.NUMBERS, numbers, stated=True), numbers_at_a_scan(study, trace)
+        u = tuple(known[: len(study.known_columns)])
         present, z, true = trace.rows(kernels_steps.PLOT, (0.0, (0.0,) * m, (0.0,) * n))
         if begins:
             s = traced_step(steps.start, z, u, c)
@@ -136,7 +136,7 @@ def trace_filter(
         rows = tracing.count_numbers(s)
         if scene.false:
             was_kept = True if begins else trace.rows(kernels_steps.STATE, 0.0, rows) > 0.5
-            is_kept = study.kept(e, known_of_false, c) & was_kept
+            is_kept = study.kept(e, tuple(known), c) & was_kept
             trace.write(kernels_steps.STATE, tracing.where(is_kept, 1.0, 0.0), rows)
             counts, rows = counts & is_kept, rows + 1
             events = traced_step(steps.counts, s, u, c)
@@ -153,7 +153,7 @@ def trace_filter(
     return programs[0], programs[1], rows
 
 
-def numbers_at_a_scan(study: "StepStudy", spec: Any, trace: tracing.Trace) -> tuple[Any, ...]:
+def numbers_at_a_scan(study: "StepStudy", trace: tracing.Trace) -> tuple[Any, ...]:
     """The time since the scan before, the quantities known at a scan, those of false plots after them, and the time."""
     from radarsim.kernels import steps
 

@@ -84,6 +84,7 @@ class Steps:
     estimate: Callable[[Any, Any, Any], tuple[Any, ...]]
     covariance: Callable[[Any, Any, Any], tuple[Any, ...]] | None = None
     counts: Callable[[Any, Any, Any], tuple[Any, ...]]
+    gate: Callable[[Any, Any, Any], tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,7 @@ class StepStudy(OneFile):
         """The components of a true state. Default: the state."""
         return tuple(x)
 
-    def difference(self, estimate: Sequence[Any], true: Sequence[Any]) -> tuple[Any, ...]:
+    def difference(self, estimate: Any, true: Any) -> tuple[Any, ...]:
         """The errors of the components, of their estimates. Default: these less the truth; an angle wraps."""
         return tuple(a - b for a, b in zip(estimate, true, strict=True))
 
