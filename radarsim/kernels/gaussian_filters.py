@@ -83,7 +83,8 @@ def associate(
     eq. 3.4 to 3.11. gate: χ² of its bound. false_to_missed: density of false plots times 1 - P_D P_G over P_D."""
     m = 3 if len(S) == 6 else 2
     S_inverse, determinant = invert(S, m)
-    nothing = 0.0 if rule == "known" else false_to_missed * math.tau ** (m / 2) * sqrt(determinant)
+    missed = 0.0 if rule == "known" else maximum(false_to_missed, LEAST_DENSITY)
+    nothing = missed * math.tau ** (m / 2) * sqrt(determinant)
     total, best, first, e, second = nothing, 0.0, 0.0, (0.0,) * m, (0.0,) * len(S)
     for number, (there, d) in enumerate(plots[:1] if rule == "known" else plots):
         square = dot(d, times(S_inverse, d))
@@ -96,11 +97,11 @@ def associate(
         total, best, first = total + likelihood, maximum(best, likelihood), first if number else likelihood
     has_plot, is_wrong = where(best > 0.0, 1.0, 0.0), where(best > first, 1.0, 0.0)
     if rule == "pda":
-        some, total = total - nothing, maximum(total, LEAST_DENSITY)
+        some = total - nothing
         e = tuple(a / total for a in e)
         spread = tuple(a / total - b for a, b in zip(second, outer_square(e), strict=True))
         return Association(e, some / total, spread, log(determinant) - 2 * log(total), has_plot, is_wrong)
-    density = log(determinant) - 2 * log(maximum(best + nothing, LEAST_DENSITY))
+    density = log(determinant) - 2 * log(where(total > 0.0, best + nothing, 1.0))
     if rule == "known":  # that it is missed says nothing of the model
         density = where(best > 0.0, density, 0.0)
     return Association(e, has_plot, None, density, has_plot, is_wrong)
