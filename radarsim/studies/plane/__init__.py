@@ -199,12 +199,13 @@ def design(spec, keys):
     stay = math.exp(-radar.scan_period_s / keys.mean_stay_s) if keys.kind == "imm" else 0.0
     start = {"acceleration": (keys.sigma_start_acceleration_mps2,) * 2, "turn": (keys.sigma_start_turn_rate_radps,)}
     missed = (1 - radar.detection_probability * keys.gate_probability) / radar.detection_probability
+    clear = np.arange(spec.scans) * radar.scan_period_s < radar.false_plots_from_s
     return Design(
         *c[:4], c.density > 0, m, keys, keys.model, keys.kind,
         (noise, keys.sigma_turn_rate_radps or 0.0), keys.quiet_sigma_acceleration_mps2 or 0.0, stay,
         keys.doppler and c.span >= RESOLVED * keys.sigma_start_velocity_mps,
         (keys.sigma_start_velocity_mps, start.get(keys.model, ())),
-        float(chdtri(m, 1 - keys.gate_probability)), missed, radar.false_plots_from_s / radar.scan_period_s,
+        float(chdtri(m, 1 - keys.gate_probability)), missed, float(clear.sum()),
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
-"""Textbook twins of the filters in the plane: full matrices in NumPy, one realisation. Nothing is shared with the package.
+"""Textbook twins of the filters in the plane: full matrices in NumPy, one realisation.
 
-A state is (x, y, vx, vy, …), with the accelerations or the rate of turn. Derivatives are complex steps, except that the
-laws of converted plots stand as they are printed.
+Nothing is shared with the package. A state is (x, y, vx, vy, …), with the accelerations or the rate of turn.
+Derivatives are complex steps.
 """
 
 import math
@@ -27,7 +27,7 @@ def folded(v, span):
     return (v + span / 2) % span - span / 2
 
 
-# ---- motion -----------------------------------------------------------------------------------------------------------
+# ---- motion ---------------------------------------------------------------------------------------------------------
 def sine_ratio(a):
     """sin a over a, of complex a too: near zero a series, as a quotient loses the derivative."""
     if abs(a) > 0.3:
@@ -60,14 +60,13 @@ def predicted(x, P, model, dt, noise):
     if model == "turn":
         F, Q[4, 4] = jacobian(lambda y: turned(y, dt), x), noise[1] ** 2
         return turned(x, dt), F @ P @ F.T + Q
-    one = np.array(
-        [[dt ** (j - i) / math.factorial(j - i) if j >= i else 0 for j in range(orders)] for i in range(orders)]
-    )
-    F[:used, :used] = np.kron(one, np.eye(2))
+    powers = range(orders)
+    coordinate = [[dt ** (j - i) / math.factorial(j - i) if j >= i else 0 for j in powers] for i in powers]
+    F[:used, :used] = np.kron(coordinate, np.eye(2))
     return F @ x, F @ P @ F.T + Q
 
 
-# ---- a plot -----------------------------------------------------------------------------------------------------------
+# ---- a plot ---------------------------------------------------------------------------------------------------------
 def polar(x):
     """Range, tangent's angle (of the right derivative, not of the right half), radial velocity; also of complex x."""
     r = np.sqrt(x[0] ** 2 + x[1] ** 2)
@@ -135,9 +134,8 @@ class Filter:
 
     def apart(self, z, mean):
         """Less the expected plot, the numbers in use."""
-        return np.array(
-            [z[0] - mean[0], wrapped(z[1] - mean[1]), *(folded(z[i] - mean[i], self.span) for i in range(2, self.m))]
-        )
+        velocity = [folded(z[2] - mean[2], self.span)] if self.m == 3 else []
+        return np.array([z[0] - mean[0], wrapped(z[1] - mean[1]), *velocity])
 
     def law(self, x, P):
         """Mean, covariance S (m, m) of a plot, and with the state C (n, m); nothing of a velocity of unknown fold."""
@@ -190,7 +188,7 @@ class Filter:
         own = bool(there) and bool(inside[0])
         false = density * mean[0] / (self.span if self.m == 3 else 1) * (1 - P_D * P_G) / P_D
         if not inside.any():
-            return x, P, false if density else 1.0, (False, False)
+            return x, P, false, (False, False)
         best = int(np.argmin(np.where(inside, d, np.inf)))
         mark = True, not (own and best == 0)
         if rule == "nearest":
@@ -217,15 +215,10 @@ class Filter:
             one, two = math.exp(-sb * sb / 2), math.exp(-2 * sb * sb)
             place = np.array([cos, sin]) * r / one
             square, half = r * r * (one**-2 - 2), (r * r + sr * sr) / 2
-            R = np.array(
-                [
-                    [
-                        square * cos**2 + half * (1 + two * math.cos(2 * b)),
-                        square * sin * cos + half * two * math.sin(2 * b),
-                    ],
-                    [0, square * sin**2 + half * (1 - two * math.cos(2 * b))],
-                ]
-            )
+            R = np.empty((2, 2))
+            R[0, 0] = square * cos**2 + half * (1 + two * math.cos(2 * b))
+            R[1, 1] = square * sin**2 + half * (1 - two * math.cos(2 * b))
+            R[0, 1] = square * sin * cos + half * two * math.sin(2 * b)
             R[1, 0] = R[0, 1]
         else:
             J = np.array([[cos, -r * sin], [sin, r * cos]])
@@ -283,3 +276,25 @@ def follow(radar, keys, t, plots):
         estimates.append(tracker.estimate())
         covariances.append(tracker.covariance())
     return np.array(estimates), np.array(covariances)
+
+
+def follow_among_false(radar, keys, t, target, false, truth):
+    """As `follow`, with the false plots (K, M, 3); and whether (K, 3) the track is kept, confirmed, and takes a wrong
+    plot for the likeliest. truth (K, 2): range and bearing."""
+    tracker, estimates, covariances, events, kept = Filter(radar, keys, True), [], [], [], True
+    for k, (z, others) in enumerate(zip(target, false, strict=True)):
+        there, in_clutter = bool(np.isfinite(z[0])), k > 0 and t[k] >= radar.false_plots_from_s
+        if k == 0:
+            tracker.start(z)
+        else:
+            tracker.predict(t[k] - t[k - 1])
+            others = others[np.isfinite(others[:, 0])]
+            plots = np.concatenate([[z], others]) if there else others
+            tracker.update(plots, there, in_clutter * 1e-6 * radar.false_plots_per_km2)
+        e = tracker.estimate()[:2] - truth[k]
+        off = np.abs([e[0], wrapped(e[1])]) >= [10 * radar.sigma_range_m, 10 * radar.sigma_bearing_rad]
+        kept = kept and not (in_clutter and off.any())
+        events.append([kept, tracker.confirmed, tracker.wrong])
+        estimates.append(tracker.estimate())
+        covariances.append(tracker.covariance())
+    return np.array(estimates), np.array(covariances), np.array(events)

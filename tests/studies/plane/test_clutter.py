@@ -1,0 +1,65 @@
+"""The filters in the plane among false plots, against textbook twins, realisation by realisation."""
+
+import numpy as np
+import pytest
+
+from tests.studies.plane import naive
+from tests.studies.plane.cases import STRAIGHT, case_of, member, plots_of, run_of
+from tests.studies.plane.test_filters import MOVED, SIZE, assert_close, assert_nees_close, difference
+
+CLUTTER = {
+    "repetition_rate_hz": 40e3,
+    "false_plots_per_km2": 0.06,
+    "false_plots_from_s": 12.0,
+    "sigma_bearing_rad": 3e-3,
+}
+FEW = [
+    member("extended", association="pda"),
+    member("converted", doppler=False),
+    member("imm", "turn", association="nearest"),
+]
+MORE = [
+    [member("extended", "turn", association=rule) for rule in ("known", "nearest", "pda")],
+    [member("unscented", "acceleration", False, association=rule) for rule in ("nearest", "pda")],
+    [member("imm", model, association=rule) for model, rule in (("acceleration", "nearest"), ("turn", "pda"))],
+    [member("converted", association=rule, doppler_update="linear") for rule in ("known", "nearest")],
+]
+
+
+def compare(filters, n, first=0):
+    """Errors of kept tracks, predicted variances, NEES, and what is counted, of single realisations. Returns how many
+    tracks are lost, and how many plots are wrong."""
+    case, lost, wrong = case_of(filters, STRAIGHT, 10, **CLUTTER), 0, 0
+    t, z, truth, false = plots_of(case, n, first)
+    for i in range(n):
+        sums = run_of(case, first + i)
+        for f, keys in enumerate(case.spec.filters):
+            (estimate, P, events), (moved, moved_P, _) = (
+                naive.follow_among_false(case.spec.radar, keys, t, z[i] * factor, false[i] * factor, truth[i, :, :2])
+                for factor in (1.0, MOVED)
+            )
+            kept = events[:, 0]
+            np.testing.assert_array_equal(sums["counts"][f], events & kept[:, None])
+            np.testing.assert_array_equal(sums["estimates"][f], np.repeat(kept[:, None], 4, axis=1))
+            e, other, P, moved_P = (
+                values[kept] for values in (difference(estimate, truth[i]), difference(moved, truth[i]), P, moved_P)
+            )
+            assert_close(sums["error"][f, kept, :, 0], e, other, SIZE)
+            variance, moved_variance = (np.einsum("kii->ki", matrix) for matrix in (P, moved_P))
+            assert_close(sums["believed"][f, kept], variance, moved_variance, variance)
+            assert_nees_close(sums["nees"][f, kept, 0], (e, P), (other, moved_P))
+            assert not any(sums[name][f, ~kept].any() for name in ("error", "believed", "nees"))
+            lost, wrong = lost + (not kept[-1]), wrong + events[:, 2].sum()
+    return lost, wrong
+
+
+def test_tracks_among_false_plots_are_the_twins():
+    lost, wrong = compare(FEW, 10, first=96)
+    assert lost >= len(FEW)
+    assert wrong > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("filters", MORE, ids=lambda filters: filters[0]["name"])
+def test_tracks_of_more_filters_are_the_twins(filters):
+    compare(filters, 20)
