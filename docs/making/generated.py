@@ -5,13 +5,12 @@ from functools import partial
 from pathlib import Path
 
 from making import claims, commands, interpretations, keys, modules, tables
-from radarsim.studies import registry
 
 MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 PARTS = {
     **{"claims": claims.markdown, "commands": commands.markdown, "keys": keys.markdown},
     **{"modules": modules.markdown, "tables": tables.common_tables},
-    **{f"tables_{study}": partial(tables.own_tables, study) for study in registry.SHIPPED},
+    **{f"tables_{study}": partial(tables.own_tables, study) for study in tables.with_own_tables()},
     **{
         f"interpretations_{paper.lower()}": partial(interpretations.markdown, paper) for paper in interpretations.PAPERS
     },

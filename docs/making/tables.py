@@ -11,8 +11,10 @@ from typing import NamedTuple
 from radarsim.report import consistency_tables, exact_check, interval_notes, rare_events
 from radarsim.report import tables as common
 from radarsim.report.user_filters import tables as user_filters_tables
-from radarsim.studies import registry
+from radarsim.studies import registry, step_tables
 from radarsim.studies.floors import floor_columns
+from radarsim.studies.onefile import OneFile
+from radarsim.studies.plane import Plane
 
 SHARED = (
     common.label_columns,
@@ -26,6 +28,9 @@ SEVERAL = {  # tables that studies have in common
     "curves": (common.curves, floor_columns.with_floors),
     "gains": (common.gains,),
     "consistency": (consistency_tables.normalised_square_columns,),
+    "last": (OneFile.last_columns,),
+    "tracks": (step_tables.track_columns,),
+    "position": (Plane.position_columns,),
     "rare": (rare_events.rate_columns,),
     "failures": (user_filters_tables.failure_columns,),
     "nees": (user_filters_tables.nees_columns, consistency_tables.normalised_square_columns),
@@ -84,7 +89,12 @@ def modules(study: str) -> Iterator[ModuleType]:
 
 def markdown() -> str:
     """All tables: those of several studies, and each study's own."""
-    return "\n\n".join([common_tables(), *(own_tables(study) for study in registry.SHIPPED)])
+    return "\n\n".join([common_tables(), *(own_tables(study) for study in with_own_tables())])
+
+
+def with_own_tables() -> list[str]:
+    """The shipped studies that declare tables of their own; those of a study in one file stand in SEVERAL."""
+    return [study for study in registry.SHIPPED if any(modules(study))]
 
 
 def common_tables() -> str:

@@ -189,5 +189,8 @@ def make_study_keys(
         "baseline": (Baseline, BASELINE),
         "scans": (Annotated[int, WholeNumber(2, max_scans), DesignMark()], key("number of scans", "number of plots")),
     }
-    study_keys: type[StudyKeys] = pydantic.create_model(name, __base__=StudyKeys, __module__=module, **fields)
+    about = f"Keys: {', '.join(parts)}, filters, baseline and scans."
+    study_keys: type[StudyKeys] = pydantic.create_model(
+        name, __base__=StudyKeys, __module__=module, __doc__=about, **fields
+    )
     return study_keys

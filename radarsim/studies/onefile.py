@@ -268,10 +268,13 @@ class OneFile(Study):
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         from radarsim.report import tables
 
-        return {"last": tables.join_columns(map(self._last, results))}
+        return {"last": tables.join_columns(map(self.last_columns, results))}
 
-    def _last(self, result: "CaseResult") -> Mapping[str, Any]:
-        """σ at the last scan, exact where known, and its limit."""
+    def last_columns(self, result: "CaseResult") -> Mapping[str, Any]:
+        """σ at the last scan, of a study in one file.
+
+        last_sigma ± last: σ at the last scan
+        exact_last_sigma: its exact value, where it is known"""
         import numpy as np
 
         from radarsim.report import statistics, tables

@@ -40,8 +40,9 @@ def consistency_columns(study: "StepStudy", result: CaseResult) -> Mapping[str, 
 def track_columns(study: "StepStudy", result: CaseResult) -> Mapping[str, Any]:
     """Tracks among false plots, by scan.
 
-    kept_share ±: realisations in which the track is still the target's
-    …_share ±: of these, those with a property that the study counts"""
+    kept_share ±: share of realisations in which the track is still the target's
+    confirmed_share ±: share of kept tracks that are confirmed
+    wrong_plot_share ±: share of kept tracks whose likeliest plot of the scan is false"""
     counts = np.asarray(result.sums["counts"])
     filters, scans = counts.shape[:2]
     kept, *others = counts.reshape(-1, counts.shape[2]).T

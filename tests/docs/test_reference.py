@@ -116,7 +116,7 @@ def test_every_part_that_is_generated_stands_in_a_page():
 # As few small cases as write every table and column that any shipped config writes.
 WRITING = [
     *(CASES[name] for name in ("range_doppler", "multimodel", "sonar_manoeuvre")),
-    *(MORE[name] for name in ("rare_folds", "rare_losses", "rare_tracks")),
+    *(MORE[name] for name in ("rare_folds", "rare_losses", "rare_tracks", "plane_clutter")),
     *(Small(*of, 200, 0) for of in (("sonar_smoothing", ("scans=8",)), ("sonar_conversion", ("scans=3",)))),
     Small("pulses_folds", ("scans=3",), 20, 0),
 ]

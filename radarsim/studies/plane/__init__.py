@@ -57,7 +57,7 @@ class Radar(radial_keys.Radar):
         "σ of the measured bearing", "standard deviation of a measured bearing, rad", symbol="σ_β", le=0.5
     )
     range_velocity_correlation: Correlation = key(
-        "correlation of range and velocity", "of the errors of one plot, as a chirp couples them", 0.0
+        "correlation of range and velocity", "correlation of the errors of one plot, as a chirp couples them", 0.0
     )
     repetition_rate_hz: Positive | None = key(
         "pulse repetition rate",
@@ -142,7 +142,7 @@ class Filter(Member):
         "σ of the turn rate", "of its step in a scan, rad/s", only={"model": "turn"}
     )
     quiet_sigma_acceleration_mps2: NonNegative = key(
-        "σ of the acceleration of the quiet model", "as sigma_acceleration_mps2, m/s²", only={"kind": "imm"}
+        "σ of the acceleration of the quiet model", "standard deviation, as of the other model, m/s²", only={"kind": "imm"}
     )
     mean_stay_s: Positive = key("mean stay in a model", "before it changes to the other, s", 60.0, only={"kind": "imm"})
     sigma_start_velocity_mps: Positive = key(
@@ -375,12 +375,14 @@ class Plane(ClutteredStudy):
     def tables(self, results):
         from radarsim.report import tables
 
-        position = tables.join_columns(map(self._position, results))
+        position = tables.join_columns(map(self.position_columns, results))
         return {**super().tables(results), "position": position}
 
-    def _position(self, result):
-        """The rms error of position at a scan along the line of sight and across it: that of the bearing times the
-        range of the flight in the middle of its spread, `range_m`."""
+    def position_columns(self, result):
+        """σ of position along the line of sight, that of the range, and across it, that of the bearing times the range.
+
+        range_m: range of the flight whose course is in the middle of its spread
+        sigma_m ±: σ of position along the line of sight, or across it, as `component` says"""
         from radarsim.report import statistics, tables
 
         f, k, c = np.nonzero(result.axes.available[:, :, :2])
