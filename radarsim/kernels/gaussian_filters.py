@@ -107,6 +107,16 @@ def associate(
     return Association(e, has_plot, None, density, has_plot, is_wrong)
 
 
+def log_densities(e: Sequence[Any], S: Sequence[Any]) -> list[Any]:
+    """The logarithm of the density of the first number of a plot, of the first two, and so on, by their innovation."""
+    L, solved, total, totals = cholesky(S, len(e)), list[Any](), 0.0, []
+    for row, number in zip(L, e, strict=True):
+        solved.append((number - sum(a * b for a, b in zip(row, solved, strict=False))) / row[-1])
+        total = total - solved[-1] * solved[-1] / 2 - log(row[-1]) - math.log(math.tau) / 2
+        totals.append(total)
+    return totals
+
+
 def take(state: State, law: Law, association: Association) -> State:
     """A state after plots of a law, whose covariance includes that of their errors; BST eq. 3.13 to 3.16."""
     (x, P), (_, S, C) = state, law

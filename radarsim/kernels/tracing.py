@@ -304,7 +304,12 @@ def maximum(x: Any, y: Any) -> Any:
 
 
 def _record(op: str, x: Any, library: Callable) -> Any:
-    return x.trace.put(op, x) if isinstance(x, Lane) else library(x)
+    return x.trace.put(op, x) if isinstance(x, Lane) else plain(library, x)
+
+
+def plain(library: Callable, *x: Any) -> Any:
+    """The value of one of NumPy's functions: of floats a float, whose arithmetic takes a third of the time of NumPy's."""
+    return float(library(*x)) if all(isinstance(number, float) for number in x) else library(*x)
 
 
 def sqrt(x: Any) -> Any:

@@ -9,7 +9,7 @@ from radarsim.config.experiment import Case
 from radarsim.recordings.positions import PlotPositions, ThinnedRows
 from radarsim.recordings.rows_by_track import join_tracks, select_rows
 from radarsim.recordings.study_part import recording_interface
-from radarsim.studies.plot_arrays import true_column
+from radarsim.studies.plot_arrays import estimate_errors, true_column
 from radarsim.studies.recording_interface import Track
 
 GAP_INTERVALS = 3.0  # in median intervals
@@ -122,7 +122,8 @@ class TrackingResult:
             column = truth.get(true_column(component, unit))
             if column is None:
                 continue
-            error = track.estimate[:, :, c] - column[rows]
+            estimate = track.estimate[:, :, c : c + 1]
+            error = estimate_errors(estimate, column[rows, None], [(component, unit)])[..., 0]
             for f, name in enumerate(track.filters):
                 is_counted = np.isfinite(error[f]) & ~(track.sigma[f, :, c] <= 0)
                 sums = self.errors.setdefault((name, component), ErrorSums(name, component, unit))

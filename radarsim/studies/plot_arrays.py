@@ -23,6 +23,19 @@ def true_column(component: str, unit: str) -> str:
     return f"{TRUTH_PREFIX}{component}_{UNITS_IN_NAMES.get(plain, plain.replace('/', 'p'))}"
 
 
+def estimate_errors(
+    estimates: "np.ndarray", truth: "np.ndarray", components: Sequence[tuple[str, str]]
+) -> "np.ndarray":
+    """Estimates less the truth, both (…, C), of components by name and unit: of an angle less whole turns."""
+    import numpy as np
+
+    errors = estimates - truth
+    for c, (_, unit) in enumerate(components):
+        if unit == "rad":
+            errors[..., c] -= 2 * np.pi * np.round(errors[..., c] / (2 * np.pi))
+    return errors
+
+
 @dataclass(frozen=True)
 class World:
     """What a filter may know beforehand.

@@ -20,6 +20,7 @@
         def update(s, z, u, c): …                   # its state after a plot
         def estimate(s, u, c): …                    # its estimates of the components
         def covariance(s, u, c): …                  # their packed covariance, or None
+        def log_densities(s, z, u, c): …            # of a plot's first number, of the first two, … by the state before
 
 These are plain functions of numbers, tuples and named records; what calculates with numbers of a realisation is in
 `radarsim.kernels.tracing` (`sqrt`, `where`, …) and `radarsim.kernels.formula_functions` (`sin`, `atan2`, …). A state, a
@@ -67,6 +68,7 @@ if TYPE_CHECKING:
 
     from radarsim.config.experiment import Case, Experiment
     from radarsim.report.drawing.model import Figure
+    from radarsim.studies.recording_interface import Likelihood
 
 
 MAX_DIFFERENCE = 1e-9  # of the largest truth: permitted difference between plain Python and the kernel
@@ -83,6 +85,7 @@ class Steps:
     update: Callable[[Any, Any, Any, Any], Any]
     estimate: Callable[[Any, Any, Any], tuple[Any, ...]]
     covariance: Callable[[Any, Any, Any], tuple[Any, ...]] | None = None
+    log_densities: Callable[[Any, Any, Any, Any], Sequence[Any]] | None = None
     counts: Callable[[Any, Any, Any], tuple[Any, ...]]
     gate: Callable[[Any, Any, Any], tuple[float, ...]]
 
@@ -399,6 +402,28 @@ class StepStudy(OneFile):
             return SimulatedPlots(plan.axes.t_s, columns, plan.axes.components, truth, {}, first)
 
         return draw
+
+    def fitted(self, filter_keys: Any) -> Sequence[str]:
+        """The keys that `radarsim fit` looks for with a filter: dotted ones of parts, bare ones of the filter. Default:
+        none."""
+        return ()
+
+    def likelihood(
+        self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
+    ) -> "Likelihood | None":
+        from radarsim.studies.step_likelihood import StepLikelihood
+
+        usable = [
+            keys
+            for keys in case.spec.filters
+            if self.kinds[keys.kind].log_densities is not None
+            and self.fitted(keys)
+            and all(name in track for track in tracks for name in self.columns(case.spec, keys))
+            and filter_name in (None, keys.name)
+        ]
+        if not usable or self.known_columns or self.false_normals(case.spec):
+            return None
+        return StepLikelihood(self, case.spec, max(usable, key=lambda keys: len(self.columns(case.spec, keys))), tracks)
 
     def tracker(self, case: "Case") -> "Tracker":
         with study_context(self.name):

@@ -20,7 +20,7 @@ from radarsim.config.model import Model
 from radarsim.config.study_keys import Member
 from radarsim.constants import STANDARD_GRAVITY_MPS2
 from radarsim.kernels import gaussian_filters
-from radarsim.kernels.formula_functions import atan2, cos, sin, uniform_pairs, wrap_angle
+from radarsim.kernels.formula_functions import atan2, cos, exp, log, sin, uniform_pairs, wrap_angle
 from radarsim.kernels.planar_motion import predict
 from radarsim.kernels.polar_plots import (
     converted,
@@ -142,7 +142,9 @@ class Filter(Member):
         "σ of the turn rate", "of its step in a scan, rad/s", only={"model": "turn"}
     )
     quiet_sigma_acceleration_mps2: NonNegative = key(
-        "σ of the acceleration of the quiet model", "standard deviation, as of the other model, m/s²", only={"kind": "imm"}
+        "σ of the acceleration of the quiet model",
+        "standard deviation, as of the other model, m/s²",
+        only={"kind": "imm"},
     )
     mean_stay_s: Positive = key("mean stay in a model", "before it changes to the other, s", 60.0, only={"kind": "imm"})
     sigma_start_velocity_mps: Positive = key(
@@ -310,6 +312,12 @@ class Tracking(Steps):
         moving = (*x[:2], where(x[2] == 0.0, 1.0, x[2]), *x[3:])  # before the second plot it may stand still
         return congruence((*polar_rows(x)[:2], *speed_and_course_rows(moving)), P)
 
+    def log_densities(s, z, u, c):
+        states, weights = (s[0][:2], (s[0][2], 1 - s[0][2])) if c.kind == "imm" else (s[:1], (1.0,))
+        laws = [law_of_plot(state, c) for state in states]
+        by_model = [gaussian_filters.log_densities(apart(z, mean, c), S) for mean, S, _ in laws]
+        return [log(maximum(dot(weights, [exp(a) for a in logs]), 1e-300)) for logs in zip(*by_model, strict=True)]
+
     def gate(s, u, c):
         S = law_of_plot(moments(s, c), c)[1]
         return math.sqrt(c.gate * S[0]), math.sqrt(c.gate * S[3 if c.m == 3 else 2])
@@ -408,6 +416,15 @@ class Plane(ClutteredStudy):
         visible, remark = case_selection.select_cases_by_panel(results, names)
         across = time_figures.sigma_figure("sigma_across", visible, groups, ACROSS)
         return {**figures, "sigma_across": replace(across, caption=across.caption + remark)}
+
+    def fitted(self, filter_keys):
+        noise = "sigma_jerk_mps3" if filter_keys.model == "acceleration" else "sigma_acceleration_mps2"
+        return (
+            "radar.sigma_range_m",
+            "radar.sigma_bearing_rad",
+            *["radar.sigma_velocity_mps"] * filter_keys.doppler,
+            noise,
+        )
 
     def begin(self, c, w):
         even, _ = uniform_pairs(w)

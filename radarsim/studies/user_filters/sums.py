@@ -19,7 +19,7 @@ from radarsim.config.experiment import Case
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.engine.sums import Layout
 from radarsim.errors import ConfigError
-from radarsim.studies.plot_arrays import World
+from radarsim.studies.plot_arrays import World, estimate_errors
 from radarsim.studies.user_filters.estimates import check_estimates, columns_of
 from radarsim.studies.user_filters.filters import Plots, UserFilter
 from radarsim.studies.user_filters.independence import Dependence, dependence
@@ -158,7 +158,8 @@ def filter_errors(
     failed[:, 0] = (has_estimate & ~finite).any((1, 2)) | np.isinf(x).any((1, 2))
     failed[:, 1] = ~failed[:, 0] & ~finite.any((1, 2)) & np.isfinite(scale).any(1)
     error = np.full((plots.n, len(plan.scans), len(names)), np.nan)
-    error[..., places] = x[:, plan.scans] - plots.truth_of(plan.axes.components)[:, plan.scans][..., places]
+    components = [plan.axes.components[c] for c in places]
+    error[..., places] = estimate_errors(x[:, plan.scans], plots.truth_of(components)[:, plan.scans], components)
     with np.errstate(invalid="ignore"):
         failed[:, 2] = ~failed[:, 0] & (np.abs(error) > DIVERGENCE_RATIO * scale[:, None]).any((1, 2))
     error[failed.any(1)] = np.nan
