@@ -12,9 +12,15 @@ def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
     return functools.reduce(lambda done, pair: done + pair[0] * pair[1], zip(a[1:], b[1:], strict=True), a[0] * b[0])
 
 
+@functools.cache
+def row_places(n: int, i: int) -> tuple[int, ...]:
+    """The places of row i in a packed symmetric matrix of n rows."""
+    return tuple(min(i, j) * n - min(i, j) * (min(i, j) + 1) // 2 + max(i, j) for j in range(n))
+
+
 def row_of(P: Sequence[Any], n: int, i: int) -> tuple[Any, ...]:
     """Row i of a packed symmetric matrix of n rows."""
-    return tuple(P[min(i, j) * n - min(i, j) * (min(i, j) + 1) // 2 + max(i, j)] for j in range(n))
+    return tuple([P[place] for place in row_places(n, i)])
 
 
 def times(P: Sequence[Any], h: Sequence[Any]) -> tuple[Any, ...]:
