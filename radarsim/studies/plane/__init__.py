@@ -256,15 +256,19 @@ def taken_converted(state, z, c):
     x, P = gaussian_filters.take(state, law_of_position(state, position, R), gaussian_filters.certain(e))
     if c.m == 2:
         return x, P
-    v = c.sigma[2]
+    north, east, v = cos(z[1]), sin(z[1]), c.sigma[2]
     if c.keys.doppler_update == "linear":
-        h = 0.0, 0.0, cos(z[1]), sin(z[1]), *(0.0,) * (len(x) - 4)
-        across = x[3] * h[2] - x[2] * h[3]
+        h = 0.0, 0.0, north, east, *(0.0,) * (len(x) - 4)
+        across = x[3] * north - x[2] * east
         e, variance = z[2] - dot(h, x), v * v + (across * c.sigma[1]) ** 2
     else:
         h, e, variance = polar_rows(x)[2], z[2] - polar(x)[2], v * v
     known = (dot(h, times(P, h)) + variance) * RESOLVED**2 < c.span * c.span
-    return where(known, update(x, P, h, fold(e, c.span), variance), (x, P))
+    # Less what the error of the range tells of that of the velocity, both are independent.
+    share = c.rho * v / c.sigma[0]
+    e = fold(e, c.span) - share * (north * (position[0] - x[0]) + east * (position[1] - x[1]))
+    h = h[0] - share * north, h[1] - share * east, *h[2:]
+    return where(known, update(x, P, h, e, variance - (c.rho * v) ** 2), (x, P))
 
 
 class Tracking(Steps):

@@ -234,7 +234,12 @@ class Filter:
             H, e, R = jacobian(polar, x)[2:], v - seen(x)[2], sv**2
         if (H @ P @ H.T + R)[0, 0] * RESOLVED**2 >= self.span**2:
             return x, P
-        return joseph(x, P, H, np.array([folded(e, self.span)]), np.array([[R]]))
+        # Of its error, that part is taken away which the linearised error of the position tells.
+        J = np.array([[cos, -r * sin], [sin, r * cos]])
+        L = (J @ self.R[:2, 2]) @ np.linalg.inv(J @ self.R[:2, :2] @ J.T)
+        told = L @ J @ self.R[:2, 2]
+        e, H = folded(e, self.span) - L @ (place - x[:2]), H - L @ np.eye(2, n)
+        return joseph(x, P, H, np.array([e]), np.array([[R - told]]))
 
     def remember(self, has_plot, wrong):
         keys = self.keys

@@ -65,8 +65,8 @@ def own_filter(plots, model, rho, doppler):
 @pytest.mark.parametrize("rho", [0.0, -0.9, 0.7])
 @pytest.mark.parametrize("model", STARTS)
 def test_on_the_line_of_sight_it_is_the_filter_of_range(model, rho):
-    """At every scan, with Doppler and without; plainly converted plots too, whose errors are taken as uncorrelated."""
-    kinds = [(kind, doppler) for kind in ("extended", "converted")[: 1 + (rho == 0)] for doppler in (False, True)]
+    """At every scan, with Doppler and without, of plots as they are and converted."""
+    kinds = [(kind, doppler) for kind in ("extended", "converted") for doppler in (False, True)]
     plots, estimates, sigmas = followed(model, rho, kinds)
     for (_, doppler), estimate, sigma in zip(kinds, estimates, sigmas, strict=True):
         wanted, wanted_sigma = own_filter(plots, model, rho, doppler)
