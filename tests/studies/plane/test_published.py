@@ -33,9 +33,9 @@ def test_the_plain_conversion_is_too_short_and_the_unbiased_one_is_not():
 
 
 def test_estimates_from_converted_plots_are_too_far():
-    """Each plot weighs most along its own bearing, which is off by b: the sum of (cos b x - z)² is least at x = r E cos b
-    / E cos² b, r σ²/2 too far; with plots that the conversion makes longer, by as much more. Extended filters see no
-    part of it. BWB II."""
+    """A plot weighs most along its own bearing, which is off by b: the sum of (cos b x - z)² is least at x =
+    r E cos b / E cos² b, r σ²/2 too far; where the conversion makes plots longer, by as much more. An extended filter
+    does not err so. BWB II."""
     n, r, sigma = 4096, 100e3, 0.02
     slow = {"kind": "straight", "range_m": r, "speed_mps": 20.0, "aspect_rad": math.pi / 2}
     keys = {"doppler": False, "sigma_acceleration_mps2": 0.01, "sigma_start_velocity_mps": 30.0}

@@ -166,22 +166,45 @@ def test_false_plots_are_spread_evenly_over_their_window_and_independent_of_the_
     assert_uncorrelated(*first[both, -1].T, *first[both, -2].T)
 
 
+def gates(case, keys, t):
+    """The scans with the plot and covariance S that a filter expects, by its twin, over plots without errors."""
+    tracker, false_from = naive.Filter(case.spec.radar, keys, True), case.spec.radar.false_plots_from_s
+    for k, (x, vx, _, y, vy, *_) in enumerate(turn_in_space(t)):
+        z = naive.seen(np.array([x, y, vx, vy])) + np.array([0, TURN["bearing_rad"], 0])
+        z[2] = naive.folded(z[2], tracker.span)
+        if k == 0:
+            tracker.start(z)
+            continue
+        tracker.predict(5.0)
+        yield k, *tracker.law(tracker.x[0], tracker.P[0])[:2], tracker
+        tracker.update([z], True, 1e-6 * case.spec.radar.false_plots_per_km2 * (t[k] >= false_from))
+
+
 def test_the_window_of_false_plots_is_twice_as_wide_as_the_widest_gate(case):
     t = case.spec.radar.scan_period_s * np.arange(SCANS)
-    flight = turn_in_space(t)
     halves = np.zeros((2, SCANS))
     for keys in case.spec.filters:
-        tracker = naive.Filter(case.spec.radar, keys, True)
-        for k, (x, vx, _, y, vy, *_) in enumerate(flight):
-            z = naive.seen(np.array([x, y, vx, vy])) + np.array([0, TURN["bearing_rad"], 0])
-            z[2] = naive.folded(z[2], tracker.span)
-            if k == 0:
-                tracker.start(z)
-                continue
-            tracker.predict(5.0)
-            S = tracker.law(tracker.x[0], tracker.P[0])[1]
+        for k, _, S, tracker in gates(case, keys, t):
             halves[:, k] = np.maximum(halves[:, k], 2 * np.sqrt(tracker.gate * np.diag(S)[:2]))
-            density = 1e-6 * case.spec.radar.false_plots_per_km2 * (t[k] >= case.spec.radar.false_plots_from_s)
-            tracker.update([z], True, density)
     halves[:, t < case.spec.radar.false_plots_from_s] = 0
     np.testing.assert_allclose(study("plane").halves(case.spec), halves, rtol=1e-9)
+
+
+def test_a_gate_holds_as_many_false_plots_as_its_volume_says(case, drawn):
+    """Doppler leaves fewer of them: 4/3 √(γ³ |S₃|) / D of γ √|S₂|, D the velocity interval."""
+    t, _, _, false = drawn
+    span, means = case.spec.radar.span_mps, []
+    for keys in case.spec.filters:
+        means.append(0.0)
+        for k, mean, S, tracker in gates(case, keys, t):
+            if t[k] < case.spec.radar.false_plots_from_s:
+                continue
+            plots = false[:, k][np.isfinite(false[:, k, :, 0])]
+            e = np.array([tracker.apart(z, mean) for z in plots])
+            number = (np.einsum("ni,ij,nj->n", e, np.linalg.inv(S), e) < tracker.gate).sum()
+            volume = math.sqrt(tracker.gate**tracker.m * np.linalg.det(S))
+            volume *= math.pi if tracker.m == 2 else 4 / 3 * math.pi / span
+            expected = 1e-6 * case.spec.radar.false_plots_per_km2 * mean[0] * volume
+            assert abs(number / N - expected) < mean_error(N, math.sqrt(expected))
+            means[-1] += expected
+    assert means[0] < 0.5 * means[1]
