@@ -52,5 +52,5 @@ def test_the_s_band_radar_is_answered_in_under_ten_commands():
     page = (ROOT / "docs" / "howto" / "s_band.md").read_text(encoding="utf-8")
     commands = [line for line in page.splitlines() if line.startswith("$ radarsim ")]
     assert 5 < len(commands) < 10
-    for asked in ("cure.yaml", "biased.yaml", "periods.yaml", "flights.yaml", "folded.yaml", "solve sband.yaml"):
+    for asked in ("cure.yaml", "biased.yaml", "flights.yaml", "folded.yaml", "solve sband.yaml"):
         assert any(asked in command for command in commands), asked
