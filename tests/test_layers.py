@@ -86,12 +86,17 @@ ROOMS = {
     "studies.stepwise": (
         *("config.experiment", "config.study_keys", *SUMS, "kernels", "report", "report.drawing"),
         *("studies.noise", "studies.onefile", "studies.plot_arrays", "studies.step_checks", "studies.step_programs"),
-        *("studies.step_tables", "studies.step_tracker", "user_code.errors"),
+        *("studies.recording_interface", "studies.step_likelihood", "studies.step_tables", "studies.step_tracker"),
+        "user_code.errors",
     ),
     "studies.step_checks": ("kernels", "user_code.errors"),
     "studies.step_clutter": (
         *("config.experiment", "engine.results", "kernels", "language", "report", "report.drawing"),
         *("studies.step_checks", "studies.step_programs", "studies.stepwise"),
+    ),
+    "studies.step_likelihood": (
+        *("studies.error_law", "studies.missed_scans", "studies.recording_interface", "studies.step_checks"),
+        *("studies.stepwise", "user_code.errors"),
     ),
     "studies.step_programs": ("kernels", "studies.step_checks", "studies.stepwise"),
     "studies.step_tables": ("engine.results", "report", "studies.stepwise"),

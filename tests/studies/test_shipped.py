@@ -32,17 +32,19 @@ def test_methods_take_the_parameters_of_the_interface(study):
 def test_keys_claims_and_recorded_plots_are_of_the_declared_types(study):
     assert issubclass(study.keys(), Keys)
     claims = claims_of(study)
-    assert isinstance(claims, PaperClaims)
-    assert issubclass(claims.evidence, Evidence)
-    assert {claim.id.partition(".")[0] for claim in claims.claims} == {paper_key(study)}
+    assert isinstance(claims, PaperClaims | None)
+    if claims is not None:
+        assert issubclass(claims.evidence, Evidence)
+        assert {claim.id.partition(".")[0] for claim in claims.claims} == {paper_key(study)}
     assert isinstance(study.recording_interface(), RecordingInterface | None)
 
 
 def test_declared_studies_load_nothing_that_computes():
+    """Those of several files: a study in one file is declared where it computes."""
     program = (
         "import sys\n"
         "from radarsim.studies import registry\n"
-        "for name in registry.SHIPPED: print(registry.study(name).about)\n"
+        "for name in registry.SHIPPED: print(name == 'plane' or registry.study(name).about)\n"
         "print({'numpy', 'numba', 'pandas', 'matplotlib'} & set(sys.modules))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)

@@ -11,7 +11,6 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtri
 
 from radarsim.config import radial_keys
 from radarsim.config.cross_checks import check_error, cross_check
@@ -196,6 +195,8 @@ def world(spec):
 
 def design(spec, keys):
     """The numbers of a filter."""
+    from scipy.special import chdtri
+
     radar, c, m = spec.radar, world(spec), 3 if keys.doppler else 2
     noise = keys.sigma_jerk_mps3 if keys.model == "acceleration" else keys.sigma_acceleration_mps2
     stay = math.exp(-radar.scan_period_s / keys.mean_stay_s) if keys.kind == "imm" else 0.0
@@ -409,13 +410,14 @@ class Plane(ClutteredStudy):
             **tables.interval_columns("sigma_m", statistics.Estimate(*(factor * end for end in sigma))),
         }
 
-    def figures(self, results, tables_by_name, experiment):
-        from radarsim.report import case_selection, tables, time_figures
+    def figures(self, results, tables, experiment):
+        from radarsim.report import case_selection, time_figures
+        from radarsim.report import tables as common
 
-        figures = super().figures(results, tables_by_name, experiment)
+        figures = super().figures(results, tables, experiment)
         columns = {"sigma_m": "sigma", "sigma_m_lo": "sigma_lo", "sigma_m_hi": "sigma_hi"}
-        rows = tables_by_name["position"].rename(columns=columns).assign(exact_sigma=np.nan)
-        groups = tables.group_by(rows, "case", "filter", "component")
+        rows = tables["position"].rename(columns=columns).assign(exact_sigma=np.nan)
+        groups = common.group_by(rows, "case", "filter", "component")
         names = case_selection.cases_for_figure(experiment, "sigma_across")
         visible, remark = case_selection.select_cases_by_panel(results, names)
         across = time_figures.sigma_figure("sigma_across", visible, groups, ACROSS)
