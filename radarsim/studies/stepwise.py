@@ -57,7 +57,7 @@ from radarsim.engine.sums import Layout
 from radarsim.errors import ConfigError
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import OneFile
-from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
+from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots, true_column
 from radarsim.studies.step_checks import DIFFERENT_FORMULA, record, to_array
 from radarsim.studies.step_programs import CompiledFilter, Scene, cached_kernel, compile_filter, to_numbers, trace_scene
 from radarsim.studies.step_tracker import Tracker
@@ -399,7 +399,9 @@ class StepStudy(OneFile):
                 name: np.broadcast_to(row.reshape(-1, *(1,) * bool(places)), measured[0].shape)
                 for name, row in zip(self.known_columns, known_quantities, strict=True)
             }
-            return SimulatedPlots(plan.axes.t_s, columns, plan.axes.components, truth, {}, first)
+            names = [true_column(*component) for component in plan.axes.components] if places else []
+            true_columns = dict(zip(names, np.moveaxis(truth, -1, 0), strict=False))
+            return SimulatedPlots(plan.axes.t_s, columns, plan.axes.components, truth, true_columns, first)
 
         return draw
 
