@@ -208,3 +208,14 @@ def test_a_gate_holds_as_many_false_plots_as_its_volume_says(case, drawn):
             assert abs(number / N - expected) < mean_error(N, math.sqrt(expected))
             means[-1] += expected
     assert means[0] < 0.5 * means[1]
+
+
+def test_false_plots_are_even_in_area_near_the_radar(case):
+    """Where a window is wide beside its range, which those that are drawn here are not."""
+    plane, x = study("plane"), (800.0, -600.0, 0.0)
+    even = np.random.default_rng(2).uniform(size=(3, N))
+    r, b, v = plane.false_plot(x, (500.0, 0.7), even, plane.world(case.spec))
+    assert_even((r**2 - 500**2) / (1500**2 - 500**2))
+    assert_even(naive.wrapped(b + math.atan2(3, 4)) / 1.4 + 0.5)
+    assert_even(v / case.spec.radar.span_mps + 0.5)
+    assert_uncorrelated(r, b, v)
