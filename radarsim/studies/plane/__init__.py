@@ -463,13 +463,18 @@ class Plane(ClutteredStudy):
     def false_plots_from_s(self, spec):
         return spec.radar.false_plots_from_s if spec.radar.false_plots_per_km2 else None
 
+    def edges(self, x, halves):
+        """Of a window: the bearing of its middle, the squares of its least and greatest range, half its angle."""
+        r, b, _ = polar((*x[:2], 0.0, 0.0))
+        return b, maximum(r - halves[0], 0.0) ** 2, (r + halves[0]) ** 2, minimum(halves[1], math.pi)
+
     def expected(self, x, halves, c):
-        return 4 * c.density * polar((*x[:2], 0.0, 0.0))[0] * halves[0] * halves[1]
+        _, near, far, across = self.edges(x, halves)
+        return c.density * (far - near) * across
 
     def false_plot(self, x, halves, even, c):
-        r, b, _ = polar((*x[:2], 0.0, 0.0))
-        square = (r - halves[0]) ** 2 + 4 * r * halves[0] * even[0]  # even in area
-        return sqrt(square), wrap_angle(b + halves[1] * (2 * even[1] - 1)), c.span * (even[2] - 0.5)
+        b, near, far, across = self.edges(x, halves)  # even in area
+        return sqrt(near + (far - near) * even[0]), wrap_angle(b + across * (2 * even[1] - 1)), c.span * (even[2] - 0.5)
 
     def kept(self, e, u, c):
         return (u[0] <= 0.0) | ((abs(e[0]) < LOST * c.sigma[0]) & (abs(e[1]) < LOST * c.sigma[1]))

@@ -210,12 +210,17 @@ def test_a_gate_holds_as_many_false_plots_as_its_volume_says(case, drawn):
     assert means[0] < 0.5 * means[1]
 
 
-def test_false_plots_are_even_in_area_near_the_radar(case):
-    """Where a window is wide beside its range, which those that are drawn here are not."""
+@pytest.mark.parametrize(
+    ("halves", "ranges", "turn"), [((500.0, 0.7), (500, 1500), 0.7), ((1500.0, 4.0), (0, 2500), math.pi)]
+)
+def test_false_plots_are_even_in_area_near_the_radar(case, halves, ranges, turn):
+    """Where a window is wide beside its range, or surrounds the radar, which those that are drawn here are not."""
     plane, x = study("plane"), (800.0, -600.0, 0.0)
-    even = np.random.default_rng(2).uniform(size=(3, N))
-    r, b, v = plane.false_plot(x, (500.0, 0.7), even, plane.world(case.spec))
-    assert_even((r**2 - 500**2) / (1500**2 - 500**2))
-    assert_even(naive.wrapped(b + math.atan2(3, 4)) / 1.4 + 0.5)
+    even, world = np.random.default_rng(2).uniform(size=(3, N)), plane.world(case.spec)
+    r, b, v = plane.false_plot(x, halves, even, world)
+    assert_even((r**2 - ranges[0] ** 2) / (ranges[1] ** 2 - ranges[0] ** 2))
+    assert_even(naive.wrapped(b + math.atan2(3, 4)) / turn / 2 + 0.5)
     assert_even(v / case.spec.radar.span_mps + 0.5)
     assert_uncorrelated(r, b, v)
+    area = (ranges[1] ** 2 - ranges[0] ** 2) * turn
+    assert plane.expected(x, halves, world) == pytest.approx(world.density * area, rel=1e-12)
