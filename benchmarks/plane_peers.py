@@ -5,8 +5,8 @@
 Needs an environment of its own with radarsim and stonesoup (never this package's): see README.md. Prints how far the
 estimates lie apart, relative to 60 km, 1 rad and 250 m/s, and Stone Soup's time a scan.
 
-Stone Soup takes its derivatives by finite differences, which are given exactly here, and means of angles on the circle;
-without the one extended filters lie 10⁻⁵ apart and PDA 10⁻³, with the other unscented filters 10⁻⁷."""
+Stone Soup takes derivatives by finite differences, and means of angles on the circle. Here both are the study's: with
+its own derivatives extended filters lie 10⁻⁵ apart and PDA 10⁻³, with its own means unscented filters 10⁻⁷."""
 
 import math
 import time
