@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from radarsim.report.sentences import Sentence
 
 MARGIN = 2.0  # widths of the window in those of the widest gate
+RARE = 0.0099  # probability of a run of missed plots after which gates may be wider
 MAX_PLACES, CUT = 60, 1e-6  # places for false plots of a scan; the probability of more
 
 
@@ -105,15 +106,18 @@ class ClutteredStudy(StepStudy):
     def halves(self, spec: Any) -> np.ndarray:
         """Half the widths (W, K) of the window, zero while there are no false plots."""
         halves, dt, c = np.zeros((len(self.window), spec.scans)), self.scan_period_s(spec), record(self.world, spec)
-        u, no_noise = (), (0.0,) * self.normals[2]
+        u, no_noise, missed = (), (0.0,) * self.normals[2], 1 - self._probability(spec)
+        most_missed = math.floor(math.log(RARE) / math.log(missed)) if missed > 0 else 0
         for keys in spec.filters:
             steps, numbers = self.kinds[keys.kind], record(self.kinds[keys.kind].design, spec, keys)
             flight = [self.plot(x, u, c, no_noise) for x in self.typical_flight(spec)]
-            s = steps.start(flight[0], u, numbers)
+            states = [steps.start(flight[0], u, numbers)]  # after none, one, two … missed plots
             for k, z in enumerate(flight[1:], 1):
-                s = steps.predict(s, dt, u, numbers)
-                halves[:, k] = np.maximum(halves[:, k], MARGIN * np.array(steps.gate(s, u, numbers)))
-                s = steps.update(s, ((1.0, z),), u, numbers)
+                states = [steps.predict(s, dt, u, numbers) for s in states]
+                gates = [halves[:, k] / MARGIN, *(steps.gate(s, u, numbers) for s in states)]
+                halves[:, k] = MARGIN * np.max(gates, axis=0)
+                after_missed = [steps.update(s, (), u, numbers) for s in states[:most_missed]]
+                states = [steps.update(states[0], ((1.0, z),), u, numbers), *after_missed]
         halves[:, dt * np.arange(spec.scans) < (self.false_plots_from_s(spec) or 0.0)] = 0.0
         return halves
 

@@ -109,6 +109,10 @@ class Straight(Flight):
 class Turn(Flight, radial_keys.Turn):
     """Straight flight, a turn of constant load, straight flight again."""
 
+    acceleration_g: Number = key(
+        "acceleration", "lateral, standard gravities; positive: to the right", unit="g", symbol="a"
+    )
+
 
 class FlyBy(Flight, radial_keys.FlyBy):
     """Straight flight past the radar."""
