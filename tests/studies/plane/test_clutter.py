@@ -10,7 +10,7 @@ from tests.studies.plane.test_filters import MOVED, SIZE, assert_close, assert_n
 CLUTTER = {
     "repetition_rate_hz": 40e3,
     "false_plots_per_km2": 0.06,
-    "false_plots_from_s": 12.0,
+    "false_plots_from_s": 22.0,
     "sigma_bearing_rad": 3e-3,
 }
 FEW = [
@@ -54,7 +54,7 @@ def compare(filters, n, first=0):
 
 
 def test_tracks_among_false_plots_are_the_twins():
-    lost, wrong = compare(FEW, 10, first=96)
+    lost, wrong = compare(FEW, 10, first=32)
     assert lost >= len(FEW)
     assert wrong > 0
 

@@ -18,7 +18,7 @@ RADAR = {
     "detection_probability": DETECTION,
     "repetition_rate_hz": 4000.0,
     "false_plots_per_km2": 0.04,
-    "false_plots_from_s": 12.0,
+    "false_plots_from_s": 22.0,
 }
 IMPROBABLE = 2 * stats.norm.sf(Z)
 
