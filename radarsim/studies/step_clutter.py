@@ -114,8 +114,8 @@ class ClutteredStudy(StepStudy):
             states = [steps.start(flight[0], u, numbers)]  # after none, one, two … missed plots
             for k, z in enumerate(flight[1:], 1):
                 states = [steps.predict(s, dt, u, numbers) for s in states]
-                gates = [halves[:, k] / MARGIN, *(steps.gate(s, u, numbers) for s in states)]
-                halves[:, k] = MARGIN * np.max(gates, axis=0)
+                gates = np.array([steps.gate(s, u, numbers) for s in states])
+                halves[:, k] = np.maximum(halves[:, k], MARGIN * gates.max(axis=0))
                 after_missed = [steps.update(s, (), u, numbers) for s in states[:most_missed]]
                 states = [steps.update(states[0], ((1.0, z),), u, numbers), *after_missed]
         halves[:, dt * np.arange(spec.scans) < (self.false_plots_from_s(spec) or 0.0)] = 0.0
