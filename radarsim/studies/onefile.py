@@ -273,7 +273,7 @@ class OneFile(Study):
     def last_columns(self, result: "CaseResult") -> Mapping[str, Any]:
         """σ at the last scan, of a study in one file.
 
-        last_sigma ± last: σ at the last scan
+        last_sigma ±: σ at the last scan
         exact_last_sigma: its exact value, where it is known"""
         import numpy as np
 

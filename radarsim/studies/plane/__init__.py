@@ -354,7 +354,7 @@ class Plane(ClutteredStudy):
         Component("v", "m/s", "$v$", "speed"),
         Component("course", "rad", "$\\psi$", "course"),
     )
-    extra_figures = (*ClutteredStudy.extra_figures, "sigma_across")
+    extra_figures = (*ClutteredStudy.extra_figures, "position")
     parts, Filter = {"radar": Radar, "target": Straight | Turn | FlyBy}, Filter
     scan_period = "radar.scan_period_s"
     measured = (
@@ -422,10 +422,10 @@ class Plane(ClutteredStudy):
         columns = {"sigma_m": "sigma", "sigma_m_lo": "sigma_lo", "sigma_m_hi": "sigma_hi"}
         rows = tables["position"].rename(columns=columns).assign(exact_sigma=np.nan)
         groups = common.group_by(rows, "case", "filter", "component")
-        names = case_selection.cases_for_figure(experiment, "sigma_across")
+        names = case_selection.cases_for_figure(experiment, "position")
         visible, remark = case_selection.select_cases_by_panel(results, names)
-        across = time_figures.sigma_figure("sigma_across", visible, groups, ACROSS)
-        return {**figures, "sigma_across": replace(across, caption=across.caption + remark)}
+        across = time_figures.sigma_figure("position", visible, groups, ACROSS)
+        return {**figures, "position": replace(across, caption=across.caption + remark)}
 
     def fitted(self, filter_keys):
         noise = "sigma_jerk_mps3" if filter_keys.model == "acceleration" else "sigma_acceleration_mps2"
