@@ -326,7 +326,7 @@ class StepStudy(OneFile):
             columns, truth = plots.rows(0), plots.truth[0]
             try:
                 with np.errstate(all="ignore"):
-                    estimate = self.tracker(plan.case).feed(columns).estimate
+                    estimate = Tracker(self, plan.case.spec).feed(columns).estimate
             except ConfigError:  # a division by zero
                 estimate = np.full_like(plan.axes.exact_sigma, np.nan)
             errors = np.stack(self.difference(np.moveaxis(estimate, -1, 0), truth.T), axis=-1)

@@ -18,6 +18,7 @@ from radarsim.config.key_types import Correlation, Flag, NonNegative, Number, Po
 from radarsim.config.model import Model
 from radarsim.config.study_keys import Member
 from radarsim.constants import STANDARD_GRAVITY_MPS2
+from radarsim.errors import ConfigError
 from radarsim.kernels import gaussian_filters
 from radarsim.kernels.formula_functions import atan2, cos, exp, log, sin, uniform_pairs, wrap_angle
 from radarsim.kernels.planar_motion import predict
@@ -426,6 +427,14 @@ class Plane(ClutteredStudy):
         visible, remark = case_selection.select_cases_by_panel(results, names)
         across = time_figures.sigma_figure("position", visible, groups, ACROSS)
         return {**figures, "position": replace(across, caption=across.caption + remark)}
+
+    def tracker(self, case):
+        if self.false_normals(case.spec):
+            for i, keys in enumerate(case.spec.filters):
+                if keys.association == "known":
+                    reason = "recorded plots do not say which is the target's: give nearest or pda"
+                    raise ConfigError(f"filters.{i}.association: known: {reason}")
+        return super().tracker(case)
 
     def fitted(self, filter_keys):
         noise = "sigma_jerk_mps3" if filter_keys.model == "acceleration" else "sigma_acceleration_mps2"

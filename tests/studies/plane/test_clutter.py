@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from radarsim.errors import ConfigError
+from radarsim.studies.registry import study
 from tests.studies.plane import naive
 from tests.studies.plane.cases import STRAIGHT, case_of, member, plots_of, run_of
 from tests.studies.plane.test_filters import MOVED, SIZE, assert_close, assert_nees_close, difference
@@ -63,3 +65,8 @@ def test_tracks_among_false_plots_are_the_twins():
 @pytest.mark.parametrize("filters", MORE, ids=lambda filters: filters[0]["name"])
 def test_tracks_of_more_filters_are_the_twins(filters):
     compare(filters, 20)
+
+
+def test_recorded_plots_do_not_say_which_is_the_targets():
+    with pytest.raises(ConfigError, match=r"filters\.0\.association: known: .*: give nearest or pda"):
+        study("plane").tracker(case_of([member("extended", association="known")], STRAIGHT, 10, **CLUTTER))

@@ -135,15 +135,9 @@ def likeliest(w, max_count, min_ratio):
 
 
 @kernel
-def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outliers, span):
-    """Update with a velocity v of variance R; returns states and weights, the likeliest first, the logarithm of the
-    density of v over all hypotheses and folds, and the probability that v is no outlier. P is updated in place.
-
-    max_fold: folds to either side of the nearest that are tried; -1: none, v is not folded. merge: hypotheses are
-    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. outliers
-    (4,): near ones are normal, the offset a part of their width; far ones uniform over the span D of folded velocities,
-    or `span` of the data; merged by moments."""
-    updated_P, gain, S = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), R, 1.0)
+def fold_innovations(x, w, v, D, max_fold, S):
+    """The innovations (n, folds) of a velocity v for each hypothesis and fold, and the logarithms of their weights with
+    a predicted variance S; max_fold as for `take_velocity`."""
     n, folds = w.size, 2 * max(max_fold, 0) + 1
     e, weight = np.empty((n, folds)), np.empty((n, folds))
     for i in range(n):
@@ -153,6 +147,21 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outli
         for j in range(folds):
             e[i, j] = innovation + D * (j - folds // 2)
             weight[i, j] = w[i] - e[i, j] * e[i, j] / (2.0 * S)
+    return e, weight
+
+
+@kernel
+def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outliers, span):
+    """Update with a velocity v of variance R; returns states and weights, the likeliest first, the logarithm of the
+    density of v over all hypotheses and folds, and the probability that v is no outlier. P is updated in place.
+
+    max_fold: folds to either side of the nearest that are tried; -1: none, v is not folded. merge: hypotheses are
+    merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. outliers
+    (4,): near ones are normal, the offset a part of their width; far ones uniform over the span D of folded velocities,
+    or `span` of the data; merged by moments."""
+    updated_P, gain, S = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), R, 1.0)
+    e, weight = fold_innovations(x, w, v, D, max_fold, S)
+    n, folds = e.shape
     log_norm, soundness = 0.5 * np.log(2.0 * np.pi * S), 1.0
     if outliers[NEAR] + outliers[FAR] > 0.0:
         T = S + (outliers[OFFSET] * outliers[OFFSET] + outliers[SPREAD] * outliers[SPREAD]) * R
