@@ -65,7 +65,9 @@ def answer(
     of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name, scans)]
     filters = [(result, name) for result in reported for name in _reported_filters(result)]
     remedies = remedy_answer.remedy_sentence(filters, tables_by_name)
-    return [*of_all_cases[:1], *of_cases, *remedies, _prior_sentence(results), *map(Sentence, remark)]
+    if not (answered := [*of_all_cases[:1], *of_cases, *remedies]):
+        return list(map(Sentence, remark))
+    return [*answered, _prior_sentence(results), *map(Sentence, remark)]
 
 
 def _prior_sentence(results: Sequence[Result]) -> Sentence:

@@ -73,7 +73,7 @@ def test_answer_names_the_scan_from_which_folded_velocity_is_as_good(result):
     experiment = load("ambiguous_rls4")
     folded = registry.study("ambiguous_doppler")
     assert folded.question(experiment) == "How much does ambiguous Doppler help RLS 4, and from which scan on?"
-    (sentence,) = answer_texts(folded, result.cases, result.tables)
+    sentence, _ = answer_texts(folded, result.cases, result.tables)
     assert sentence.startswith("RLS 4, D = 15 m/s, memory: ")
     assert "all folds are right in" in sentence
 
@@ -87,7 +87,7 @@ def test_orders_and_their_sentence():
     assert len(result.tables["folds"]) == 0
     sentences = answer_texts(registry.study("ambiguous_doppler"), result.cases, result.tables)
     first, *sentences = sentences
-    assert len(sentences) == 3
+    assert len(sentences) == 4
     assert all("the best combination" in sentence for sentence in sentences)
     study, curves = registry.study("ambiguous_doppler"), result.curves.query("component == 'r'")
     scans = {case.name: result_scans(study, case) for case in result.cases}
@@ -132,8 +132,9 @@ def test_interval_around_five_percent_is_not_called_above(result, ends, words):
     gains.loc[
         last, ["excess_over_oracle_percent", "excess_over_oracle_percent_lo", "excess_over_oracle_percent_hi"]
     ] = ends
-    (sentence,) = answer_texts(registry.study("ambiguous_doppler"), result.cases, {**result.tables, "gains": gains})
+    sentence, prior = answer_texts(registry.study("ambiguous_doppler"), result.cases, {**result.tables, "gains": gains})
     assert words in sentence
+    assert prior.startswith("Prior of the filters: ")
 
 
 @pytest.mark.parametrize("combine", [False, True])
@@ -161,13 +162,16 @@ def test_mean_of_fan_is_the_estimate():
 
 @pytest.mark.parametrize("keys", [(), ("radar.detection_probability=0.7",), ("radar.repetition_rate_hz=[1000, 1200]",)])
 def test_track_over_simulated_plots_equals_the_study(keys):
-    """Recorded at the config's own times, the trackers' estimates are those of the kernels."""
+    """Recorded at the config's own times, the trackers' estimates are those of the kernels. The prior of a run is that
+    of the first scan, of a recording that of the first plot: compared is a realisation with a plot at the first scan."""
     case = load("ambiguous_rls4", [*keys, "filters.2.hypotheses=2"]).cases[0]
     plan = study.prepare(case)
     plots, out = realisations.simulate_outputs(plan.world, plan.banks, 8)
-    columns = recorded_plots.FoldedRecordedPlots().simulated(case, 11)
+    recorded = [recorded_plots.FoldedRecordedPlots().simulated(case, 8 + lane) for lane in range(8)]
+    lane = next(lane for lane in range(3, 8) if np.isfinite(recorded[lane]["range_m"][0]))
+    columns = recorded[lane]
     is_detected = ~np.isnan(columns["range_m"])
-    assert np.array_equal(columns["range_m"][is_detected], plots[is_detected, 0, 3])
+    assert np.array_equal(columns["range_m"][is_detected], plots[is_detected, 0, lane])
     assert (np.abs(columns["velocity_mps"][is_detected]) <= plan.world.spans[is_detected] / 2).all()
     recorded_columns = columns | {"velocity_mps": columns["velocity_mps"].copy()}
     tracks = tracking.Tracker(case).feed(recorded_columns)
@@ -176,7 +180,7 @@ def test_track_over_simulated_plots_equals_the_study(keys):
     assert set(names) - set(tracks.filters) == {"oracle"}  # recorded velocities are folded
     for f, name in enumerate(tracks.filters):
         bank, field = (by_filter[names.index(name)] for by_filter in (plan.banks.bank, plan.banks.estimate_field))
-        difference = np.abs(tracks.estimate[f] - out[bank, :, field : field + 3, 3])[started]
+        difference = np.abs(tracks.estimate[f] - out[bank, :, field : field + 3, lane])[started]
         assert (difference <= tolerances(case, is_detected)[0]).all()
         assert np.isnan(tracks.estimate[f][~started]).all()
 
