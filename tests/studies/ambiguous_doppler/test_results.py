@@ -97,7 +97,7 @@ def test_orders_and_their_sentence():
     singles = largest[["order 0", "order 1", "order 2", "order 2 range only"]]
     text = "Least σ of the range at worst, after the start of the track, in 3 cases: "
     assert first.startswith(f"{text}{largest.idxmin()}, ")
-    assert f"the best single order, {singles.idxmin()}, comes to " in first
+    assert f"the best single model order, {singles.idxmin()}, comes to " in first
     assert {"orders", "sigma_r"} <= set(result.figures)
 
 
