@@ -2,7 +2,6 @@
 
 import functools
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -87,12 +86,3 @@ def atan2(y: Any, x: Any) -> Any:
 def wrap_angle(angle: Any) -> Any:
     """An angle less whole turns, from -π to π."""
     return angle - nearest(angle * (1 / math.tau)) * math.tau
-
-
-def uniform_pairs(normals: Sequence[Any]) -> list[Any]:
-    """Independent numbers, even from 0 to 1, of as many independent unit normals, whose number is even: the two polar
-    coordinates of each pair, in probability."""
-    uniforms = []
-    for a, b in zip(normals[::2], normals[1::2], strict=True):
-        uniforms += [exp(-(a * a + b * b) / 2), atan2(b, a) / math.tau + 0.5]
-    return uniforms

@@ -12,7 +12,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from radarsim.kernels.formula_functions import exp, log
-from radarsim.kernels.small_matrices import add, cholesky, congruence, dot, invert, outer_square, row_of, times
+from radarsim.kernels.packed_matrices import add, cholesky, invert, outer_square
+from radarsim.kernels.small_matrices import congruence, dot, row_of, times
 from radarsim.kernels.tracing import maximum, minimum, sqrt, where
 
 CENTRE = 1 / 3  # weight of the central sigma point

@@ -8,7 +8,8 @@ from typing import Any
 
 from radarsim.kernels.formula_functions import cos, sin
 from radarsim.kernels.gaussian_filters import State
-from radarsim.kernels.small_matrices import add, congruence, dot
+from radarsim.kernels.packed_matrices import add
+from radarsim.kernels.small_matrices import congruence, dot
 from radarsim.kernels.tracing import where
 
 SIZES = {"velocity": 4, "acceleration": 6, "turn": 5}  # numbers of a state by what is constant

@@ -10,7 +10,8 @@ from typing import Any
 
 from radarsim.kernels.formula_functions import atan2, cos, exp, sin, wrap_angle
 from radarsim.kernels.gaussian_filters import Law, State
-from radarsim.kernels.small_matrices import add, row_of
+from radarsim.kernels.packed_matrices import add
+from radarsim.kernels.small_matrices import row_of
 from radarsim.kernels.tracing import sqrt
 
 

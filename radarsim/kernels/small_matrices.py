@@ -4,7 +4,7 @@ import functools
 from collections.abc import Sequence
 from typing import Any
 
-from radarsim.kernels.tracing import UnsupportedFormula, case_value, minimum, sqrt
+from radarsim.kernels.tracing import UnsupportedFormula, case_value, minimum
 
 
 def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
@@ -13,14 +13,14 @@ def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
 
 
 @functools.cache
-def row_places(n: int, i: int) -> tuple[int, ...]:
+def _row_places(n: int, i: int) -> tuple[int, ...]:
     """The places of row i in a packed symmetric matrix of n rows."""
     return tuple(min(i, j) * n - min(i, j) * (min(i, j) + 1) // 2 + max(i, j) for j in range(n))
 
 
 def row_of(P: Sequence[Any], n: int, i: int) -> tuple[Any, ...]:
     """Row i of a packed symmetric matrix of n rows."""
-    return tuple([P[place] for place in row_places(n, i)])
+    return tuple([P[place] for place in _row_places(n, i)])
 
 
 def times(P: Sequence[Any], h: Sequence[Any]) -> tuple[Any, ...]:
@@ -32,41 +32,6 @@ def congruence(J: Sequence[Sequence[Any]], P: Sequence[Any]) -> tuple[Any, ...]:
     """J P J', packed, of a packed P and the rows of J."""
     moved = [times(P, row) for row in J]
     return tuple(dot(J[i], moved[j]) for i in range(len(J)) for j in range(i, len(J)))
-
-
-def add(P: Sequence[Any], Q: Sequence[Any]) -> tuple[Any, ...]:
-    """The sum of two packed matrices."""
-    return tuple(a + b for a, b in zip(P, Q, strict=True))
-
-
-def outer_square(e: Sequence[Any]) -> tuple[Any, ...]:
-    """e e', packed."""
-    return tuple(e[i] * e[j] for i in range(len(e)) for j in range(i, len(e)))
-
-
-def invert(S: Sequence[Any], n: int) -> tuple[tuple[Any, ...], Any]:
-    """The inverse of a packed matrix of 2 or 3 rows, and its determinant."""
-    if n == 2:
-        determinant = S[0] * S[2] - S[1] * S[1]
-        return (S[2] / determinant, -S[1] / determinant, S[0] / determinant), determinant
-    a, b, d, e, f, g = S
-    first = e * g - f * f, d * f - b * g, b * f - d * e
-    determinant = a * first[0] + b * first[1] + d * first[2]
-    rest = a * g - d * d, b * d - a * f, a * e - b * b
-    return tuple(cofactor / determinant for cofactor in (*first, *rest)), determinant
-
-
-def cholesky(P: Sequence[Any], n: int) -> list[list[Any]]:
-    """The rows of lower triangular L, L L' = P, of growing length, of a positive packed P."""
-    rows: list[list[Any]] = []
-    for i in range(n):
-        row: list[Any] = []
-        for j in range(i):
-            rest = row_of(P, n, j)[i] - sum(row[k] * rows[j][k] for k in range(j))
-            row.append(rest / rows[j][j])
-        row.append(sqrt(row_of(P, n, i)[i] - sum(a * a for a in row)))
-        rows.append(row)
-    return rows
 
 
 def update(x: Sequence[Any], P: Sequence[Any], h: Sequence[Any], e: Any, R: Any) -> tuple[tuple, tuple]:

@@ -24,8 +24,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.errors import ConfigError
-from radarsim.kernels.formula_functions import exp, uniform_pairs
+from radarsim.kernels.formula_functions import exp
 from radarsim.kernels.tracing import where
+from radarsim.kernels.uniform_numbers import uniform_pairs
 from radarsim.language.translate import join_names, tr
 from radarsim.studies.step_checks import record
 from radarsim.studies.stepwise import StepStudy

@@ -146,7 +146,8 @@ def test_page_is_whole_and_leads_nowhere(written):
 def test_the_figure_of_the_first_sentence_of_the_answer_bears_it_and_no_other_does(written):
     def of(name):
         """The texts of a figure, one after the other."""
-        return " ".join(re.findall(r"<text[^>]*>([^<]*)</text>", (written.folder / name).read_text()))
+        text = (written.folder / name).read_text().replace("\u00a0", " ")
+        return " ".join(re.findall(r"<text[^>]*>([^<]*)</text>", text))
 
     first, *others = re.findall(r"^## (\w+)$", (written.folder / "figures/captions.md").read_text(), re.MULTILINE)
     sentence = page_sentences.headline(written.answer)

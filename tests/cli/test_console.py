@@ -215,8 +215,8 @@ def test_list_is_one_screen_and_takes_words(tmp_path, monkeypatch):
 
     shown = listed().splitlines()
     assert sum(len(console.wrap_line(line, 80)) for line in shown) <= 24
-    assert [line.split("  ")[0] for line in shown[1:5]] == ["P1", "P2", "P3", "P4"]
-    names = [name for line in shown[1:5] for name in line[4:].split(", ")]
+    assert [line.split("  ")[0] for line in shown[1:6]] == ["P1", "P2", "P3", "P4", "plane"]
+    names = [name for line in shown[1:6] for name in line.partition("  ")[2].split(", ")]
     assert sorted(names) == list(find_files.available_stems("configs"))
     assert {"rls2", "ambiguous", "orders"} <= set(shown[1][4:].split(", "))
     assert shown[0].startswith(f"{len(names)} configs ")

@@ -68,7 +68,7 @@ solve rls2 key --gain --filter r+Vr --equals 5 => '--gain': must be followed by 
 SHOWN = """
 check range_doppler -n 1e7 => valid | rls1 | rls5 | 10,000,000 | MB
 check rls2 -n 4000 --precision 0.5 => precision not within reach of 1 case: rls2; -n 128000 would do
-list => rls1 | range_doppler | 26 scenarios | 29 filters
+list => rls1 | range_doppler | 26 scenarios | 31 filters
 list filters => range_doppler | observes: [range, velocity]
 schema => "$schema": "https://json-schema.org/
 """

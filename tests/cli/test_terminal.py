@@ -110,7 +110,7 @@ def test_what_is_piped_stays_in_one_line_and_speaks_english(results, monkeypatch
     lines = capsys.readouterr().out.splitlines()
     assert any(len(line) > WIDTH for line in lines)
     assert lines[0].startswith("P1.18  ")
-    assert re.search(r"off by [\d.]+ margins$", lines[2])
+    assert re.search(r"; measured [\d.]+ \[.*\] %$", lines[2])
 
 
 class Clock:

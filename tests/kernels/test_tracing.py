@@ -204,7 +204,8 @@ def test_what_is_done_twice_stands_once_and_words_change_no_program():
 
 # ---- what authors may use, as the how-to has it ----
 PAGE = (Path(__file__).parents[2] / "docs/howto/own_study.md").read_text(encoding="utf-8")
-INNER = {  # of the program
+INNER = {
+    "plain",  # of the program
     *("case_value", "count_numbers", "eliminate", "is_number", "leaves"),
     *("map_numbers", "power_of_two", "with_float_numbers"),
 }

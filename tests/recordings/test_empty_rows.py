@@ -130,6 +130,7 @@ def test_empty_rows_change_no_estimate_of_a_step_study():
     study = SimpleNamespace(
         name="steps", kinds={"kalman": steps}, measured=(authoring.MeasuredColumn("x_m", "m", ()),), known_columns=(),
         components=(authoring.Component("x", "m", "$x$", "x"),), scan_period_s=lambda spec: 4.0,
+        false_normals=lambda spec: 0, columns=lambda spec, keys: ("x_m",),
     )  # fmt: skip
     spec = SimpleNamespace(filters=[SimpleNamespace(name="kalman", kind="kalman")])
     columns = {"t_s": 4.0 * np.arange(40), "x_m": np.random.default_rng(2).normal(0, 5, 40)}

@@ -20,7 +20,8 @@ from radarsim.config.study_keys import Member
 from radarsim.constants import STANDARD_GRAVITY_MPS2
 from radarsim.errors import ConfigError
 from radarsim.kernels import gaussian_filters
-from radarsim.kernels.formula_functions import atan2, cos, exp, log, sin, uniform_pairs, wrap_angle
+from radarsim.kernels.formula_functions import atan2, cos, exp, log, sin, wrap_angle
+from radarsim.kernels.packed_matrices import add
 from radarsim.kernels.planar_motion import predict
 from radarsim.kernels.polar_plots import (
     converted,
@@ -32,8 +33,9 @@ from radarsim.kernels.polar_plots import (
     speed_and_course_rows,
     state_of_plot,
 )
-from radarsim.kernels.small_matrices import add, congruence, dot, times, update
+from radarsim.kernels.small_matrices import congruence, dot, times, update
 from radarsim.kernels.tracing import maximum, minimum, sqrt, where
+from radarsim.kernels.uniform_numbers import uniform_pairs
 from radarsim.report.quantities import Component
 from radarsim.studies.onefile import MeasuredColumn
 from radarsim.studies.step_clutter import ClutteredStudy
@@ -347,7 +349,7 @@ class Plane(ClutteredStudy):
     name, about = "plane", "Range, bearing and radial velocity in the plane, among false plots."
     asks = "What is Doppler worth in the plane?"
     filters = MappingProxyType(
-        {"kind": "extended, unscented, converted or imm", "model": "velocity, acceleration, turn"}
+        {"kind": "extended, unscented, converted or imm", "model": "velocity, acceleration or turn"}
     )
     components = (
         Component("r", "m", "$r$", "range"),

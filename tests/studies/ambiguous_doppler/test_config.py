@@ -27,9 +27,9 @@ from radarsim.studies import registry
         ("filters.3.doppler", "remainder", "filters.3.merge: belongs to doppler: folded, not remainder"),
         ("filters.1.doppler", "remainder", "filters.1.doppler: remainder needs several rates in radar.repetition_rate"),
         ("filters.5.stay_probability", "0.9", "filters.5.stay_probability: belongs to combine: likelihood"),
-        ("radar.repetition_rate_hz", "1", "radar.repetition_rate_hz: its span must be at least 0.03 m/s"),
+        ("radar.repetition_rate_hz", "1", "repetition_rate_hz: its unambiguous interval must be at least 0.03 m/s"),
         ("radar.sigma_velocity_mps", "1e17",
-         "its span must be at least 1e+13 m/s, radar.sigma_velocity_mps over 10000"),
+         "its unambiguous interval must be at least 1e+13 m/s, radar.sigma_velocity_mps over 10000"),
         ("radar.repetition_rate_hz", "0", "radar.repetition_rate_hz: must be > 0, got 0"),
         ("radar.repetition_rate_hz", "[1000, 1200, 1000]", "radar.repetition_rate_hz: must differ from rate to rate: "),
         ("radar.repetition_rate_hz", "[]", "radar.repetition_rate_hz: must hold at least 1"),
@@ -93,7 +93,8 @@ def test_short_span_warns_and_runs():
     study = registry.study("ambiguous_doppler")
     assert study.warnings(load("ambiguous_rls4")) == []
     (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=120"]))
-    assert line.startswith("ambiguous_rls4: radar.repetition_rate_hz: its span of 1.8 m/s is under 2 σ_V, 2 m/s")
+    interval = "its unambiguous interval of 1.8 m/s"
+    assert line.startswith(f"ambiguous_rls4: radar.repetition_rate_hz: {interval} is under 2 σ_V, 2 m/s")
     (line,) = study.warnings(load("ambiguous_rls4", ["radar.repetition_rate_hz=[120, 1000]"]))
     assert "1.8 m/s" in line
     assert study.warnings(load("orders", ["radar.repetition_rate_hz=1"])) == []  # nothing there is folded

@@ -163,7 +163,7 @@ def test_mean_of_fan_is_the_estimate():
 @pytest.mark.parametrize("keys", [(), ("radar.detection_probability=0.7",), ("radar.repetition_rate_hz=[1000, 1200]",)])
 def test_track_over_simulated_plots_equals_the_study(keys):
     """Recorded at the config's own times, the trackers' estimates are those of the kernels. The prior of a run is that
-    of the first scan, of a recording that of the first plot: compared is a realisation with a plot at the first scan."""
+    of the first scan, of a recording that of the first plot: the realisation has a plot at the first scan."""
     case = load("ambiguous_rls4", [*keys, "filters.2.hypotheses=2"]).cases[0]
     plan = study.prepare(case)
     plots, out = realisations.simulate_outputs(plan.world, plan.banks, 8)
