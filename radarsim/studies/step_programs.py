@@ -130,8 +130,7 @@ def trace_filter(
         trace.write(kernels_steps.STATE, s)
         estimate = traced_step(steps.estimate, s, u, c)
         check_length(steps.estimate, estimate, n, "components")
-        e = traced_step(study.difference, estimate, true)
-        check_length(study.difference, e, n, "components")
+        e = study.difference(estimate, true)
         counts = trace.rows(kernels_steps.COUNTED, 0.0) > 0.5
         rows = tracing.count_numbers(s)
         if scene.false:

@@ -11,7 +11,6 @@
         def move(self, x, dt, c, w): …              # the state after dt seconds; (self, x, dt, c, w, t): at time t, s
         def plot(self, x, u, c, w): …               # the numbers of a plot; u: what is known at the scan
         def truth(self, x, u, c): …                 # the components of the state; where not given, the state itself
-        def difference(self, estimate, true): …     # the errors of the components; where not given, less the truth
 
     class Ekf(Steps):
         def design(spec, filter_keys): …            # the numbers of a filter by its keys, a record
@@ -55,6 +54,7 @@ from radarsim.config.study_keys import possible_kinds
 from radarsim.engine.results import Axes, CaseResult
 from radarsim.engine.sums import Layout
 from radarsim.errors import ConfigError
+from radarsim.kernels.formula_functions import wrap_angle
 from radarsim.studies.noise import noise_key
 from radarsim.studies.onefile import OneFile
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots, true_column
@@ -142,8 +142,10 @@ class StepStudy(OneFile):
         return tuple(x)
 
     def difference(self, estimate: Any, true: Any) -> tuple[Any, ...]:
-        """The errors of the components, of their estimates. Default: these less the truth; an angle wraps."""
-        return tuple(a - b for a, b in zip(estimate, true, strict=True))
+        """The errors of the components: estimates less the truth, of an angle less whole turns."""
+        errors = (a - b for a, b in zip(estimate, true, strict=True))
+        units = (component.unit for component in self.components)
+        return tuple(wrap_angle(e) if unit == "rad" else e for e, unit in zip(errors, units, strict=True))
 
     def detection(self, spec: Any) -> float:
         """The probability of a plot after the first. Default: certain."""

@@ -219,7 +219,7 @@ def design(spec, keys):
     )  # fmt: skip
 
 
-def apart(z, mean, c):
+def plot_difference(z, mean, c):
     """A plot less another, or less the expected one: the numbers that the filter uses."""
     position = z[0] - mean[0], wrap_angle(z[1] - mean[1])
     return (*position, fold(z[2] - mean[2], c.span)) if c.m == 3 else position
@@ -228,7 +228,9 @@ def apart(z, mean, c):
 def law_of_plot(state, c):
     """The law of a plot under a state, with nothing of the velocity where its fold is not known."""
     if c.kind == "unscented":
-        mean, S, C = gaussian_filters.unscented_law(state, lambda x: polar(x)[: c.m], lambda a, b: apart(a, b, c))
+        mean, S, C = gaussian_filters.unscented_law(
+            state, lambda x: polar(x)[: c.m], lambda a, b: plot_difference(a, b, c)
+        )
     else:
         mean, S, C = gaussian_filters.linearised_law(state[1], polar(state[0])[: c.m], polar_rows(state[0])[: c.m])
     R = errors_covariance(c.sigma, c.rho)
@@ -240,24 +242,24 @@ def law_of_plot(state, c):
     return mean, (S[0], S[1], with_r, S[3], with_b, S[5]), (C[0], C[1], tuple(with_state))
 
 
-def taken(state, z, density, c):
+def take_plots(state, z, density, c):
     """A state after the plots of a scan, and their association. z: the plot, or among false plots, of a density per m²,
     the places for plots."""
     mean, S, _ = law = law_of_plot(state, c)
     if c.in_clutter:
         false_to_missed = c.missed * density * mean[0] / (c.span if c.m == 3 else 1.0)  # per m, rad and m/s
-        plots = [(there, apart(plot, mean, c)) for there, plot in z]
+        plots = [(there, plot_difference(plot, mean, c)) for there, plot in z]
         association = gaussian_filters.associate(plots, S, c.keys.association, c.gate, false_to_missed)
     else:
-        association = gaussian_filters.take_plot(apart(z, mean, c), S)
+        association = gaussian_filters.take_plot(plot_difference(z, mean, c), S)
     if c.kind != "converted":
         return gaussian_filters.take(state, law, association), association
     if c.in_clutter:
         z = tuple(a + b for a, b in zip(mean, association.e, strict=True))
-    return where(association.has_plot > 0.5, taken_converted(state, z, c), state), association
+    return where(association.has_plot > 0.5, take_converted_plot(state, z, c), state), association
 
 
-def taken_converted(state, z, c):
+def take_converted_plot(state, z, c):
     """A state after a plot that is converted to x and y, then after its radial velocity."""
     position, R = converted(z, c.sigma, c.keys.unbiased)
     e = position[0] - state[0][0], position[1] - state[0][1]
@@ -304,10 +306,10 @@ class Tracking(Steps):
         if c.in_clutter:
             density = where(history[3] > c.clear - 0.5, c.density, 0.0)
         if c.kind == "imm":
-            (first, association), (second, other) = (taken(state, z, density, c) for state in states[:2])
+            (first, association), (second, other) = (take_plots(state, z, density, c) for state in states[:2])
             states = first, second, gaussian_filters.probability_after(states[2], association, other)
         else:
-            states, association = taken(states, z, density, c)
+            states, association = take_plots(states, z, density, c)
         if c.in_clutter:
             was_confirmed, _, seen, scan = history
             plots, has_plot = association.has_plot + sum(seen), association.has_plot
@@ -327,7 +329,7 @@ class Tracking(Steps):
     def log_densities(s, z, u, c):
         states, weights = (s[0][:2], (s[0][2], 1 - s[0][2])) if c.kind == "imm" else (s[:1], (1.0,))
         laws = [law_of_plot(state, c) for state in states]
-        by_model = [gaussian_filters.log_densities(apart(z, mean, c), S) for mean, S, _ in laws]
+        by_model = [gaussian_filters.log_densities(plot_difference(z, mean, c), S) for mean, S, _ in laws]
         return [log(maximum(dot(weights, [exp(a) for a in logs]), 1e-300)) for logs in zip(*by_model, strict=True)]
 
     def gate(s, u, c):
@@ -453,7 +455,6 @@ class Plane(ClutteredStudy):
         return c.range * cos(c.bearing), c.range * sin(c.bearing), heading
 
     def move(self, x, dt, c, w, t):
-        before = after = 0.0 * dt
         if not c.turns:
             return x[0] + dt * c.speed * cos(x[2]), x[1] + dt * c.speed * sin(x[2]), x[2]
         before = minimum(maximum(c.begins - t + dt, 0.0), dt)
@@ -470,10 +471,6 @@ class Plane(ClutteredStudy):
 
     def truth(self, x, u, c):
         return *polar((x[0], x[1], 0.0, 0.0))[:2], c.speed, wrap_angle(x[2])
-
-    def difference(self, estimate, true):
-        r, b, v, course = (a - b for a, b in zip(estimate, true, strict=True))
-        return r, wrap_angle(b), v, wrap_angle(course)
 
     def false_plots_from_s(self, spec):
         return spec.radar.false_plots_from_s if spec.radar.false_plots_per_km2 else None
