@@ -9,6 +9,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import plural, tr
+from radarsim.report.drawing.model import MAX_PANEL_LINES
 from radarsim.report.key_labels import (
     config_device,
     config_stem,
@@ -22,7 +23,6 @@ from radarsim.report.key_labels import (
 MAX_CASES = 8  # cases of a panel; the others are named in its caption
 MAX_PANELS = 12
 MAX_MISSING_NAMES = 8  # names of what a figure leaves out
-MAX_LINES = 12  # of a panel that several cases of more than FEW_FILTERS share
 FEW_FILTERS = 3  # distinguished by dash, while shades distinguish the cases
 
 
@@ -59,7 +59,7 @@ def group_by_config(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]
     return groups
 
 
-def group_by_panel(results: Sequence[CaseResult], max_lines: float = MAX_LINES) -> dict[str, list[CaseResult]]:
+def group_by_panel(results: Sequence[CaseResult], max_lines: float = MAX_PANEL_LINES) -> dict[str, list[CaseResult]]:
     """Group the cases that share a panel, by the panel's title.
 
     A panel holds the cases of one config; where several keys are swept, those alike in all but the last. Cases with

@@ -9,7 +9,7 @@ from radarsim.language.translate import term, tr
 from radarsim.report import tables as common
 from radarsim.report.case_selection import cases_for_figure, group_by_panel, select_cases_by_panel
 from radarsim.report.drawing.model import Figure, Panel
-from radarsim.report.figure_lines import all_filters, ratio_panel
+from radarsim.report.figure_lines import all_filters, ratio_panels
 from radarsim.report.panel_layout import arrange_columns
 
 if TYPE_CHECKING:
@@ -31,10 +31,11 @@ def consistency_figures(
 def nees_panels(results: Sequence[CaseResult], rows: Mapping) -> list[Panel]:
     """NEES against time, a panel for each config; rows by case, filter and `nees`."""
     filters = all_filters(results)
-    panels = [
-        ratio_panel(title, members, rows, tr(NEES), filters) for title, members in group_by_panel(results).items()
+    return [
+        panel
+        for title, members in group_by_panel(results).items()
+        for panel in ratio_panels(title, members, rows, tr(NEES), filters)
     ]
-    return [panel for panel in panels if len(panel.marks) > 1]
 
 
 def nees_figure(panels: Sequence[Panel], left_out: str) -> Figure:

@@ -19,7 +19,7 @@ from radarsim.report.key_labels import (
     shorten_mapping,
     swept_description,
 )
-from radarsim.report.panel_layout import fitting_axis, time_axis, with_keys
+from radarsim.report.panel_layout import fitting_axis, keyed_panels, time_axis
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -101,11 +101,14 @@ def _shown_value(result: CaseResult, key: str, value: object) -> str:
     return format_degrees(factor * float(str(value))) if is_turned else format_value(value, is_written_as_power(key))
 
 
-def ratio_panel(title: str, members: Sequence[CaseResult], rows: Mapping, label: str, filters: Sequence[str]) -> Panel:
-    """A panel of any quantity of the members about one; rows by case, filter and its column, against t_s."""
+def ratio_panels(
+    title: str, members: Sequence[CaseResult], rows: Mapping, label: str, filters: Sequence[str]
+) -> list[Panel]:
+    """Panels of any quantity of the members about one; rows by case, filter and its column, against t_s."""
     column = next(key[2] for key in rows)
     marks = case_lines(members, rows, column, ("t_s", column), filters)
-    return with_keys(Panel(time_axis(), fitting_axis(label, marks), (Reference(1), *marks), title), members, filters)
+    panel = Panel(time_axis(), fitting_axis(label, marks), (Reference(1), *marks), title)
+    return keyed_panels(panel, members, filters) if marks else []
 
 
 def line_style(nth_filter: int, nth_case: int, cases: int) -> Style:

@@ -9,7 +9,7 @@ from radarsim.engine.results import CaseResult
 from radarsim.language.translate import tr
 from radarsim.report import caption_remarks
 from radarsim.report.case_selection import MAX_MISSING_NAMES
-from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Style
+from radarsim.report.drawing.model import COLUMN_MM, MAX_PANEL_LINES, PAGE_MM, Axis, Figure, Line, Mark, Panel, Style
 from radarsim.report.key_labels import (
     degrees_factor_and_unit,
     escape_dollars,
@@ -20,15 +20,17 @@ from radarsim.report.key_labels import (
 )
 
 WIDE_MM = 120.0  # one panel of many lines
-MAX_LINES_NAMED_AT_ENDS = 6  # lines of one panel named at their ends; if more, by colour and dash
 RARE_LOSS = 0.1  # of a share's loss: below it the loss is drawn logarithmically
 LOG_RATIO = 20  # ratio of values from which an axis is logarithmic
+FLAT_RATIO = 2.0  # ratio of values up to which an axis begins near them: from zero they would fill less than half of it
 NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
 WIDEST_BAND, LOG_MARGIN, MARGIN = 2.0, 1.12, 0.05  # of a shared axis: how far bands count, and room at its ends
 
 
 def with_legend_cell(panels: Sequence[Panel]) -> list[Panel]:
-    """Panels of many lines with one legend in a cell of its own, with names from the lines."""
+    """Panels with one legend in a cell of its own, with names from the lines; unchanged if lines are too many."""
+    if any(len(_lines(panel)) > MAX_PANEL_LINES for panel in panels):
+        return list(panels)
     keys = {mark.label: mark.style for panel in panels for mark in panel.marks if isinstance(mark, Line) and mark.label}
     blank = [
         replace(
@@ -54,9 +56,13 @@ def count_axis(label: str, highest: float) -> Axis:
 
 
 def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
-    """An axis of positive values: logarithmic where the least would otherwise lie on zero."""
+    """An axis of positive values: from zero, or near them if they would fill less than half of it; logarithmic where
+    the least would otherwise lie on zero."""
     values = np.concatenate([np.asarray(mark.y, float) for mark in marks if isinstance(mark, Line)] or [np.ones(1)])
-    values = values[np.isfinite(values) & (values > 0)]
+    values = values[np.isfinite(values) & (values >= 0)]
+    if values.size and 0 < values.max() < FLAT_RATIO * values.min():
+        return Axis(label)
+    values = values[values > 0]
     if not values.size or values.max() <= LOG_RATIO * values.min():
         return Axis(label, limits=(0, None))
     low = NEAR_ZERO * float(values.max())
@@ -103,12 +109,9 @@ def share_y_axis(panels: Sequence[Panel]) -> list[Panel]:
         return list(panels)
     limited = [panel.y for panel in filled if None not in panel.y.limits]
     logarithmic = [panel.y for panel in filled if panel.y.scale == "log"]
-    first_axis = filled[0].y
-    y = (
-        limited
-        or logarithmic
-        or [fitting_axis(first_axis.label, lines) if first_axis.limits == (0, None) else first_axis]
-    )[0]
+    from_zero = [panel.y for panel in filled if panel.y.limits == (0, None)]
+    fitted = fitting_axis(filled[0].y.label, lines) if from_zero else filled[0].y
+    y = (limited or logarithmic or [fitted])[0]
     if not limited:
         y = replace(y, limits=holding(lines, y))
     return [replace(panel, y=y) for panel in panels]
@@ -142,26 +145,36 @@ def arrange_columns(figure: Figure) -> Figure:
     axes = {(panel.y.label, panel.y.scale, panel.y.limits, panel.y.ticks) for panel in panels if panel.marks}
     figure = replace(figure, panels=panels, share_y=count > 1 and len(axes) == 1)
     if count == 1:
-        wide = figure.panels[0].legend == "right"
+        wide = len(_lines(figure.panels[0])) > MAX_PANEL_LINES
         return replace(figure, columns=1, width_mm=WIDE_MM if wide else COLUMN_MM, panel_height_mm=64.0)
     return replace(figure, columns=2 if count in (2, 4) else 3, width_mm=PAGE_MM, panel_height_mm=56.0)
 
 
-def with_keys(panel: Panel, members: Sequence[CaseResult], filters: Sequence[str], baseline: bool = True) -> Panel:
-    """A panel whose legend explains dashes by filter and colours by swept value; few lines are named at their ends.
+def keyed_panels(
+    panel: Panel, members: Sequence[CaseResult], filters: Sequence[str], baseline: bool = True
+) -> list[Panel]:
+    """A panel in which a legend explains dashes by filter, and swept values are named at the ends of the lines; of more
+    lines than a panel can hold, a panel for each filter.
 
     filters as for `case_lines`; baseline: whether to draw the baseline filter."""
     if len(members) == 1:
-        return panel
-    visible_filters = {
+        return [panel]
+    drawn = {
         f for result in members for n, f in enumerate(result.axes.filters) if baseline or n != result.axes.baseline
     }
-    dashes = tuple((escape_dollars(f), Style(0, n, n)) for n, f in enumerate(filters) if f in visible_filters)
-    dashes = dashes if len(dashes) > 1 else ()
-    title = key_title(members[0]) if members[0].swept_values else ""
-    if sum(isinstance(mark, Line) for mark in panel.marks) > MAX_LINES_NAMED_AT_ENDS:
-        return _by_colour(panel, dashes, title)
-    return replace(panel, keys=dashes, line_title=title)
+    names = {n: escape_dollars(f) for n, f in enumerate(filters) if f in drawn}
+    panel = replace(panel, line_title=key_title(members[0]) if members[0].swept_values else "")
+    if len(names) == 1:
+        return [panel]
+    if len(_lines(panel)) <= MAX_PANEL_LINES:
+        return [replace(panel, keys=tuple((name, Style(0, n, n)) for n, name in names.items()))]
+    return [_panel_of_filter(panel, n, name) for n, name in names.items()]
+
+
+def _panel_of_filter(panel: Panel, nth_filter: int, name: str) -> Panel:
+    """A panel with only the lines of one filter."""
+    marks = tuple(mark for mark in panel.marks if not isinstance(mark, Line) or mark.style.dash == nth_filter)
+    return replace(panel, marks=marks, title=", ".join(filter(None, (panel.title, name))))
 
 
 def key_title(result: CaseResult) -> str:
@@ -170,9 +183,6 @@ def key_title(result: CaseResult) -> str:
     return label_with_unit(key_symbol(result, key), degrees_factor_and_unit(key_label(result, key).unit)[1])
 
 
-def _by_colour(panel: Panel, dashes: tuple, title: str) -> Panel:
-    """A panel of many lines: names in a legend beside it, one for each colour and each dash."""
-    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
-    shades = {line.label: Style(line.style.colour, 0) for line in lines}
-    marks = tuple(replace(mark, label="") if isinstance(mark, Line) else mark for mark in panel.marks)
-    return replace(panel, marks=marks, keys=(*shades.items(), *dashes), key_title=title, legend="right")
+def _lines(panel: Panel) -> list[Line]:
+    """The lines of a panel, without its scattered points."""
+    return [mark for mark in panel.marks if isinstance(mark, Line) and mark.style.dash is not None]

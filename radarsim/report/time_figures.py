@@ -20,7 +20,19 @@ from radarsim.report.case_selection import (
     realisations_text,
     select_cases_by_panel,
 )
-from radarsim.report.drawing.model import COLUMN_MM, GREY, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report.drawing.model import (
+    COLUMN_MM,
+    GREY,
+    MAX_PANEL_LINES,
+    PAGE_MM,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Reference,
+    Style,
+)
 from radarsim.report.figure_lines import GAIN, SIGMA, all_filters, case_lines, line_from_rows
 from radarsim.report.key_labels import (
     case_label,
@@ -30,14 +42,7 @@ from radarsim.report.key_labels import (
     sigma_axis_label,
     swept_description,
 )
-from radarsim.report.panel_layout import (
-    MAX_LINES_NAMED_AT_ENDS,
-    WIDE_MM,
-    arrange_columns,
-    fitting_axis,
-    time_axis,
-    with_keys,
-)
+from radarsim.report.panel_layout import WIDE_MM, arrange_columns, fitting_axis, keyed_panels, time_axis
 from radarsim.report.quantities import Component
 from radarsim.report.statistics import Z95
 
@@ -55,8 +60,11 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
     curves is tables.group_by(table, "case", "filter", "component")."""
     groups = group_by_panel(results)
     filters = all_filters(results)
-    panels = [_sigma_panel(title, members, curves, component, filters) for title, members in groups.items()]
-    panels = [panel for panel in panels if panel.marks]
+    panels = [
+        panel
+        for title, members in groups.items()
+        for panel in _sigma_panels(title, members, curves, component, filters)
+    ]
     caption = tr(
         "Root-mean-square error of the {quantity} about the truth against time, of {realisations}.",
         quantity=component.words,
@@ -71,7 +79,7 @@ def with_floor(figure: Figure, curves: "pd.DataFrame", component: str, factor: f
     """A figure of σ of one case, of few lines, with its floor. Of filters that have other plots it is that of those
     with the most."""
     rows = curves[curves["component"].eq(component) & curves["floor"].notna()] if "floor" in curves else curves[:0]
-    if not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MAX_LINES_NAMED_AT_ENDS:
+    if not len(rows) or len(figure.panels) != 1 or len(figure.panels[0].marks) > MAX_PANEL_LINES:
         return figure
     lowest = factor * rows.groupby("t_s", sort=True)["floor"].min()
     (panel,) = figure.panels
@@ -86,12 +94,12 @@ UNDER_UNBIASED = term("Grey: Cramér–Rao bound (CRB) of unbiased estimators.")
 GUIDE = Style(GREY, 0, width_pt=0.8)
 
 
-def _sigma_panel(
+def _sigma_panels(
     title: str, members: Sequence[CaseResult], curves: Mapping, component: Component, filters: Sequence[str]
-) -> Panel:
+) -> list[Panel]:
     marks = case_lines(members, curves, component.name, SIGMA, filters)
     y = fitting_axis(sigma_axis_label(component.symbol, component.unit), marks)
-    return with_keys(Panel(time_axis(), y, tuple(marks), title), members, filters)
+    return keyed_panels(Panel(time_axis(), y, tuple(marks), title), members, filters) if marks else []
 
 
 def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, component: Component) -> Figure:
@@ -114,7 +122,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
         for panel_title, members in group_by_panel(results).items():
             if lines := case_lines(members, gains, component.name, GAIN, filters):
                 panel = Panel(time_axis(), *_cut(y, lines), panel_title)
-                panels.append(with_keys(panel, members, filters, baseline=False))
+                panels += keyed_panels(panel, members, filters, baseline=False)
         return _with_remark_on_losses(arrange_columns(Figure(name, title, caption, tuple(panels))))
     marks = _gain_lines(results, gains, component, has_several_gains)
     # Many long names would cover the lines: the legend is beside the panel.
@@ -188,19 +196,18 @@ def component_figures(
 
 
 def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, component: Component) -> Figure | None:
-    """Dynamic error (bias) and fluctuation error (spread) of one component, a panel for each case that has both. None
-    where no case's bias exceeds its spread anywhere: then σ suffices."""
-    panels: list[Panel] = []
+    """Dynamic error (bias) and fluctuation error (spread) of one component, a panel of each for each case that has
+    both. None where no case's bias exceeds its spread anywhere: then σ suffices."""
+    pairs: list[tuple[Panel, Panel]] = []
     for result in results:
-        filter_rows = [
-            (f, curves[(result.name, f, component.name)])
+        filter_rows = {
+            f: curves[(result.name, f, component.name)]
             for f in result.axes.filters
             if (result.name, f, component.name) in curves
-        ]
-        if any((abs(rows["bias"]) > rows["spread"]).any() for _, rows in filter_rows):
-            panel = _dynamic_panel(result, filter_rows, component)
-            panels.append(replace(panel, keys=()) if panels else panel)
-    if not panels:
+        }
+        if any((abs(rows["bias"]) > rows["spread"]).any() for rows in filter_rows.values()):
+            pairs.append(_dynamic_panels(result, filter_rows, component))
+    if not pairs:
         return None
     caption = tr(
         "Errors of the {quantity} in cases with a mean error above the standard deviation at some time: mean error "
@@ -208,25 +215,28 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
         quantity=component.words,
         realisations=realisations_text(results),
     )
-    titles = [panel.title for panel in panels]
-    caption += left_out_remark(titles, pick_evenly(titles, MAX_PANELS))
+    titles = [panel.title for panel, _ in pairs]
+    pairs = pick_evenly(pairs, MAX_PANELS // 2)
+    caption += left_out_remark(titles, [panel.title for panel, _ in pairs])
     title = tr("Dynamic and fluctuation error of the {quantity}", quantity=component.words)
-    figure = arrange_columns(Figure(name, title, caption, tuple(pick_evenly(panels, MAX_PANELS))))
-    return figure
+    return Figure(name, title, caption, tuple(panel for pair in pairs for panel in pair), 2, PAGE_MM, 56.0)
 
 
-def _dynamic_panel(result: CaseResult, filter_rows: Sequence[tuple], component: Component) -> Panel:
-    marks: list[Mark] = [Reference(0)]
-    for n, (f, rows) in enumerate(filter_rows):
-        t = rows["t_s"].to_numpy()
+def _dynamic_panels(
+    result: CaseResult, filter_rows: "Mapping[str, pd.DataFrame]", component: Component
+) -> tuple[Panel, Panel]:
+    """The panels of bias and of spread of a case, a line for each filter."""
+    biases: list[Mark] = [Reference(0)]
+    spreads: list[Mark] = []
+    for n, (f, rows) in enumerate(filter_rows.items()):
+        t, name, style = rows["t_s"].to_numpy(), escape_dollars(f), Style(n, n, n)
         bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
-        name = escape_dollars(f)
-        marks.append(Line(t, bias, "", Style(n, 0, n), bias - half, bias + half, name=tr("{name}: bias", name=name)))
-        marks.append(
-            Line(t, rows["spread"].to_numpy(), "", Style(n, 1, n), name=tr("{name}: standard deviation", name=name))
-        )
-    keys = [(escape_dollars(f), Style(n, None, n)) for n, (f, _) in enumerate(filter_rows)]
-    keys += [(tr("bias"), Style(0, 0)), (tr("standard deviation"), Style(0, 1))]
+        biases.append(Line(t, bias, name, style, bias - half, bias + half, name=name))
+        spreads.append(Line(t, rows["spread"].to_numpy(), name, style, name=name))
     title = swept_description(result) or config_device(result)
-    y = Axis(label_with_unit(tr("error of {symbol}", symbol=component.symbol), component.unit))
-    return Panel(time_axis(), y, tuple(marks), title, tuple(keys))
+    bias_axis = Axis(label_with_unit(tr("bias of {symbol}", symbol=component.symbol), component.unit))
+    label = label_with_unit(tr("standard deviation of {symbol}", symbol=component.symbol), component.unit)
+    return (
+        Panel(time_axis(), bias_axis, tuple(biases), title),
+        Panel(time_axis(), fitting_axis(label, spreads), tuple(spreads), title),
+    )

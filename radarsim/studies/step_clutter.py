@@ -152,7 +152,7 @@ class ClutteredStudy(StepStudy):
             columns = "t_s", "kept_share", "kept_share_lo", "kept_share_hi"
             marks = tuple(figure_lines.case_lines(members, rows, "", columns, filters))
             panel = Panel(panel_layout.time_axis(), Axis(tr("share of tracks kept")), marks, title)
-            panels.append(panel_layout.with_keys(panel, members, filters))
+            panels += panel_layout.keyed_panels(panel, members, filters)
         caption = tr(
             "Share of tracks that are still the target's, of {realisations}. Bands: 95 % intervals.",
             realisations=case_selection.realisations_text(visible),

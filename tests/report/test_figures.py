@@ -20,7 +20,7 @@ from radarsim.report import (
     wording,
 )
 from radarsim.report.drawing import canvas as drawing_canvas
-from radarsim.report.drawing import line_names, line_points, page_figure, style
+from radarsim.report.drawing import legend_placement, line_names, line_points, page_figure, style
 from radarsim.report.drawing.model import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.studies.range_doppler import figures as range_doppler_figures
@@ -98,6 +98,55 @@ def test_few_lines_are_named_at_their_ends_many_in_a_legend():
     assert len(many.figure.legends[0].get_texts()) == 30
     keyed = drawn(one(line(), keys=(("solid", Style()),), key_title="what"))
     assert keyed.figure.legends[0].get_title().get_text() == "what"
+
+
+@pytest.mark.parametrize("width", [85.0, 120.0, 175.0])
+@pytest.mark.parametrize("panels", [1, 2, 3, 5])
+def test_lines_too_many_for_a_legend_are_named_at_their_ends(panels, width):
+    names = ("r", "r+V, random jerk", "modified and combined", *(f"filter {n}" for n in range(5)))
+    lines = tuple(Line(np.arange(3.0), np.full(3, float(n)), name, Style(n, n, n)) for n, name in enumerate(names))
+    panel = Panel(Axis("x"), Axis("y"), lines, direct=False)
+    figure = Figure("f", "", "", (panel,) * panels, 3, 175.0, 58.0)
+    canvas = drawing_canvas.render(legend_placement.at_width(figure, width))
+    assert not canvas.legends
+    assert canvas.get_figheight() * 25.4 < 297
+    for axes in canvas.axes:
+        assert sorted(text.get_text().replace("\n", " ") for text in axes.texts) == sorted(names)
+        boxes = sorted((text.get_window_extent() for text in axes.texts), key=lambda box: box.y0)
+        assert all(above.y0 > below.y1 - 3 for below, above in pairwise(boxes))
+        assert max(box.x1 for box in boxes) <= canvas.bbox.x1
+
+
+def test_lines_of_several_filters_and_values_have_a_panel_for_each_filter(expected_radar):
+    results = [expected_radar("rls2", 10.0**-n, f"rls2 D={n}") for n in range(1, 6)]
+    component = Component("r", "m", "$r$", "range")
+    figures = {
+        count: time_figures.sigma_figure("sigma_r", chosen, curves_of(chosen), component)
+        for count in (3, 5)
+        if (chosen := results[:count])
+    }
+    (together,) = figures[3].panels
+    assert [name for name, _ in together.keys] == ["r", "r+Vr"]
+    assert [panel.title for panel in figures[5].panels] == ["RLS 2, r", "RLS 2, r+Vr"]
+    assert all(len(panel.marks) == 5 and not panel.keys for panel in figures[5].panels)
+
+
+def curves_of(results):
+    return tables.group_by(tables.curves(results), "case", "filter", "component")
+
+
+def test_an_axis_begins_near_its_curves_if_from_zero_they_would_fill_less_than_half():
+    near, far = (panel_layout.fitting_axis("σ", [curve_of(values)]) for values in ([250, 150], [250, 120]))
+    assert near.limits == (None, None)
+    assert far.limits == (0, None)
+    figure = one(Line(np.arange(2.0), np.array([250.0, 150.0]), "a"))
+    strokes = [curve for curve in drawn(figure).lines if isinstance(curve.get_marker(), tuple)]
+    assert len(strokes) == 1
+    assert len(drawn(replace(figure, panels=(replace(figure.panels[0], y=far),))).lines) == 1
+
+
+def curve_of(values):
+    return Line(np.arange(float(len(values))), np.array(values, float), "a")
 
 
 def test_a_legend_has_the_order_of_the_lines_at_their_ends():
@@ -207,11 +256,11 @@ def test_panels_of_one_column_have_their_own_heights():
 
 
 def test_a_legend_lies_on_no_curve_and_stands_once_a_figure():
-    marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(9))
+    marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(6))
     panel = Panel(Axis("x"), Axis("y"), marks, direct=False)
     canvas = drawing_canvas.render(Figure("f", "", "", (panel,) * 4, columns=2))
     (legend,) = canvas.legends
-    assert len(legend.get_texts()) == 9
+    assert len(legend.get_texts()) == 6
     box = legend.get_window_extent()
     for axes in canvas.axes:
         assert axes.get_legend() is None
@@ -327,12 +376,12 @@ def test_a_line_that_leaves_a_cut_axis_keeps_its_name_within_the_panel():
 
 @pytest.mark.parametrize("wanted", [[0.0, 0.1, 0.2], [0.0, 5.0, 5.1, 9.9], [9.0, 9.1], [3.0]])
 def test_separated(wanted):
-    placed = line_names.spread_positions(np.array(wanted), 1.0, 0.0, 10.0)
+    placed = line_names.spread_positions(np.array(wanted), np.ones(len(wanted) - 1), 0.0, 10.0)
     assert np.all(np.diff(placed) >= 1 - 1e-12)
     assert placed.min() >= 0
     assert placed.max() <= 10
     apart = np.array([1.0, 4.0, 8.0])
-    np.testing.assert_array_equal(line_names.spread_positions(apart, 1.0, 0.0, 10.0), apart)
+    np.testing.assert_array_equal(line_names.spread_positions(apart, np.ones(2), 0.0, 10.0), apart)
 
 
 def test_same_bytes_each_time():
@@ -549,7 +598,7 @@ def test_cases_of_many_filters_have_a_panel_each_where_lines_would_be_too_many(e
     groups = case_selection.group_by_panel(results)
     assert [len(members) for members in groups.values()] == [1] * 7
     assert len(set(groups)) == 7
-    assert [len(members) for members in case_selection.group_by_panel(results[:6]).values()] == [6]
+    assert [len(members) for members in case_selection.group_by_panel(results[:3]).values()] == [3]
     assert len(case_selection.group_by_panel(results, np.inf)) == 1
 
 
@@ -584,16 +633,16 @@ def test_scattered_points_are_all_drawn():
     assert len(curve.get_xdata()) == 60
 
 
-def test_many_lines_have_their_legend_in_a_cell_of_its_own():
-    marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(7))
+def test_several_panels_have_their_legend_in_a_cell_of_its_own():
+    marks = tuple(Line(np.arange(3.0), np.full(3, float(i)), f"filter {i}", Style(i, i, i)) for i in range(6))
     whole = panel_layout.with_legend_cell([Panel(Axis("x"), Axis("y"), marks), Panel(Axis("x"), Axis("y"), marks)])
-    assert [words for words, _ in whole[-1].keys] == [f"filter {i}" for i in range(7)]
+    assert [words for words, _ in whole[-1].keys] == [f"filter {i}" for i in range(6)]
     assert not whole[-1].marks
-    assert [mark.name for mark in whole[1].marks] == [f"filter {i}" for i in range(7)]
+    assert [mark.name for mark in whole[1].marks] == [f"filter {i}" for i in range(6)]
     assert not any(mark.label for panel in whole for mark in panel.marks)
     canvas = drawing_canvas.render(Figure("f", "", "", tuple(whole), columns=2))
     (legend,) = canvas.legends
-    assert [text.get_text() for text in legend.get_texts()] == [f"filter {i}" for i in range(7)]
+    assert [text.get_text() for text in legend.get_texts()] == [f"filter {i}" for i in range(6)]
     assert len(canvas.axes) == 2
 
 

@@ -12,7 +12,9 @@ from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.papers.forest_plot import forest_plot
 from radarsim.report.drawing import canvas as drawing_canvas
-from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Note, Panel
+from radarsim.report.drawing.crowded_panels import with_names_at_ends
+from radarsim.report.drawing.legend_placement import plan_legends
+from radarsim.report.drawing.model import COLUMN_MM, MAX_PANEL_LINES, PAGE_MM, Axis, Figure, Line, Note, Panel
 from radarsim.report.drawing.style import MM, PNG_DPI
 from tests.report.test_claims_page import row
 
@@ -93,8 +95,24 @@ def test_a_width_at_which_words_would_be_cut_is_increased_and_said(tmp_path):
     assert f"figure sigma_r: drawn {width_mm:.0f} mm wide, as words would be cut at 20 mm" in result.warnings
 
 
+def crowded_panels(figure):
+    """The panels of a figure with more lines than a legend can explain, none of them named at its end."""
+    plan = plan_legends(with_names_at_ends(figure))
+    named = [
+        [mark for mark in panel.marks if isinstance(mark, Line) and mark.style.dash is not None and mark.name]
+        for panel in plan.panels
+    ]
+    return [
+        panel.title
+        for panel, lines, ends in zip(plan.panels, named, plan.at_ends, strict=True)
+        if len(lines) > MAX_PANEL_LINES and not ends
+    ]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("config", CONFIGS)
-def test_no_figure_of_a_shipped_config_is_cut(config):
-    result = run(config, realisations=200)
-    assert faults_of_widths(result._figures_by_name) == []
+def test_no_figure_of_a_shipped_config_is_cut_or_crowded(config):
+    figures = run(config, realisations=200)._figures_by_name
+    sizes = [drawing_canvas.at_width(figure, width) for figure in figures.values() for width in (None, *WIDTHS_MM)]
+    assert {figure.name: panels for figure in sizes if (panels := crowded_panels(figure))} == {}
+    assert faults_of_widths(figures) == []

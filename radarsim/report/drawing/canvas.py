@@ -20,6 +20,7 @@ from matplotlib.text import Annotation
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
+from radarsim.report.drawing.crowded_panels import with_names_at_ends
 from radarsim.report.drawing.legend_placement import LegendPlan, at_width, longest_name, plan_legends
 from radarsim.report.drawing.line_names import draw_legend, draw_legend_below, name_line_ends, separate_names
 from radarsim.report.drawing.marks import common_map_colours, draw_panel
@@ -61,7 +62,7 @@ class PrintableFigure(Canvas):
 def render(figure: Figure) -> Canvas:
     """Draw a figure with Matplotlib, laid out at its size in millimetres."""
     with matplotlib.rc_context(STYLE), _ignore_missing_glyphs():
-        figure = fit_rows(figure)
+        figure = with_names_at_ends(fit_rows(figure))
         return _layout(figure, plan_legends(figure))
 
 

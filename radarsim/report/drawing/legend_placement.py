@@ -136,16 +136,22 @@ def named_lines(panel: Panel) -> list[Line]:
 
 
 def longest_name(panel: Panel) -> int:
-    """Letters of the longest name of a panel's lines."""
-    return max((len(plain_text(line.label)) for line in named_lines(panel)), default=0)
+    """Letters of the longest row of the names of a panel's lines."""
+    rows = (plain_text(row) for line in named_lines(panel) for row in line.label.split("\n"))
+    return max(map(len, rows), default=0)
+
+
+def name_rows(panel: Panel) -> int:
+    """Rows of the names of a panel's lines, one above the other."""
+    return sum(line.label.count("\n") + 1 for line in named_lines(panel))
 
 
 def _names_fit(panel: Panel, height_mm: float) -> bool:
     """Whether the lines of a panel can be named at their ends."""
     lines = named_lines(panel)
-    short = all(len(line.label) <= MAX_END_NAME_LETTERS for line in lines)
+    is_short = longest_name(panel) <= MAX_END_NAME_LETTERS
     connected = all(line.style.dash is not None for line in lines)
-    return panel.direct and short and connected and len(lines) <= height_mm / END_NAME_MM
+    return panel.direct and is_short and connected and name_rows(panel) <= height_mm / END_NAME_MM
 
 
 def _legend_keys(panel: Panel, at_ends: bool, explained_crosses: set[str]) -> LegendKeys:

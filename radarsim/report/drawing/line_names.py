@@ -63,21 +63,25 @@ def separate_names(names: list[Annotation]) -> None:
     axes = names[0].axes
     assert axes is not None  # every name is written into a panel
     box = axes.get_window_extent()
-    step = 1.2 * STYLE["font.size"] * axes.figure.dpi / 72
+    row = 1.2 * STYLE["font.size"] * axes.figure.dpi / 72
     line_ends = [axes.transData.transform(name.xy)[1] for name in names]
     order = np.argsort(line_ends, kind="stable")
-    positions = spread_positions(np.array(line_ends)[order], step, box.y0 + step / 2, box.y1 - step / 2)
+    heights = np.array([row * (names[i].get_text().count("\n") + 1) for i in order])
+    steps = (heights[1:] + heights[:-1]) / 2
+    low, high = box.y0 + heights[0] / 2, box.y1 - heights[-1] / 2
+    positions = spread_positions(np.array(line_ends)[order], steps, low, high)
     for i, y in zip(order, positions, strict=True):
         names[i].set_position((1.015, axes.transAxes.inverted().transform((0, y))[1]))
         names[i].xyann = (1.015, axes.transAxes.inverted().transform((0, y))[1])
         names[i].anncoords = "axes fraction"
 
 
-def spread_positions(targets: np.ndarray, step: float, low: float, high: float) -> np.ndarray:
-    """Rising positions at least `step` apart, nearest to the targets (rising) in squares, inside low … high.
+def spread_positions(targets: np.ndarray, steps: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Rising positions (n,) at least `steps` (n - 1,) apart, nearest to the targets (n,), rising, in squares, inside
+    low … high.
 
-    Pool-adjacent-violators on positions less their own multiple of the step."""
-    offsets = step * np.arange(len(targets))
+    Pool-adjacent-violators on positions less the sum of the steps before them."""
+    offsets = np.append(0.0, np.cumsum(steps))
     groups: list[list[float]] = []
     for value in np.clip(targets, low, high) - offsets:
         groups.append([value])

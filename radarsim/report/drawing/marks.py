@@ -15,6 +15,7 @@ from radarsim.report.drawing.model import Axis as AxisSpec
 from radarsim.report.drawing.model import Bars, Heat, Line, Mark, Note, Panel, Reference
 from radarsim.report.drawing.scales import Scale, scans_of, tick_text
 from radarsim.report.drawing.style import (
+    AXIS_BREAK,
     EXACT,
     ROUGH,
     SYMBOL,
@@ -57,6 +58,8 @@ def draw_panel(axes: Axes, panel: Panel, map_colours: MapColours) -> None:
     if panel.y.limits == SHARE_LIMITS and panel.x.limits[1] is None:  # a share of one is drawn whole
         for line in axes.lines:
             line.set_clip_on(False)
+    if panel.y.scale == "linear" and axes.get_ylim()[0] > 0 and not panel.y.ticks and not has_cells:
+        axes.plot([0], [0.03], transform=axes.transAxes, **AXIS_BREAK)
     if panel.remark:
         axes.set_title(panel.remark, loc="right", fontsize=7)
 

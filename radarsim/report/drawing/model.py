@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 COLUMN_MM = 85.0  # one column of a journal page
 PAGE_MM = 175.0  # two columns
+MAX_PANEL_LINES = 6  # that a panel can hold; if more, they are named at their ends
 GREY = -1  # the colour of marks that are not curves: guides, crowds of points
 
 

@@ -39,6 +39,15 @@ EXACT: dict[str, Any] = {
     "markersize": 4.2,
     "markeredgewidth": 0.6,
 }
+AXIS_BREAK: dict[str, Any] = {  # two strokes across an axis that does not begin at zero
+    "marker": ((-1, -0.9), (1, -0.1), (-1, 0.1), (1, 0.9)),
+    "color": "black",
+    "markersize": 5,
+    "markerfacecolor": "none",
+    "markeredgewidth": 0.6,
+    "clip_on": False,
+    "zorder": 5,
+}
 ROUGH: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6, "markeredgewidth": 0.5, "mfc": "white"}
 ROUGH_KEY = Style(GREY, 0, 0, width_pt=0.5)
 STYLE: dict[Any, Any] = {  # Matplotlib names every key that it knows as a type of its own

@@ -65,8 +65,11 @@ def share_figure(
     rows = tables.group_by(table, "case", "filter")
     filters = figure_lines.all_filters(results)
     panels_by_title = case_selection.group_by_panel(results).items()
-    share_panels = [_share_panel(title, members, rows, labels[:2], filters) for title, members in panels_by_title]
-    share_panels = [panel for panel in share_panels if panel.marks]
+    share_panels = [
+        panel
+        for title, members in panels_by_title
+        for panel in _share_panels(title, members, rows, labels[:2], filters)
+    ]
     if not share_panels:
         return None
     return panel_layout.arrange_columns(Figure(name, labels[1], labels[2], tuple(share_panels)))
@@ -115,9 +118,9 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
     return {"right": figure}
 
 
-def _share_panel(
+def _share_panels(
     title: str, members: Sequence[Result], rows: Mapping, labels: tuple[str, str], filters: Sequence[str]
-) -> Panel:
+) -> list[Panel]:
     column, axis_title = labels
     exact = ["exact_right"] if column == "right" else []
     columns = ("t_s", column, f"{column}_lo", f"{column}_hi", *exact)
@@ -131,7 +134,7 @@ def _share_panel(
         tuple(marks),
         title,
     )
-    return panel_layout.with_keys(panel, members, filters)
+    return panel_layout.keyed_panels(panel, members, filters) if marks else []
 
 
 def orders_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> dict[str, Figure]:

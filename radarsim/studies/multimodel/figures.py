@@ -14,7 +14,18 @@ from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import term, tr
 from radarsim.report import caption_remarks, case_selection, figure_lines, key_labels, panel_layout, tables
-from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Note, Panel, Reference, Style
+from radarsim.report.drawing.model import (
+    MAX_PANEL_LINES,
+    PAGE_MM,
+    Axis,
+    Figure,
+    Heat,
+    Line,
+    Note,
+    Panel,
+    Reference,
+    Style,
+)
 from radarsim.report.quantities import Component
 
 if TYPE_CHECKING:
@@ -222,14 +233,8 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         sigma_panels.append(
             Panel(panel_layout.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1)
         )
-    if len(sigma_panels) > 1:
+    if len(sigma_panels) > 1 and len(results[0].axes.filters) <= MAX_PANEL_LINES:
         sigma_panels = _with_legend(sigma_panels, results[0], marker=None)
-    elif sigma_panels and _has_many_filters(results[0]):
-        (panel,) = sigma_panels
-        keys = _legend_keys(results[0], marker=None)
-        sigma_panels = [
-            replace(panel, marks=tuple(_without_labels(panel.marks)), keys=keys, direct=False, legend="right")
-        ]
     caption = tr(
         "Root-mean-square error of {quantity} about the truth, of {count:,} realisations. Dotted: ends of the stages.",
         quantity=quantity,

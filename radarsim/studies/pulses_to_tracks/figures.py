@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language.translate import term, tr
 from radarsim.report import case_selection, figure_lines, key_labels, panel_layout, sweep_figures, tables, time_figures
-from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
+from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.report.quantities import RADIAL
 from radarsim.report.statistics import MIN_EVENTS
 from radarsim.studies.pulses_to_tracks.kernels.layout import AGES
@@ -41,12 +41,9 @@ def figures(
 
 
 def _figure(name: str, title: str, caption: str, figure_panels: list[Panel]) -> Figure:
-    if len(figure_panels) > 1 or any(
-        len(panel.marks) > panel_layout.MAX_LINES_NAMED_AT_ENDS for panel in figure_panels
-    ):
+    if len(figure_panels) > 1:
         figure_panels = panel_layout.with_legend_cell(figure_panels)
-    columns = min(3, len(figure_panels))
-    return Figure(name, title, caption, tuple(figure_panels), columns, COLUMN_MM if columns == 1 else PAGE_MM)
+    return panel_layout.arrange_columns(Figure(name, title, caption, tuple(figure_panels)))
 
 
 def _title(result: Result) -> str:

@@ -2,13 +2,14 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language.translate import tr
+from radarsim.language.translate import term, tr
 from radarsim.report import (
     caption_remarks,
     case_selection,
@@ -43,6 +44,7 @@ def figures(
 ) -> dict[str, Figure]:
     """The figures sigma_r … gain_ar (1a … 3b of the paper), and `settling` where the manoeuvre variance is swept."""
     figures_by_name = time_figures.component_figures(results, tables_by_name, RADIAL, experiment)
+    figures_by_name = {name: _with_wave_bands(figure, results) for name, figure in figures_by_name.items()}
     if experiment.stem == PAPER_CONFIG:
         figures_by_name |= {
             name: caption_remarks.with_figure_number(figures_by_name[name], FIGURE_NUMBERS[name])
@@ -59,6 +61,34 @@ def figures(
     if selected_cases:
         figures_by_name["consistency"] = consistency_figure(selected_cases, tables_by_name["consistency"], left_out)
     return {name: drawing for name, drawing in figures_by_name.items() if drawing}
+
+
+BANDS = {"metre": term("metre"), "decimetre": term("decimetre"), "centimetre": term("centimetre")}
+
+
+def _with_wave_bands(figure: Figure, results: Sequence[Result]) -> Figure:
+    """A figure whose lines are named by radars of several wave bands, with the band after each name."""
+    named = [(key_labels.case_label(result), result.spec.radar.band) for result in results]
+    bands = {label: BANDS[band] for label, band in named if band in BANDS}
+    if len(set(bands.values())) < 2 or len(bands) < len(named):
+        return figure
+
+    def with_band(name: str) -> str:
+        return f"{name} ({tr(bands[name])})" if name in bands else name
+
+    panels = (
+        replace(
+            panel,
+            marks=tuple(
+                replace(mark, label=with_band(mark.label), name=with_band(mark.name))
+                if isinstance(mark, Line)
+                else mark
+                for mark in panel.marks
+            ),
+        )
+        for panel in figure.panels
+    )
+    return replace(figure, panels=tuple(panels))
 
 
 def consistency_figure(results: Sequence[Result], table: "pd.DataFrame", left_out: str) -> Figure:
