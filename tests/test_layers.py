@@ -91,7 +91,7 @@ ROOMS = {
     ),
     "studies.step_checks": ("kernels", "user_code.errors"),
     "studies.step_clutter": (
-        *("config.experiment", "engine.results", "kernels", "language", "report", "report.drawing"),
+        *("config.experiment", "engine.results", "language", "report", "report.drawing"),
         *("studies.step_checks", "studies.step_programs", "studies.stepwise"),
     ),
     "studies.step_likelihood": (

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from radarsim.kernels.formula_functions import exp, log
+from radarsim.kernels.lane_loops import accumulate, when
 from radarsim.kernels.packed_matrices import add, cholesky, invert, outer_square
 from radarsim.kernels.small_matrices import congruence, dot, row_of, times
 from radarsim.kernels.tracing import maximum, minimum, sqrt, where
@@ -52,11 +53,12 @@ def unscented_law(
 class Association(NamedTuple):
     """What a filter makes of the plots of a scan.
 
-    e (m,): their innovation; weight: the probability that one of them is the target's; spread: packed, of its
-    innovation about e, or None; density: the logarithm of their density, times -2 but for a constant; has_plot: 1.0 if
-    the gate has one; is_wrong: 1.0 if the likeliest is not the first."""
+    e (m,): their innovation; S_inverse: packed, of its covariance; weight: the probability that one of them is the
+    target's; spread: packed, of its innovation about e, or None; density: the logarithm of their density, times -2 but
+    for a constant; has_plot: 1.0 if the gate has one; is_wrong: 1.0 if the likeliest is not the first."""
 
     e: Sequence[Any]
+    S_inverse: Sequence[Any]
     weight: Any
     spread: Sequence[Any] | None
     density: Any
@@ -64,21 +66,33 @@ class Association(NamedTuple):
     is_wrong: Any
 
 
-def certain(e: Sequence[Any]) -> Association:
-    """The association of a plot that is the target's, with an innovation e."""
-    return Association(e, 1.0, None, 0.0, 1.0, 0.0)
-
-
 def take_plot(e: Sequence[Any], S: Sequence[Any]) -> Association:
-    """The association of the only plot, with an innovation e of the packed covariance S."""
+    """The association of the only plot, which is the target's, with an innovation e of the packed covariance S."""
     S_inverse, determinant = invert(S, len(e))
-    return certain(e)._replace(density=dot(e, times(S_inverse, e)) + log(determinant))
+    density = dot(e, times(S_inverse, e)) + log(determinant)
+    return Association(e, S_inverse, 1.0, None, density, 1.0, 0.0)
+
+
+class WeighedPlots(NamedTuple):
+    """What plots in a gate add up to: likelihoods relative to an expected plot, that of the best one; the innovation,
+    of PDA the sum of all and of their squares, each times its likelihood."""
+
+    total: Any
+    best: Any
+    e: Sequence[Any]
+    squares: Sequence[Any]
 
 
 def associate(
-    plots: Sequence[tuple[Any, Sequence[Any]]], S: Sequence[Any], rule: str, gate: Any, false_to_missed: Any
+    places: Sequence[Any],
+    difference: Callable[[Any], Sequence[Any]],
+    S: Sequence[Any],
+    rule: str,
+    gate: Any,
+    false_to_missed: Any,
 ) -> Association:
-    """The association of plots, each whether it is there (1.0) and its innovation (m,), of packed covariance S.
+    """The association of the plots of a scan, places as in `accumulate`, whose innovations difference(plot) have the
+    packed covariance S.
 
     rule: `known`, the first is the target's; `nearest` in the gate; `pda`, all of the gate by their probabilities, BST
     eq. 3.4 to 3.11. gate: χ² of its bound. false_to_missed: density of false plots times 1 - P_D P_G over P_D."""
@@ -86,26 +100,39 @@ def associate(
     S_inverse, determinant = invert(S, m)
     missed = 0.0 if rule == "known" else maximum(false_to_missed, LEAST_DENSITY)
     nothing = missed * math.tau ** (m / 2) * sqrt(determinant)
-    total, best, first, e, second = nothing, 0.0, 0.0, (0.0,) * m, (0.0,) * len(S)
-    for number, (there, d) in enumerate(plots[:1] if rule == "known" else plots):
-        square = dot(d, times(S_inverse, d))
-        likelihood = where((there > 0.5) & (rule == "known" or square < gate), exp(-maximum(square, 0.0) / 2), 0.0)
-        if rule == "pda":
-            e = tuple(a + likelihood * b for a, b in zip(e, d, strict=True))
-            second = tuple(a + likelihood * b for a, b in zip(second, outer_square(d), strict=True))
-        else:
-            e = tuple(where(likelihood > best, b, a) for a, b in zip(e, d, strict=True))
-        total, best, first = total + likelihood, maximum(best, likelihood), first if number else likelihood
-    has_plot, is_wrong = where(best > 0.0, 1.0, 0.0), where(best > first, 1.0, 0.0)
+
+    def weigh(plots: WeighedPlots, place: Any) -> WeighedPlots:
+        there, plot = place
+        d, is_near = difference(plot), there > 0.5
+        if rule != "known":  # the bounds of the gate in its first two numbers: most plots of a scan are beyond
+            is_near = is_near & (d[0] * d[0] < gate * S[0]) & (d[1] * d[1] < gate * S[m])
+
+        def add_near(plots: WeighedPlots) -> WeighedPlots:
+            square = dot(d, times(S_inverse, d))
+            is_inside = is_near & (rule == "known" or square < gate)
+            likelihood = where(is_inside, exp(-maximum(square, 0.0) / 2), 0.0)
+            if rule == "pda":
+                e = tuple(a + likelihood * b for a, b in zip(plots.e, d, strict=True))
+                squares = tuple(a + likelihood * b for a, b in zip(plots.squares, outer_square(d), strict=True))
+            else:
+                e, squares = where(likelihood > plots.best, tuple(d), tuple(plots.e)), plots.squares
+            return WeighedPlots(plots.total + likelihood, maximum(plots.best, likelihood), e, squares)
+
+        return when(is_near, plots, add_near)
+
+    none = WeighedPlots(nothing, 0.0, (0.0,) * m, (0.0,) * (len(S) if rule == "pda" else 0))
+    target = accumulate(places[:1], none, weigh)
+    total, best, e, squares = target if rule == "known" else accumulate(places[1:], target, weigh)
+    has_plot, is_wrong = where(best > 0.0, 1.0, 0.0), where(best > target.best, 1.0, 0.0)
     if rule == "pda":
-        some = total - nothing
         e = tuple(a / total for a in e)
-        spread = tuple(a / total - b for a, b in zip(second, outer_square(e), strict=True))
-        return Association(e, some / total, spread, log(determinant) - 2 * log(total), has_plot, is_wrong)
+        spread = tuple(a / total - b for a, b in zip(squares, outer_square(e), strict=True))
+        density = log(determinant) - 2 * log(total)
+        return Association(e, S_inverse, (total - nothing) / total, spread, density, has_plot, is_wrong)
     density = log(determinant) - 2 * log(where(total > 0.0, best + nothing, 1.0))
     if rule == "known":  # that it is missed says nothing of the model
         density = where(best > 0.0, density, 0.0)
-    return Association(e, has_plot, None, density, has_plot, is_wrong)
+    return Association(e, S_inverse, has_plot, None, density, has_plot, is_wrong)
 
 
 def log_densities(e: Sequence[Any], S: Sequence[Any]) -> list[Any]:
@@ -120,10 +147,10 @@ def log_densities(e: Sequence[Any], S: Sequence[Any]) -> list[Any]:
 
 def take(state: State, law: Law, association: Association) -> State:
     """A state after plots of a law, whose covariance includes that of their errors; BST eq. 3.13 to 3.16."""
-    (x, P), (_, S, C) = state, law
+    (x, P), (_, _, C) = state, law
     n, m = len(x), len(C)
-    S_inverse, columns = invert(S, m)[0], tuple(tuple(C[k][i] for k in range(m)) for i in range(n))
-    K = tuple(times(S_inverse, column) for column in columns)
+    columns = tuple(tuple(C[k][i] for k in range(m)) for i in range(n))
+    K = tuple(times(association.S_inverse, column) for column in columns)
     after = tuple(
         row_of(P, n, i)[j] - association.weight * dot(K[i], columns[j]) for i in range(n) for j in range(i, n)
     )

@@ -19,6 +19,8 @@ from radarsim.kernels.lanes import (
     row_pointer,
 )
 
+COUNT = ir.IntType(64)
+
 
 def emit_program(program: tracing.Program):
     """An intrinsic that runs a program on eight realisations: its arrays are given by their addresses, as a tuple."""
@@ -68,28 +70,91 @@ def zero_lanes(count: int):
 
 def _emit_operations(program, builder, pointers):
     """The results of all operations of a program, whose outputs are written."""
-    results = []
+    results, loops = [], LoopBlocks(builder, pointers)
     for op, *operands in program.ops:
         if op in ("row", "plain"):
             results.append(_read(builder, op, pointers[operands[0]], operands[1]))
         elif op == "number":
             results.append(ir.Constant(VECTOR, [operands[0]] * WIDTH))
+        elif op in LoopBlocks.OPERATIONS:
+            results.append(getattr(loops, f"emit_{op}")(results, *operands))
         else:
             results.append(_operation(builder, op, [results[index] for index in operands]))
     for array, number, index in program.outputs:
-        builder.store(
-            results[index], row_pointer(builder, pointers[array], ir.Constant(ir.IntType(64), number))
-        ).align = 8
+        _write(builder, results[index], pointers[array], ir.Constant(COUNT, number))
     return results
 
 
+class LoopBlocks:
+    """The blocks of the loops of a program (`radarsim.kernels.lane_loops`): a head that tests, a pass, what follows."""
+
+    OPERATIONS = "loop", "carry", "while", "pass_row", "store", "repeat", "result"
+
+    def __init__(self, builder, pointers):
+        self.builder, self.pointers = builder, pointers
+        self.heads = {}  # by the loop's number: its first block, its pass from 0 on, its carried numbers
+        self.open = []  # those that have not ended, and where they go on
+
+    def emit_loop(self, results, *starts):
+        before, head = self.builder.block, self.builder.append_basic_block("loop")
+        self.builder.branch(head)
+        self.builder.position_at_end(head)
+        number, carried = self.builder.phi(COUNT), [self.builder.phi(VECTOR) for _ in starts]
+        number.add_incoming(ir.Constant(COUNT, 0), before)
+        for phi, start in zip(carried, starts, strict=True):
+            phi.add_incoming(results[start], before)
+        self.heads[len(results)] = head, number, carried
+        self.open.append(len(results))
+
+    def emit_carry(self, results, loop, j):
+        return self.heads[loop][2][j]
+
+    emit_result = emit_carry
+
+    def emit_while(self, results, mask, most):
+        builder, (_, number, _) = self.builder, self.heads[self.open[-1]]
+        lanes_that_go_on = builder.bitcast(results[mask], ir.IntType(WIDTH))
+        goes_on = builder.icmp_unsigned("!=", lanes_that_go_on, ir.Constant(ir.IntType(WIDTH), 0))
+        goes_on = builder.and_(goes_on, builder.icmp_unsigned("<", number, ir.Constant(COUNT, most)))
+        one_pass, following = (builder.append_basic_block(name) for name in ("pass", "following"))
+        builder.cbranch(goes_on, one_pass, following)
+        builder.position_at_end(one_pass)
+        self.open.append(following)
+
+    def emit_pass_row(self, results, loop, array, first, stride):
+        return _load(self.builder, self.pointers[array], self._pass_index(loop, first, stride))
+
+    def emit_store(self, results, loop, value, array, first, stride):
+        _write(self.builder, results[value], self.pointers[array], self._pass_index(loop, first, stride))
+
+    def _pass_index(self, loop, first, stride):
+        step = self.builder.mul(self.heads[loop][1], ir.Constant(COUNT, stride))
+        return self.builder.add(step, ir.Constant(COUNT, first))
+
+    def emit_repeat(self, results, loop, *afters):
+        following, (head, number, carried) = self.open.pop(), self.heads[self.open.pop()]
+        number.add_incoming(self.builder.add(number, ir.Constant(COUNT, 1)), self.builder.block)
+        for phi, after in zip(carried, afters, strict=True):
+            phi.add_incoming(results[after], self.builder.block)
+        self.builder.branch(head)
+        self.builder.position_at_end(following)
+
+
 def _read(builder, op, pointer, number):
-    index = ir.Constant(ir.IntType(64), number)
+    index = ir.Constant(COUNT, number)
     if op == "plain":
         return broadcast(builder, builder.load(builder.gep(pointer, [index])))
+    return _load(builder, pointer, index)
+
+
+def _load(builder, pointer, index):
     value = builder.load(row_pointer(builder, pointer, index))
     value.align = 8
     return value
+
+
+def _write(builder, value, pointer, index):
+    builder.store(value, row_pointer(builder, pointer, index)).align = 8
 
 
 LLVM_FUNCTIONS = {"sqrt": "llvm.sqrt.v8f64", "nearest": "llvm.rint.v8f64"}

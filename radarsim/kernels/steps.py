@@ -8,28 +8,29 @@ false plot; errors (groups · K · C) rows: errors of the components, zero beyon
 lost tracks.
 
 Layout of the noise: the normals 2 j and 2 j + 1 of scan k are those of pair `pairs` · k + j of the stream of plots;
-whether there is one, the uniform number k of the stream of detections."""
+whether there is one, the uniform number k of the stream of detections; for false plots the uniform numbers j and
+`uniform_pairs` + j of a scan are those of pair `uniform_pairs` · k + j of their stream."""
 
 import numpy as np
 
 from radarsim.kernels.compiler import kernel
 from radarsim.kernels.lane_programs import emit_program
 from radarsim.kernels.lanes import WIDTH, add_totals, address, full, get, put, row, total, where_greater
-from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_pairs
+from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_pairs, fill_uniform_strip
 from radarsim.kernels.tracing import Program
 
 STRIP = 16  # scans whose noise is drawn at once
 # Arrays of a program of the world, and of one of a filter.
-STATE, KNOWN, NUMBERS, FIRST_NORMALS, SECOND_NORMALS, PLOT = range(6)
+STATE, KNOWN, NUMBERS, FIRST_NORMALS, SECOND_NORMALS, PLOT, EVEN = range(7)
 COUNTED, ERRORS, TESTED, EVENTS = 3, 4, 6, 7
 
 
-def truth_kernel(first: Program, following: Program, pairs: int, rows: int):
+def truth_kernel(first: Program, following: Program, pairs: int, rows: int, uniform_pairs: int):
     """The kernel that draws truth and plots, from the programs of the first scan and of those that follow."""
     begin, move = emit_program(first), emit_program(following)
 
     @kernel
-    def draw(keys, start, groups, scan_numbers, width, numbers, detection, state, a, b, u, plots):
+    def draw(keys, start, groups, scan_numbers, width, numbers, detection, state, a, b, u, even, plots):
         scans = scan_numbers.size // width
         for g in range(groups):
             for k in range(scans):
@@ -37,6 +38,9 @@ def truth_kernel(first: Program, following: Program, pairs: int, rows: int):
                     fill_normal_strip(keys[0], start + g * WIDTH, U(k * pairs), a, b)
                 if detection < 1.0 and k & 1 == 0:
                     fill_uniform_pairs(keys[1], start + g * WIDTH, U(k >> 1), u[:WIDTH], u[WIDTH:])
+                if uniform_pairs > 0:
+                    half = uniform_pairs * WIDTH
+                    fill_uniform_strip(keys[2], start + g * WIDTH, U(k * uniform_pairs), even[:half], even[half:])
                 plot_row = row(address(plots), (g * scans + k) * rows)
                 present = full(1.0)
                 if detection < 1.0 and k > 0:
@@ -52,6 +56,7 @@ def truth_kernel(first: Program, following: Program, pairs: int, rows: int):
                     row(address(a), noise),
                     row(address(b), noise),
                     plot_row,
+                    address(even),
                 )
                 if k == 0:
                     begin(addresses)

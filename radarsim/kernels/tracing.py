@@ -109,8 +109,8 @@ class Program:
     """Operations on eight realisations, in order, each on the results of earlier ones by their numbers.
 
     ("number", x), ("row", array, r) and ("plain", array, r) begin: a constant, row r of lanes of an array, and its
-    plain number r in all lanes. outputs are (array, row, number of the operation); sums are the operations whose
-    results are added up over all eights."""
+    plain number r in all lanes. Those of loops are in `radarsim.kernels.lane_loops`. outputs are (array, row, number of
+    the operation); sums are the operations whose results are added up over all eights."""
 
     ops: tuple[tuple, ...]
     outputs: tuple[tuple[int, int, int], ...]
@@ -129,7 +129,8 @@ class Trace:
     """
 
     def __init__(self) -> None:
-        self._indices: dict[tuple, int] = {}
+        self.ops: list[tuple] = []
+        self.indices: dict[tuple, int] = {}  # of those that a formula may use
         self.outputs: list[tuple[int, int, int]] = []
         self.sums: list[int] = []
         self.constants: dict[int, float] = {}  # the values of operations that are the same in every case
@@ -151,7 +152,7 @@ class Trace:
             raise UnsupportedFormula(
                 f"gives {value:g} in every realisation: it divides by zero, or goes beyond all numbers"
             )
-        index = self._index(op, *indices)
+        index = self.index(op, *indices)
         if value is not None:
             self.constants[index] = value
         if in_this_case is not None:
@@ -167,7 +168,7 @@ class Trace:
         number = float(value)
         if not math.isfinite(number):
             raise UnsupportedFormula(f"{number} is not finite, and no number to calculate with")
-        index = self._index("number", number)
+        index = self.index("number", number)
         self.constants[index] = self.case_values[index] = number
         return index
 
@@ -181,13 +182,25 @@ class Trace:
             )
         return value.index
 
-    def _index(self, *operation: Any) -> int:
-        return self._indices.setdefault(operation, len(self._indices))
+    def index(self, *operation: Any) -> int:
+        """The number of an operation, which is recorded where it is new."""
+        index = self.indices.setdefault(operation, len(self.ops))
+        if index == len(self.ops):
+            self.ops.append(operation)
+        return index
+
+    def forget(self, first: int) -> None:
+        """Forget the operations from a number on."""
+        del self.ops[first:]
+        self.indices = {operation: index for operation, index in self.indices.items() if index < first}
+        for values in (self.constants, self.case_values):
+            for index in [index for index in values if index >= first]:
+                del values[index]
 
     def rows(self, array: int, like: Any, first: int = 0) -> Any:
         """A structure like another, whose numbers stand in the rows of an array from `first` on."""
         places = iter(range(first, first + count_numbers(like)))
-        return map_numbers(lambda _: Lane(self, self._index("row", array, next(places))), like)
+        return map_numbers(lambda _: Lane(self, self.index("row", array, next(places))), like)
 
     def plain(self, array: int, like: Any, stated: bool = False) -> Any:
         """A structure like another, whose numbers stand in an array, the same for all realisations.
@@ -196,7 +209,7 @@ class Trace:
         places = iter(range(count_numbers(like)))
 
         def lane(number: Any) -> Lane:
-            index = self._index("plain", array, next(places))
+            index = self.index("plain", array, next(places))
             if stated:
                 self.case_values[index] = float(number)
             return Lane(self, index)
@@ -214,7 +227,7 @@ class Trace:
 
     def program(self) -> Program:
         """The recorded operations as a program."""
-        return Program(tuple(self._indices), tuple(self.outputs), tuple(self.sums))
+        return Program(tuple(self.ops), tuple(self.outputs), tuple(self.sums))
 
 
 FOLDED_OPERATIONS: dict[str, Callable] = {

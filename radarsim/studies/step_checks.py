@@ -19,7 +19,11 @@ def step_numbers(function: Callable[..., Any], *arguments: Any) -> Any:
 
 def traced_step(function: Callable[..., Any], *arguments: Any) -> Any:
     """The result of a step on numbers of a realisation, checked to be the same on each call."""
-    result, repeated = (step_numbers(function, *arguments) for _ in range(2))
+    trace = next((number.trace for number in tracing.leaves(arguments) if isinstance(number, tracing.Lane)), None)
+    result, operations = _trace_once(trace, function, *arguments)
+    if trace:
+        trace.forget(len(trace.ops) - len(operations))
+    repeated, repeated_operations = _trace_once(trace, function, *arguments)
     if result is None or isinstance(result, list):
         raise user_code_error(
             function, f"must give a tuple of numbers, got {'nothing' if result is None else 'a list'}"
@@ -39,9 +43,16 @@ def traced_step(function: Callable[..., Any], *arguments: Any) -> Any:
         [number.index if isinstance(number, tracing.Lane) else number for number in tracing.leaves(numbers)]
         for numbers in (result, repeated)
     )
-    if next(formulas) != next(formulas):
+    if next(formulas) != next(formulas) or operations != repeated_operations:
         raise user_code_error(function, f"{DIFFERENT_FORMULA}: draw by normals")
     return result
+
+
+def _trace_once(trace: tracing.Trace | None, function: Callable[..., Any], *arguments: Any) -> tuple[Any, list[tuple]]:
+    """The result of a step, and the operations that it adds to a trace, if any."""
+    first = len(trace.ops) if trace else 0
+    result = step_numbers(function, *arguments)
+    return result, trace.ops[first:] if trace else []
 
 
 def record(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -89,12 +100,3 @@ def shape(value: Any) -> str:
     if isinstance(value, tuple):
         return f"({', '.join(map(shape, value))})"
     return "·" if tracing.is_number(value) else f"a {type(value).__name__}" if isinstance(value, list) else repr(value)
-
-
-def check_candidates(function: Callable[..., Any], values: Any, count: int) -> None:
-    """Raise ConfigError where a function does not give places for plots: a number and a plot of this many each."""
-    for place in values if isinstance(values, tuple) else (None,):
-        if not isinstance(place, tuple) or len(place) != 2 or shape(place) != f"(·, {shape((0.0,) * count)})":
-            raise user_code_error(
-                function, f"must give places (there, {shape((0.0,) * count)}) for plots, got {shape(place)}"
-            )

@@ -8,7 +8,7 @@ that their tracks see the plots that they would see of a field without bounds.
         middle = (…)                                # the normals of the first state of a typical flight
 
         def false_plots_from_s(self, spec): …       # from which time on there are false plots, s; None: never
-        def expected(self, x, halves, c): …         # their mean number in a window of half the widths `halves` about x
+        def expected_false_plots(self, x, halves, c): …  # their mean number, of half the widths `halves` about x
         def false_plot(self, x, halves, even, c): … # one, of numbers `even` from 0 to 1, as many as are measured
 
     class Tracking(Steps):
@@ -24,9 +24,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.errors import ConfigError
-from radarsim.kernels.formula_functions import exp
-from radarsim.kernels.tracing import where
-from radarsim.kernels.uniform_numbers import uniform_pairs
 from radarsim.language.translate import join_names, tr
 from radarsim.studies.step_checks import record
 from radarsim.studies.stepwise import StepStudy
@@ -43,7 +40,7 @@ if TYPE_CHECKING:
 
 MARGIN = 2.0  # widths of the window in those of the widest gate
 RARE = 0.0099  # probability of a run of missed plots after which gates may be wider
-MAX_PLACES, CUT = 60, 1e-6  # places for false plots of a scan; the probability of more
+MAX_PLACES, CUT = 500, 1e-6  # places for false plots of a scan; the probability of more
 
 
 class ClutteredStudy(StepStudy):
@@ -56,14 +53,6 @@ class ClutteredStudy(StepStudy):
         """From which time on there are false plots, s. Default: None, there are none."""
         return None
 
-    def expected(self, x: Any, halves: Sequence[Any], c: Any) -> Any:
-        """The mean number of false plots in a window of half the widths `halves` about a true state."""
-        raise NotImplementedError
-
-    def false_plot(self, x: Any, halves: Sequence[Any], even: Sequence[Any], c: Any) -> tuple[Any, ...]:
-        """A false plot of that window, of independent numbers from 0 to 1, as many as are measured."""
-        raise NotImplementedError
-
     @property
     def false_quantities(self) -> int:  # type: ignore[override]
         return len(self.window)
@@ -72,18 +61,14 @@ class ClutteredStudy(StepStudy):
         is_clear = self.false_plots_from_s(spec) is None
         return list(np.zeros((len(self.window), t_s.size)) if is_clear else self.halves(spec))
 
-    def false_normals(self, spec: Any) -> int:
-        if self.false_plots_from_s(spec) is None:
-            return 0
-        return 2 * math.ceil((1 + len(self.measured) * self._places(spec)) / 2)
-
-    def _places(self, spec: Any) -> int:
-        """How many places a scan has for false plots."""
+    def false_places(self, spec: Any) -> int:
         from scipy.special import pdtrik
 
+        if self.false_plots_from_s(spec) is None:
+            return 0
         c = record(self.world, spec)
         flight, halves = self.typical_flight(spec), np.transpose(self.halves(spec))
-        expected = max(float(self.expected(x, half, c)) for x, half in zip(flight, halves, strict=True))
+        expected = max(float(self.expected_false_plots(x, half, c)) for x, half in zip(flight, halves, strict=True))
         places = max(1, math.ceil(pdtrik(1 - CUT, expected)))
         if places > MAX_PLACES:
             raise ConfigError(
@@ -121,18 +106,6 @@ class ClutteredStudy(StepStudy):
                 states = [steps.update(states[0], ((1.0, z),), u, numbers), *after_missed]
         halves[:, dt * np.arange(spec.scans) < (self.false_plots_from_s(spec) or 0.0)] = 0.0
         return halves
-
-    def false_plots(self, x: Any, u: Any, c: Any, w: Sequence[Any]) -> tuple[Any, ...]:
-        (number, *even), measured = uniform_pairs(w), len(self.measured)
-        expected = self.expected(x, u, c)
-        probability = at_most = exp(-expected)
-        places = []
-        for place in range(len(even) // measured):
-            plot = self.false_plot(x, u, even[place * measured : (place + 1) * measured], c)
-            places.append((where(number > at_most, 1.0, 0.0), plot))
-            probability = probability * expected / (place + 1)
-            at_most = at_most + probability
-        return tuple(places)
 
     def figures(
         self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]", experiment: "Experiment"

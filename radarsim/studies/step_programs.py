@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from radarsim.kernels import small_matrices, tracing
-from radarsim.studies.step_checks import (
-    check_candidates,
-    check_length,
-    check_same_shape,
-    record,
-    traced_step,
-    variances,
-)
+from radarsim.kernels import lane_loops, small_matrices, tracing
+from radarsim.kernels.formula_functions import exp
+from radarsim.kernels.lane_loops import RepeatedRows
+from radarsim.studies.step_checks import check_length, check_same_shape, record, traced_step, variances
 
 if TYPE_CHECKING:
     from radarsim.studies.stepwise import Steps, StepStudy
@@ -30,7 +25,7 @@ class Scene:
     """The programs of truth and plots: those of the first scan, and of later ones.
 
     rows: of the state; plot_rows: of a plot with the truth and the false plots; pairs: of normals of a scan; false: the
-    places for false plots."""
+    places for false plots, and the pairs of uniform numbers that they take."""
 
     first: tracing.Program
     following: tracing.Program
@@ -38,6 +33,7 @@ class Scene:
     plot_rows: int
     pairs: int
     false: int
+    uniform_pairs: int
 
 
 @dataclass(frozen=True)
@@ -55,37 +51,52 @@ def trace_scene(study: "StepStudy", spec: Any, world: Any) -> Scene:
     from radarsim.kernels import steps
 
     first, move, plot = study.normals
-    false = study.false_normals(spec)
-    programs, places = [], 0
+    places, measured, components = study.false_places(spec), len(study.measured), len(study.components)
+    programs = []
     state: Any = None
     for count in (first, move):
         trace = tracing.Trace()
         c, (dt, *u, time) = trace.plain(steps.NUMBERS, world, stated=True), numbers_at_a_scan(study, trace)
-        w = [unit_normal(trace, n) for n in range(count + plot + false)]
-        state_normals, plot_normals, false_normals = (
-            tuple(w[i:j]) for i, j in ((0, count), (count, count + plot), (count + plot, len(w)))
-        )
+        w = tuple(unit_normal(trace, n) for n in range(count + plot))
         if state is None:
-            x = traced_step(study.begin, c, state_normals)
+            x = traced_step(study.begin, c, w[:count])
         else:
             times = [time] if moves_by_time(study) else []
-            x = traced_step(study.move, trace.rows(steps.STATE, state), dt, c, state_normals, *times)
+            x = traced_step(study.move, trace.rows(steps.STATE, state), dt, c, w[:count], *times)
             check_same_shape(study.move, x, state)
         state = x
-        z, true = traced_step(study.plot, x, tuple(u), c, plot_normals), traced_step(study.truth, x, tuple(u), c)
-        check_length(study.plot, z, len(study.measured), "measured")
-        check_length(study.truth, true, len(study.components), "components")
-        false_plots: tuple[Any, ...] = ()
-        if false:
-            false_plots = traced_step(study.false_plots, x, tuple(u), c, false_normals)
-            check_candidates(study.false_plots, false_plots, len(study.measured))
-        places = len(false_plots)
+        z, true = traced_step(study.plot, x, tuple(u), c, w[count:]), traced_step(study.truth, x, tuple(u), c)
+        check_length(study.plot, z, measured, "measured")
+        check_length(study.truth, true, components, "components")
         trace.write(steps.STATE, x)
-        trace.write(steps.PLOT, (z, true, false_plots), 1)
+        trace.write(steps.PLOT, (z, true), 1)
+        if places:
+            write_false_plots(study, trace, x, tuple(u), c, places)
         programs.append(trace.program())
-    plot_rows = 1 + len(study.measured) + len(study.components) + places * (1 + len(study.measured))
-    pairs = -(-(max(first, move) + plot + false) // 2)
-    return Scene(programs[0], programs[1], tracing.count_numbers(state), plot_rows, pairs, places)
+    plot_rows = 1 + measured + components + places * (1 + measured)
+    uniform_pairs = -(-(1 + places * measured) // 2) if places else 0
+    pairs = -(-(max(first, move) + plot) // 2)
+    return Scene(programs[0], programs[1], tracing.count_numbers(state), plot_rows, pairs, places, uniform_pairs)
+
+
+def write_false_plots(study: "StepStudy", trace: tracing.Trace, x: Any, u: Any, c: Any, places: int) -> None:
+    """Write the false plots of a scan about a true state: their number is Poisson's, by the inverse of its law."""
+    from radarsim.kernels import steps
+
+    measured, components = len(study.measured), len(study.components)
+    number, expected = trace.rows(steps.EVEN, 0.0), traced_step(study.expected_false_plots, x, u, c)
+
+    def write_plot(loop: lane_loops.Loop, state: tuple[Any, ...]) -> tuple[Any, ...]:
+        probability, at_most, count = state
+        plot = traced_step(study.false_plot, x, u, loop.rows(steps.EVEN, (0.0,) * measured, 1, measured), c)
+        check_length(study.false_plot, plot, measured, "measured")
+        there = tracing.where(number > at_most, 1.0, 0.0)
+        loop.write(steps.PLOT, (there, plot), 1 + measured + components, 1 + measured)
+        probability = probability * expected / count
+        return probability, at_most + probability, count + 1.0
+
+    none = exp(-expected)
+    lane_loops.record_loop(trace, places, (none, none, 1.0), lambda _, state: number > state[1], write_plot)
 
 
 def compile_filter(study: "StepStudy", spec: Any, filter_keys: Any, scene: Scene, missed: bool) -> CompiledFilter:
@@ -121,7 +132,7 @@ def trace_filter(
             predicted = traced_step(steps.predict, trace.rows(kernels_steps.STATE, state), dt, u, c)
             check_same_shape(steps.predict, predicted, state)
             if scene.false:
-                z = ((present, z), *trace.rows(kernels_steps.PLOT, ((0.0, (0.0,) * m),) * scene.false, 1 + m + n))
+                z = (present, z), RepeatedRows(trace, kernels_steps.PLOT, (0.0,) * m, 1 + m + n, scene.false)
             s = traced_step(steps.update, predicted, z, u, c)
             check_same_shape(steps.update, s, state)
             if missed and not scene.false:

@@ -28,7 +28,7 @@ class Tracker:
 
     def __init__(self, study: "StepStudy", spec: Any):
         self.study, self.names = study, tuple(filter_keys.name for filter_keys in spec.filters)
-        self.several = study.false_normals(spec) > 0
+        self.several = study.false_places(spec) > 0
         measured = [number.column for number in study.measured]
         self.filters = [
             (

@@ -36,13 +36,15 @@ Among false plots a study gives more:
     false_quantities = 1                            # numbers of a scan after those that are known, for its plots alone
     counted = ("confirmed",)                        # what is counted of kept tracks
 
-    def false_normals(self, spec): …                # how many unit normals the false plots of a scan take; 0: none
-    def false_plots(self, x, u, c, w): …            # places for them, each whether there is one (1.0), and its numbers
+    def false_places(self, spec): …                 # how many places for false plots a scan has; 0: none
+    def expected_false_plots(self, x, u, c): …      # their mean number, of Poisson's law
+    def false_plot(self, x, u, even, c): …          # one, of numbers `even` from 0 to 1, as many as are measured
     def kept(self, e, u, c): …                      # whether a track with these errors is still the target's
 
 and each filter `counts(s, u, c)`, what is counted of a track: 1.0 or 0.0 each. An update then takes, in place of a
-plot, a tuple of places for plots, of which that of the target is the first, at missed scans too. Lost tracks stay lost,
-their errors do not count; the table `tracks` says how many are kept."""
+plot, places for plots, each whether there is one (1.0), and its numbers: that of the target first, at missed scans too;
+`radarsim.kernels.lane_loops.accumulate` goes over them. Lost tracks stay lost, their errors do not count; the table
+`tracks` says how many are kept."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -126,15 +128,16 @@ class StepStudy(OneFile):
     plot: Callable[..., Any]
 
     kept: Callable[..., Any]
-    false_plots: Callable[..., Any]
+    expected_false_plots: Callable[..., Any]
+    false_plot: Callable[..., Any]
 
     def known_quantities(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
         """Quantities known at times t_s (K,) s: columns (K,), in the order of `known_columns`, and those of false
         plots. Default: nothing."""
         return ()
 
-    def false_normals(self, spec: Any) -> int:
-        """How many unit normals the false plots of a scan take. Default: 0, there are none."""
+    def false_places(self, spec: Any) -> int:
+        """How many places for false plots a scan has. Default: 0, there are none."""
         return 0
 
     def truth(self, x: Any, u: Any, c: Any) -> tuple[Any, ...]:
@@ -205,8 +208,10 @@ class StepStudy(OneFile):
             sums = Layout(**sums.shapes, believed=(f, k, c), nees=(f, k, 2))
         if scene.false:
             sums = Layout(**sums.shapes, estimates=(f, k, c), counts=(f, k, 1 + len(self.counted)))
-        keys = np.stack([noise_key(case, "plots"), noise_key(case, "detections")])
-        draw = cached_kernel(steps.truth_kernel, scene.first, scene.following, scene.pairs, scene.plot_rows)
+        keys = np.stack([noise_key(case, stream) for stream in ("plots", "detections", "false plots")])
+        draw = cached_kernel(
+            steps.truth_kernel, scene.first, scene.following, scene.pairs, scene.plot_rows, scene.uniform_pairs
+        )
         kernel_arguments = known_quantities.ravel(), known_quantities.shape[1], draw, to_numbers(world)
         return Plan(sums, axes, keys, detection, *kernel_arguments, scene, filters, case)
 
@@ -425,7 +430,7 @@ class StepStudy(OneFile):
             and all(name in track for track in tracks for name in self.columns(case.spec, keys))
             and filter_name in (None, keys.name)
         ]
-        if not usable or self.known_columns or self.false_normals(case.spec):
+        if not usable or self.known_columns or self.false_places(case.spec):
             return None
         return StepLikelihood(self, case.spec, max(usable, key=lambda keys: len(self.columns(case.spec, keys))), tracks)
 
@@ -448,7 +453,8 @@ def draw_plots(plan: Plan, first: int, groups: int) -> np.ndarray:
     from radarsim.kernels.steps import STRIP
 
     scene = plan.scene
-    room = [aligned_zeros(n * WIDTH) for n in (scene.rows, STRIP * scene.pairs, STRIP * scene.pairs, 2)]
+    rows = scene.rows, STRIP * scene.pairs, STRIP * scene.pairs, 2, 2 * scene.uniform_pairs
+    room = [aligned_zeros(n * WIDTH) for n in rows]
     plots = aligned_zeros(groups * plan.axes.k.size * scene.plot_rows * WIDTH)
     plan.draw(plan.keys, first, groups, plan.known_quantities, plan.width, plan.numbers, plan.detection, *room, plots)
     return plots

@@ -248,8 +248,9 @@ def take_plots(state, z, density, c):
     mean, S, _ = law = law_of_plot(state, c)
     if c.in_clutter:
         false_to_missed = c.missed * density * mean[0] / (c.span if c.m == 3 else 1.0)  # per m, rad and m/s
-        plots = [(there, plot_difference(plot, mean, c)) for there, plot in z]
-        association = gaussian_filters.associate(plots, S, c.keys.association, c.gate, false_to_missed)
+        association = gaussian_filters.associate(
+            z, lambda plot: plot_difference(plot, mean, c), S, c.keys.association, c.gate, false_to_missed
+        )
     else:
         association = gaussian_filters.take_plot(plot_difference(z, mean, c), S)
     if c.kind != "converted":
@@ -263,7 +264,8 @@ def take_converted_plot(state, z, c):
     """A state after a plot that is converted to x and y, then after its radial velocity."""
     position, R = converted(z, c.sigma, c.keys.unbiased)
     e = position[0] - state[0][0], position[1] - state[0][1]
-    x, P = gaussian_filters.take(state, law_of_position(state, position, R), gaussian_filters.certain(e))
+    law = law_of_position(state, position, R)
+    x, P = gaussian_filters.take(state, law, gaussian_filters.take_plot(e, law[1]))
     if c.m == 2:
         return x, P
     north, east, v = cos(z[1]), sin(z[1]), c.sigma[2]
@@ -433,7 +435,7 @@ class Plane(ClutteredStudy):
         return {**figures, "position": replace(across, caption=across.caption + remark)}
 
     def tracker(self, case):
-        if self.false_normals(case.spec):
+        if self.false_places(case.spec):
             for i, keys in enumerate(case.spec.filters):
                 if keys.association == "known":
                     reason = "recorded plots do not say which is the target's: give nearest or pda"
@@ -480,7 +482,7 @@ class Plane(ClutteredStudy):
         r, b, _ = polar((*x[:2], 0.0, 0.0))
         return b, maximum(r - halves[0], 0.0) ** 2, (r + halves[0]) ** 2, minimum(halves[1], math.pi)
 
-    def expected(self, x, halves, c):
+    def expected_false_plots(self, x, halves, c):
         _, near, far, across = self.edges(x, halves)
         return c.density * (far - near) * across
 

@@ -230,4 +230,4 @@ def test_false_plots_are_even_in_area_near_the_radar(case, halves, ranges, turn)
     assert_even(v / case.spec.radar.span_mps + 0.5)
     assert_uncorrelated(r, b, v)
     area = (ranges[1] ** 2 - ranges[0] ** 2) * turn
-    assert plane.expected(x, halves, world) == pytest.approx(world.density * area, rel=1e-12)
+    assert plane.expected_false_plots(x, halves, world) == pytest.approx(world.density * area, rel=1e-12)
