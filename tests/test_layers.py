@@ -100,9 +100,15 @@ ROOMS = {
     ),
     "studies.step_programs": ("kernels", "studies.step_checks", "studies.stepwise"),
     "studies.step_tables": ("engine.results", "report", "studies.stepwise"),
+    "studies.planar": (
+        *("config.experiment", "config.planar_keys", "engine.results", "kernels", "report", "report.drawing"),
+        *("studies.floors", "studies.onefile", "studies.planar_tables", "studies.step_clutter"),
+    ),
+    "studies.planar_tables": (
+        *("config.experiment", "engine.results", "kernels", "report", "report.drawing", "studies.planar"),
+    ),
     "studies.plane": (
-        *("config.cross_checks", "config.key_types", "config.model", "config.radial_keys", "config.study_keys"),
-        *("constants", "kernels", "report", "studies.floors", "studies.onefile", "studies.step_clutter"),
+        *("config.cross_checks", "config.key_types", "config.study_keys", "kernels", "studies.planar"),
         "studies.stepwise",
     ),
     "studies.step_tracker": (

@@ -74,6 +74,7 @@ NO_CODE = {
     "kernels.kalman_algebra",
     "kernels.small_matrices",
     "kernels.formula_functions",
+    "kernels.lane_loops",
     "kernels.tracing",
 }  # plain Python until a kernel calls them
 

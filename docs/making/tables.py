@@ -11,10 +11,9 @@ from typing import NamedTuple
 from radarsim.report import consistency_tables, exact_check, interval_notes, rare_events
 from radarsim.report import tables as common
 from radarsim.report.user_filters import tables as user_filters_tables
-from radarsim.studies import registry, step_tables
+from radarsim.studies import planar_tables, registry, step_tables
 from radarsim.studies.floors import floor_columns
 from radarsim.studies.onefile import OneFile
-from radarsim.studies.plane import Plane
 
 SHARED = (
     common.label_columns,
@@ -30,7 +29,7 @@ SEVERAL = {  # tables that studies have in common
     "consistency": (consistency_tables.normalised_square_columns,),
     "last": (OneFile.last_columns,),
     "tracks": (step_tables.track_columns,),
-    "position": (Plane.position_columns,),
+    "position": (planar_tables.position_columns,),
     "rare": (rare_events.rate_columns,),
     "failures": (user_filters_tables.failure_columns,),
     "nees": (user_filters_tables.nees_columns, consistency_tables.normalised_square_columns),

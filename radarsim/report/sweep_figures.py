@@ -1,7 +1,7 @@
 """Figures of a sweep, for every study: σ at the last scan against one swept key, or over two as a map."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -146,6 +146,39 @@ def _line_panel(
     )
 
 
+class SweptGrid:
+    """The cells of a map: cases of a config that is swept over two keys."""
+
+    def __init__(self, keys: Sequence[str], members: Sequence[CaseResult]):
+        self.keys, self.members = keys, members
+        values = [list(dict.fromkeys(_hashable(dict(r.swept_values)[key]) for r in members)) for key in keys]
+        self.ranked = [sorted(v, key=lambda value: (isinstance(value, str), value)) for v in values]
+        (self.x, _), (self.y, _) = (
+            axis_positions(members[0], key, v) for key, v in zip(keys, self.ranked, strict=True)
+        )
+
+    def panel(self, title: str, label: str, value: Callable[[CaseResult], Sequence[float]]) -> Panel | None:
+        """A map of a value of each case, and half the width of its interval if that is to be written; None if there is
+        no value."""
+        cells = np.full((2, len(self.y), len(self.x)), np.nan)
+        for result in self.members:
+            swept_values = dict(result.swept_values)
+            column, row = (self.ranked[i].index(_hashable(swept_values[key])) for i, key in enumerate(self.keys))
+            numbers = value(result)
+            cells[: len(numbers), row, column] = numbers
+        if not np.isfinite(cells[0]).any():
+            return None
+        across, up = (_map_axis(self.members[0], key, v) for key, v in zip(self.keys, self.ranked, strict=True))
+        half_widths = cells[1] if np.isfinite(cells[1]).any() else None
+        return Panel(across, up, (Heat(self.x, self.y, cells[0], label, half_widths=half_widths),), title)
+
+    def figure(self, name: str, title: str, caption: str, maps: Sequence[Panel]) -> Figure:
+        """A figure of maps."""
+        columns = min(2, len(maps))
+        width = panel_layout.WIDE_MM if columns == 1 else PAGE_MM
+        return Figure(name, title, caption, tuple(maps), columns, width, 62)
+
+
 def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], curves: Mapping) -> Figure | None:
     """σ of the first component at the last scan over two keys: a map for each filter."""
     component, unit = members[0].axes.components[0]
@@ -153,22 +186,17 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     varying = [key for key in keys if len({_hashable(dict(r.swept_values)[key]) for r in members}) > 1]
     if len(varying) < 2:  # the component is of one value of a key alone
         return line_figure(name, varying[0], [members], curves) if varying else None
-    values = [list(dict.fromkeys(_hashable(dict(r.swept_values)[key]) for r in members)) for key in keys]
-    ranked = [sorted(v, key=lambda value: (isinstance(value, str), value)) for v in values]
-    (x, _), (y, _) = (axis_positions(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
-    across, up = (_map_axis(members[0], key, v) for key, v in zip(keys, ranked, strict=True))
-    maps = []
-    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
-    for f in filters[:MOST_PANELS]:
-        grid = np.full((len(y), len(x)), np.nan)
-        for result in members:
-            column, row = (ranked[i].index(_hashable(dict(result.swept_values)[key])) for i, key in enumerate(keys))
-            grid[row, column] = final_sigma(result, f, component, curves)[0]
-        if np.isfinite(grid).any():
-            label = key_labels.label_with_unit(
-                tr("$\\sigma$ of {symbol}", symbol=key_labels.component_symbol(component)), unit
+    grid, filters = SweptGrid(keys, members), list(dict.fromkeys(f for result in members for f in result.axes.filters))
+    label = key_labels.label_with_unit(tr("$\\sigma$ of {symbol}", symbol=key_labels.component_symbol(component)), unit)
+    maps = [
+        panel
+        for f in filters[:MOST_PANELS]
+        if (
+            panel := grid.panel(
+                key_labels.escape_dollars(f), label, lambda result, f=f: final_sigma(result, f, component, curves)[:1]
             )
-            maps.append(Panel(across, up, (Heat(x, y, grid, label),), key_labels.escape_dollars(f)))
+        )
+    ]
     if not maps:
         return None
     first, second = (key_labels.key_label(members[0], key).text for key in keys)
@@ -180,11 +208,7 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         realisations=case_selection.realisations_text(members),
     )
     caption += case_selection.left_out_remark(filters, filters[:MOST_PANELS])
-    title = tr("σ over the {first} and the {second}", first=first, second=second)
-    columns = min(2, len(maps))
-    width = panel_layout.WIDE_MM if columns == 1 else PAGE_MM
-    figure = Figure(name, title, caption, tuple(maps), columns, width, 62)
-    return figure
+    return grid.figure(name, tr("σ over the {first} and the {second}", first=first, second=second), caption, maps)
 
 
 def _map_axis(result: CaseResult, key: str, values: Sequence) -> Axis:

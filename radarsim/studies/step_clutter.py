@@ -88,6 +88,19 @@ class ClutteredStudy(StepStudy):
             states.append(self.move(states[-1], dt, c, no_noise, *times))
         return states
 
+    def typical_states(self, spec: Any, filter_keys: Any) -> "Iterator[tuple[Any, Any]]":
+        """A filter's states at the scans of a typical flight, by plots without errors, each with its numbers."""
+        steps, dt, c = self.kinds[filter_keys.kind], self.scan_period_s(spec), record(self.world, spec)
+        numbers, in_clutter = record(steps.design, spec, filter_keys), self.false_plots_from_s(spec) is not None
+        s = None
+        for x in self.typical_flight(spec):
+            z = self.plot(x, (), c, (0.0,) * self.normals[2])
+            if s is None:
+                s = steps.start(z, (), numbers)
+            else:
+                s = steps.update(steps.predict(s, dt, (), numbers), ((1.0, z),) if in_clutter else z, (), numbers)
+            yield s, numbers
+
     @functools.lru_cache(maxsize=16)  # noqa: B019  there is one object of the class
     def halves(self, spec: Any) -> np.ndarray:
         """Half the widths (W, K) of the window, zero while there are no false plots."""

@@ -24,14 +24,18 @@ def curve_columns(study: "StepStudy", result: CaseResult) -> Mapping[str, Any]:
 
 def consistency_columns(study: "StepStudy", result: CaseResult) -> Mapping[str, Any]:
     """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""
-    tested = [f for f, member in enumerate(result.spec.filters) if study.kinds[member.kind].covariance is not None]
     scans, freedom = result.axes.k.size, len(study.components)
-    n = tables.realisation_counts(result)[tested, :, 0].ravel()
-    sums = np.asarray(result.sums["nees"])[tested].reshape(-1, 2) / [freedom, freedom**2]
+    is_tested = np.zeros((len(result.axes.filters), scans), dtype=bool)
+    for f, member in enumerate(result.spec.filters):
+        if study.kinds[member.kind].covariance is not None:
+            is_tested[f, study.tested_from(result.spec, member) :] = True
+    f, k = np.nonzero(is_tested)
+    n = tables.realisation_counts(result)[f, k, 0]
+    sums = np.asarray(result.sums["nees"])[f, k] / [freedom, freedom**2]
     bounds = consistency_tables.bounds_from_spread(sums[:, 0], sums[:, 1], n, len(sums))
     mean = statistics.mean_square(sums[:, 0], sums[:, 1], n)
     return {
-        **tables.label_columns(result, np.repeat(tested, scans), np.tile(np.arange(scans), len(tested))),
+        **tables.label_columns(result, f, k),
         "n": n.astype(int),
         **consistency_tables.normalised_square_columns("nees", mean, bounds),
     }

@@ -28,8 +28,8 @@ realisations at a time, compiled, and on floats over recorded plots. Branches by
 and whole numbers of a record are no numbers of a realisation, and each of their values has a separate kernel.
 
 The first plot is always there; `detection` is the probability of each later one. Where a filter gives a covariance,
-`believed_sigma` in `curves` and the table `consistency` say how it agrees with the errors. A study that knows σ exactly
-gives `exact_sigma`.
+`believed_sigma` in `curves` and the table `consistency` say how it agrees with the errors, the latter from the scan
+`tested_from(spec, filter_keys)` on. A study that knows σ exactly gives `exact_sigma`.
 
 Among false plots a study gives more:
 
@@ -153,6 +153,10 @@ class StepStudy(OneFile):
     def detection(self, spec: Any) -> float:
         """The probability of a plot after the first. Default: certain."""
         return 1.0
+
+    def tested_from(self, spec: Any, filter_keys: Any) -> int:
+        """The number of the scan, from 0, from which the NEES tests a filter's covariance. Default: the first."""
+        return 0
 
     def exact_sigma(self, spec: Any) -> np.ndarray | None:
         """The exact σ (F, K, C) of a case about the truth, NaN where unknown. Default: not known."""

@@ -1,5 +1,6 @@
 """Figures that a sweep has by itself: what is drawn is σ at the last scan; and the page of claims."""
 
+import itertools
 import warnings
 from dataclasses import replace
 
@@ -9,9 +10,10 @@ import pytest
 from radarsim.api import result_content, run
 from radarsim.language.current import use_language
 from radarsim.papers.claim_rows import measured_words
-from radarsim.report import case_selection, figure_lines, key_labels, math_text, sweep_figures, tables
+from radarsim.report import case_selection, figure_lines, gain_maps, key_labels, math_text, sweep_figures, tables
 from radarsim.report.drawing import canvas, legend_placement
 from radarsim.report.drawing.model import Line
+from radarsim.report.quantities import Component
 
 
 def swept(config, *overrides, n=200):
@@ -51,6 +53,28 @@ def test_two_keys_are_a_map():
     for i, r in enumerate((50, 100, 250)):
         for j, k in enumerate((10, 15)):
             assert heat.values[i, j] == rows[f"rls2 scans={k} radar.sigma_range_m={r}", "r+Vr", "r"]["sigma"].iloc[-1]
+
+
+def test_gains_over_two_keys_are_maps_with_their_intervals_and_sentences():
+    result, _ = swept("rls2", "sweep.scans=[15,10]", "sweep.radar.sigma_range_m=[50,100,250]")
+    # As measured, without what is known exactly.
+    gains, components = result.gains.assign(exact_percent=np.nan), [Component("r", "m", words="range")]
+    (figure,) = gain_maps.gain_map_figures(result.cases, gains, components).values()
+    (panel,) = figure.panels
+    rows, heat = tables.group_by(gains, "case", "component"), panel.marks[0]
+    last = {
+        (k, r): rows[f"rls2 scans={k} radar.sigma_range_m={r}", "r"].iloc[-1] for k in (10, 15) for r in (50, 100, 250)
+    }
+    for (i, r), (j, k) in itertools.product(enumerate((50, 100, 250)), enumerate((10, 15))):
+        assert heat.values[i, j] == last[k, r]["gain_percent"]
+        assert heat.half_widths[i, j] == pytest.approx((last[k, r]["gain_hi"] - last[k, r]["gain_lo"]) / 2)
+    (sentence,) = gain_maps.gain_map_sentences(result.cases, gains, components)
+    least, greatest = (choose(last.items(), key=lambda item: item[1]["gain_percent"]) for choose in (min, max))
+    for (k, r), row in (least, greatest):
+        assert f"{row['gain_percent']:.3g} %" in sentence.text
+        assert f"scans = {k}, σ of the measured range = {r} m" in sentence.text or f"{r} m" in sentence.text
+    assert "(interval for all 6 compared)" in sentence.text
+    assert not list(gain_maps.map_groups(run.run("rls2", realisations=8).cases))
 
 
 @pytest.mark.parametrize(

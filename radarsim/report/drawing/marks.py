@@ -1,5 +1,6 @@
 """A panel's marks, drawn on Matplotlib's axes."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -175,7 +176,20 @@ def _draw_map(axes: Axes, heat: Heat, map_colours: MapColours) -> None:
         for (i, j), value in np.ndenumerate(heat.values):
             if np.isfinite(value):
                 ink = "white" if norm(value) < 0.5 else "black"
-                axes.text(j, i, number(float(value), 3), ha="center", va="center", color=ink, fontsize=7)
+                axes.text(j, i, _cell_text(heat, i, j), ha="center", va="center", color=ink, fontsize=7)
+
+
+def _cell_text(heat: Heat, i: int, j: int) -> str:
+    """A cell's value, and under it half the width of its interval where that is known; to as many places as give three
+    digits of the greatest value."""
+    value = float(heat.values[i, j])
+    if heat.half_widths is None:
+        return number(value, 3)
+    greatest = float(np.nanmax(np.abs(heat.values)))
+    places = max(0, 2 - math.floor(math.log10(greatest))) if greatest > 0 else 0
+    half_width, unit = float(heat.half_widths[i, j]), 10.0**places
+    text = number(round(value, places) + 0.0, 6)
+    return text if math.isnan(half_width) else f"{text}\n±{number(math.ceil(half_width * unit) / unit, 6)}"
 
 
 def _draw_note(axes: Axes, note: Note) -> None:

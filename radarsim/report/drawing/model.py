@@ -83,14 +83,15 @@ class Bars:
 class Heat:
     """A map of values (len(y), len(x)) over the centres of its cells, with the label of its colour bar.
 
-    Where there are few values, they are written into the cells. Maps of a figure with the same label and group share
-    their colours."""
+    Where there are few values, they are written into the cells, with half the widths of their intervals if known. Maps
+    of a figure with the same label and group share their colours."""
 
     x: np.ndarray
     y: np.ndarray
     values: np.ndarray
     label: str
     group: str = ""
+    half_widths: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,10 @@ def cell_text(panel: Panel, heat: Heat, row: int, column: int) -> str:
     """The title of a map's cell: both coordinates and the value, under their labels."""
     x, y = (tick_text(float(value)) for value in (heat.x[column], heat.y[row]))
     lines = [_under_label(panel.x.label, x), _under_label(panel.y.label, y)]
-    return "\n".join([*lines, _under_label(heat.label, number(float(heat.values[row, column])))])
+    value = number(float(heat.values[row, column]))
+    if heat.half_widths is not None and not math.isnan(heat.half_widths[row, column]):
+        value += f" ± {number(float(heat.half_widths[row, column]), 2)}"
+    return "\n".join([*lines, _under_label(heat.label, value)])
 
 
 def _under_label(label: str, text: str) -> str:

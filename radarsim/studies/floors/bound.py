@@ -16,6 +16,7 @@ from radarsim.report.quantities import SMOOTHED_TERMS
 LAGS = tuple(SMOOTHED_TERMS)
 CRB, POSTERIOR = "CRB", "posterior CRB"
 ENUMERATION, REDUCTION = "enumeration", "information reduction"
+FALSE_REDUCTION = "information reduction among false plots"
 MIN_EIGENVALUE = 1e-12  # of the largest, of parameters in units of their own errors: below, nothing is known
 MAX_UNKNOWN_SHARE = 1e-9  # of a component in what is not known: above, it has no bound
 
@@ -24,8 +25,8 @@ class Bound(NamedTuple):
     """The least σ (K, C) of components with the same plots, not-a-number where there is no bound.
 
     lagged (LAGS, K, C): so many scans later; smoothed (K, C): after the last scan; both not-a-number where plots may be
-    missed. patterns (K,): how missed plots count, of ENUMERATION, REDUCTION and nothing. is_attained: whether an
-    estimator attains it."""
+    missed. patterns (K,): how missed and false plots count, of ENUMERATION, REDUCTION, FALSE_REDUCTION and nothing.
+    is_attained: whether an estimator attains it."""
 
     sigma: np.ndarray
     lagged: np.ndarray
