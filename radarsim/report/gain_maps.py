@@ -52,21 +52,20 @@ def _gain_panels(grid: sweep_figures.SweptGrid, gains: "pd.DataFrame", component
         for component in components:
             words = str(component.words)
             title = f"{key_labels.escape_dollars(filter_name)}: {words}" if len(names) > 1 else words
-            place = filter_name, component.name
-            panel = grid.panel(
-                title, tr("gain, %"), lambda result, place=place: _gain_and_half_width(rows, result, *place)
-            )
+            values = {
+                result.name: _gain_and_half_width(rows.get((result.name, filter_name, component.name)))
+                for result in grid.members
+            }
+            panel = grid.panel(title, tr("gain, %"), values)
             panels += [panel] if panel else []
     return panels
 
 
-def _gain_and_half_width(
-    rows: "Mapping[tuple[str, ...], pd.DataFrame]", result: CaseResult, filter_name: str, component: str
-) -> Sequence[float]:
+def _gain_and_half_width(rows: "pd.DataFrame | None") -> Sequence[float]:
     """A gain at the last scan with half the width of its interval, per cent; exact ones without."""
-    if (found := rows.get((result.name, filter_name, component))) is None:
+    if rows is None:
         return (np.nan,)
-    gain = compared_value.row_value(found.iloc[-1], GAIN)
+    gain = compared_value.row_value(rows.iloc[-1], GAIN)
     return (gain.value,) if gain.is_exact else (gain.value, float(np.ptp(gain.estimate[1:])) / 2)
 
 

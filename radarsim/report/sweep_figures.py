@@ -1,7 +1,7 @@
 """Figures of a sweep, for every study: σ at the last scan against one swept key, or over two as a map."""
 
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -157,14 +157,14 @@ class SweptGrid:
             axis_positions(members[0], key, v) for key, v in zip(keys, self.ranked, strict=True)
         )
 
-    def panel(self, title: str, label: str, value: Callable[[CaseResult], Sequence[float]]) -> Panel | None:
-        """A map of a value of each case, and half the width of its interval if that is to be written; None if there is
-        no value."""
+    def panel(self, title: str, label: str, values: Mapping[str, Sequence[float]]) -> Panel | None:
+        """A map of a value of each case, by its name, with half the width of its interval if that is to be written;
+        None if there is no value."""
         cells = np.full((2, len(self.y), len(self.x)), np.nan)
         for result in self.members:
             swept_values = dict(result.swept_values)
             column, row = (self.ranked[i].index(_hashable(swept_values[key])) for i, key in enumerate(self.keys))
-            numbers = value(result)
+            numbers = values[result.name]
             cells[: len(numbers), row, column] = numbers
         if not np.isfinite(cells[0]).any():
             return None
@@ -188,15 +188,11 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         return line_figure(name, varying[0], [members], curves) if varying else None
     grid, filters = SweptGrid(keys, members), list(dict.fromkeys(f for result in members for f in result.axes.filters))
     label = key_labels.label_with_unit(tr("$\\sigma$ of {symbol}", symbol=key_labels.component_symbol(component)), unit)
-    maps = [
-        panel
-        for f in filters[:MOST_PANELS]
-        if (
-            panel := grid.panel(
-                key_labels.escape_dollars(f), label, lambda result, f=f: final_sigma(result, f, component, curves)[:1]
-            )
-        )
-    ]
+    maps = list[Panel]()
+    for f in filters[:MOST_PANELS]:
+        finals = {result.name: final_sigma(result, f, component, curves)[:1] for result in members}
+        panel = grid.panel(key_labels.escape_dollars(f), label, finals)
+        maps += [panel] if panel else []
     if not maps:
         return None
     first, second = (key_labels.key_label(members[0], key).text for key in keys)

@@ -121,7 +121,8 @@ class PlanarStudy(ClutteredStudy):
         """Where speed and course are linear enough in the velocity for their covariance to mean something: the
         second-order term of the speed, v σ² / 2 with σ of the course, is small beside σ of the speed, the other
         components given."""
-        steps, speed, P = self.kinds[filter_keys.kind], self.world(spec).speed, np.zeros((4, 4))
+        steps: Any = self.kinds[filter_keys.kind]
+        speed, P = self.world(spec).speed, np.zeros((4, 4))
         for k, (s, c) in enumerate(self.typical_states(spec, filter_keys)):
             P[np.triu_indices(4)] = steps.covariance(s, (), c)
             P = np.triu(P) + np.triu(P, 1).T

@@ -26,9 +26,9 @@ def consistency_columns(study: "StepStudy", result: CaseResult) -> Mapping[str, 
     """Mean NEES of all components by scan, per degree of freedom, with bounds and verdict."""
     scans, freedom = result.axes.k.size, len(study.components)
     is_tested = np.zeros((len(result.axes.filters), scans), dtype=bool)
-    for f, member in enumerate(result.spec.filters):
+    for number, member in enumerate(result.spec.filters):
         if study.kinds[member.kind].covariance is not None:
-            is_tested[f, study.tested_from(result.spec, member) :] = True
+            is_tested[number, study.tested_from(result.spec, member) :] = True
     f, k = np.nonzero(is_tested)
     n = tables.realisation_counts(result)[f, k, 0]
     sums = np.asarray(result.sums["nees"])[f, k] / [freedom, freedom**2]

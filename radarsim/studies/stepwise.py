@@ -120,7 +120,7 @@ class StepStudy(OneFile):
     known_columns: tuple[str, ...] = ()
     false_quantities: int = 0
     counted: tuple[str, ...] = ()
-    extra_figures = ("consistency", "tracks")
+    extra_figures: tuple[str, ...] = ("consistency", "tracks")
 
     world: Callable[..., Any]
     begin: Callable[..., Any]
