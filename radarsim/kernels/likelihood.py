@@ -16,7 +16,7 @@ correlation falls with time as a power."""
 
 import numpy as np
 
-from radarsim.kernels.compiler import kernel
+from radarsim.kernels.compiler import inline, kernel
 
 FAR_WIDTH = 10.0  # the least of far outliers, in σ of a number
 FAR_COUNT = 6  # widths of far outliers
@@ -41,46 +41,66 @@ def log_likelihood(
     Out: log_densities (n, m), the logarithm of each number's density given those before it, zero where it is missing;
     soundness (n, m): the probability that it is no outlier."""
     product, p, laws = np.zeros_like(P), np.zeros_like(x), np.empty((3, LAW_COUNT))
-    hard_x, hard_P, hard_score, hard_soundness = x.copy(), P.copy(), log_densities[0].copy(), soundness[0].copy()
+    numbers = H, z, variance, present, outliers, first, span, white, p, laws
+    hard_x, hard_P = x.copy(), P.copy()
+    hard_scores, hard_soundness = np.empty_like(log_densities[:1]), np.empty_like(soundness[:1])
     for k in range(z.shape[0]):
-        row = H[k], z[k], variance[k], present[k], outliers, k < first, span, white, p, laws
         may_be_hard = k > 0 and hard_share > 0.0
         if may_be_hard:
             hard_x[:], hard_P[:] = x, P
             extrapolate(hard_x, hard_P, product, p, F[k], Q[k], HARD_FACTOR * manoeuvre)
-            take_row(hard_x, hard_P, row, hard_score, hard_soundness)
+            take_row(hard_x, hard_P, numbers, k, hard_scores, hard_soundness, 0)
         if k > 0:
             extrapolate(x, P, product, p, F[k], Q[k], manoeuvre)
-        take_row(x, P, row, log_densities[k], soundness[k])
+        take_row(x, P, numbers, k, log_densities, soundness, k)
         if may_be_hard:
             calm = np.log(1.0 - hard_share) + log_densities[k].sum()
-            hard = np.log(hard_share) + hard_score.sum()
+            hard = np.log(hard_share) + hard_scores.sum()
             total = max(calm, hard) + np.log1p(np.exp(-abs(calm - hard)))
             log_densities[k, 0] += total - log_densities[k].sum()
             merge_states(x, P, hard_x, hard_P, np.exp(hard - total))
 
 
 @kernel
-def take_row(x, P, row, log_densities, soundness):
-    """Update x and P in place by the numbers of a row; fills the logarithms of their densities and their soundness.
+def log_likelihood_of_tracks(
+    lengths, x, P, F, Q, H, z, variance, present, manoeuvre, outliers, first, hard_share, span, white, log_densities,
+    soundness
+):  # fmt: skip
+    """`log_likelihood` of several tracks, whose rows follow each other: of track i lengths[i], which starts from x[i]
+    and P, and whose outliers follow their law from its row first[i] on."""
+    b = 0
+    for i in range(lengths.size):
+        a, b = b, b + lengths[i]
+        log_likelihood(
+            x[i], P.copy(), F[a:b], Q[a:b], H[a:b], z[a:b], variance[a:b], present[a:b], manoeuvre, outliers, first[i],
+            hard_share, span, white, log_densities[a:b], soundness[a:b]
+        )  # fmt: skip
 
-    row: what `log_likelihood` has of it, and work arrays p (d,) and laws (3, LAW_COUNT)."""
-    H, z, variance, present, outliers, is_start, span, white, p, laws = row
-    for j in range(z.size):
-        log_densities[j], soundness[j] = 0.0, 1.0
-        if present[j]:
-            e, spread = innovation(x, P, H[j], z[j], p)
-            S = spread + white * variance[j]
-            if is_start:
-                S += (start_factor(outliers[j]) - 1.0) * variance[j]
-            if outliers[j, NEAR] + outliers[j, FAR] > 0.0 and not is_start:
-                fill_laws(laws, e, S, variance[j], outliers[j], span[j])
-                log_densities[j], soundness[j] = take_number_of_laws(x, P, p, e, laws)
+
+@inline
+def take_row(x, P, numbers, k, log_densities, soundness, out):
+    """Update x and P in place by the numbers of row k; fills row `out` of the logarithms of their densities and of
+    their soundness.
+
+    numbers: those of all rows as `log_likelihood` has them, and work arrays p (d,) and laws (3, LAW_COUNT). No view of
+    a row is made, which would take longer than the row."""
+    H, z, variance, present, outliers, first, span, white, p, laws = numbers
+    for j in range(z.shape[1]):
+        log_densities[out, j], soundness[out, j] = 0.0, 1.0
+        if present[k, j]:
+            e, spread = innovation(x, P, H, k, j, z[k, j], p)
+            S = spread + white * variance[k, j]
+            share = outliers[j, NEAR] + outliers[j, FAR]
+            if share > 0.0 and k < first:
+                S += (start_factor(outliers[j]) - 1.0) * variance[k, j]
+            if share > 0.0 and k >= first:
+                fill_laws(laws, e, S, variance[k, j], outliers[j], span[j])
+                log_densities[out, j], soundness[out, j] = take_number_of_laws(x, P, p, e, laws)
             else:
-                log_densities[j] = take_number(x, P, p, e, S)
+                log_densities[out, j] = take_number(x, P, p, e, S)
 
 
-@kernel
+@inline
 def start_factor(outliers):
     """The factor on the variance of a number that starts a track, where it may be an outlier that is no gross error;
     outliers (4,): the law of these."""
@@ -88,21 +108,21 @@ def start_factor(outliers):
     return 1.0 + outliers[NEAR] * sizes + outliers[FAR] * (FAR_WIDTH * FAR_WIDTH - 1.0)
 
 
-@kernel
-def innovation(x, P, h, z, p):
-    """The innovation z - h x of a number, and the part h P h' of its variance; p (d,) takes P h'."""
+@inline
+def innovation(x, P, H, k, j, z, p):
+    """The innovation z - h x of a number, with h = H[k, j], and the part h P h' of its variance; p (d,) takes P h'."""
     e, spread, d = z, 0.0, x.size
     for a in range(d):
-        e -= h[a] * x[a]
+        e -= H[k, j, a] * x[a]
         p[a] = 0.0
         for b in range(d):
-            p[a] += P[a, b] * h[b]
+            p[a] += P[a, b] * H[k, j, b]
     for a in range(d):
-        spread += h[a] * p[a]
+        spread += H[k, j, a] * p[a]
     return e, spread
 
 
-@kernel
+@inline
 def extrapolate(x, P, product, predicted_x, F, Q, manoeuvre):
     """x = F x and P = F P F' + manoeuvre Q, in place; product (d, d) and predicted_x (d,) are work arrays.
 
@@ -125,7 +145,7 @@ def extrapolate(x, P, product, predicted_x, F, Q, manoeuvre):
             P[b, a] = P[a, b]
 
 
-@kernel
+@inline
 def take_number(x, P, p, e, S):
     """Update x and P in place by a number with innovation e of variance S; returns the logarithm of its density."""
     gain = 1.0 / S
@@ -202,12 +222,13 @@ def with_lasting_errors(x, P, with_errors, F, Q, H, variance, correlation):
     """The arguments x, P, F, Q and H of `log_likelihood`, white 0 and manoeuvre 1, for errors that last: after the d
     components of the state come m errors of the numbers, in their standard deviations.
 
-    x (d,) and P (d, d) at the first row, there with_errors (d, m) their covariance with the errors; F, Q (n, d, d): Q
+    x (…, d) and P (d, d) at the first row, there with_errors (d, m) their covariance with the errors; F, Q (n, d, d): Q
     of the manoeuvre as it is; H (n, m, d), variance (n, m); correlation (n,): of errors with those of the row before.
     """
     n, m, d = H.shape
     errors, eye = slice(d, d + m), np.eye(m)
-    state, wide = np.append(x, np.zeros(m)), np.block([[P, with_errors], [with_errors.T, eye]])
+    state = np.concatenate([x, np.zeros((*x.shape[:-1], m))], axis=-1)
+    wide = np.block([[P, with_errors], [with_errors.T, eye]])
     F_, Q_ = np.zeros((n, d + m, d + m)), np.zeros((n, d + m, d + m))
     F_[:, :d, :d], Q_[:, :d, :d] = F, Q
     F_[:, errors, errors] = correlation[:, None, None] * eye

@@ -17,7 +17,7 @@ def filter_recorded(x, P, F, Q, H, R, gains, adapts, z, present, out):
         extrapolate(x, P, product, p, F[k], Q[k], 1.0)
         for d in range(D):
             if present[k, d]:
-                y, spread = innovation(x, P, H[k, d], z[k, d], p)
+                y, spread = innovation(x, P, H, k, d, z[k, d], p)
                 S = spread + R[k, d]
                 out[k, 2 * n + d] = y * y / S
                 correct_state(x, P, p, S, y, gains[k, d], adapts)

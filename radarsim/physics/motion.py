@@ -14,6 +14,16 @@ def transition(dt: float, size: int = 3) -> np.ndarray:
     return F
 
 
+def transitions(dt: np.ndarray, size: int = 3) -> np.ndarray:
+    """The transition matrices (n, size, size) over times (n,)."""
+    F, power = np.tile(np.eye(size), (len(dt), 1, 1)), np.ones(len(dt))
+    for lag in range(1, size):
+        power = power * dt / lag
+        for i in range(size - lag):
+            F[:, i, i + lag] = power
+    return F
+
+
 def white_jerk_covariance(variance: float, dt: float) -> np.ndarray:
     """Covariance (3, 3) that white jerk of spectral density variance · dt, in (m/s³)² s, adds over a scan. A jerk that
     white noise gives has, averaged over a scan, the variance `variance`, (m/s³)². (Bar-Shalom, Li & Kirubarajan,

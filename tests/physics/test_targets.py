@@ -5,7 +5,7 @@ import pytest
 
 from radarsim import constants
 from radarsim.physics import targets
-from radarsim.physics.motion import manoeuvre_covariance, transition
+from radarsim.physics.motion import manoeuvre_covariance, transition, transitions
 from tests.tolerances import assert_rounded, rounding
 
 T = np.linspace(0.0, 60.0, 60001)
@@ -62,6 +62,13 @@ def test_transition_is_the_papers_matrix():
     dt = 7.0
     np.testing.assert_array_equal(transition(dt), [[1, dt, dt**2 / 2], [0, 1, dt], [0, 0, 1]])
     np.testing.assert_array_equal(transition(2.0) @ transition(5.0), transition(7.0))  # halves: exact in binary
+
+
+def test_transitions_over_many_times_are_those_over_each():
+    times = np.array([0.0, 0.3, 7.0])
+    for size in (1, 3, 4):
+        expected = np.stack([transition(dt, size) for dt in times])
+        assert_rounded(transitions(times, size), expected, operations=6)
 
 
 def test_manoeuvre_covariance_is_the_papers_matrix():

@@ -14,6 +14,7 @@ from radarsim.recordings.fit import advice, fit
 from radarsim.recordings.study_part import recording_interface
 from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.multimodel.model_bank import start_weights
+from radarsim.studies.range_doppler import plot_likelihood
 from radarsim.studies.sonar import conversion
 from tests.recordings.error_laws import error_laws, outlier_law
 from tests.tolerances import Z, assert_rounded, polynomial_condition, rounding, scaled_condition
@@ -142,6 +143,24 @@ def test_errors_that_last_have_the_density_of_their_correlations():
     model = with_lasting_errors(x, P, first, F, q * Q, H, variance, rho**steps)
     log_likelihood(*model, z, variance, there, 1.0, *no_outliers(m), 0.0, score, np.empty((n, m)))
     assert_rounded(score.sum(), expected, density_size(off, spread), operations=len(off))
+
+
+@pytest.mark.parametrize("law", [ErrorLaw(), ErrorLaw(outliers=0.02), ErrorLaw(correlation=0.4)])
+def test_tracks_that_are_taken_together_are_those_taken_alone(law, monkeypatch):
+    case = loaded("rls2", "scans=30")
+    tracks = [recording("rls2", "scans=30", number=number) for number in range(3)]
+    tracks[1] = {name: column[:12] for name, column in tracks[1].items()}
+    tracks[2]["range_m"][:2] = np.nan
+    together, values = likelihood(case, None, *tracks), np.array([200.0, 12.0, 1e-4])
+    alone = [likelihood(case, None, track) for track in tracks]
+    for part in alone:
+        part.span = together.span
+    assert_rounded(together(values, law), sum(part(values, law) for part in alone), together.rows, operations=9)
+    for soundness, part in zip(together.soundness(values, law), alone, strict=True):
+        for name, column in part.soundness(values, law)[0].items():
+            np.testing.assert_array_equal(soundness[name], column)
+    monkeypatch.setattr(plot_likelihood, "BATCH_ROWS", 20)
+    assert likelihood(case, None, *tracks)(values, law) == pytest.approx(together(values, law), rel=1e-12)
 
 
 @pytest.mark.parametrize("offset", [0.0, 5.0])

@@ -1,15 +1,16 @@
 """How likely recorded plots are under a filter's model."""
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.kernels.kalman_algebra import unpack
-from radarsim.kernels.likelihood import log_likelihood, start_factor, with_lasting_errors
-from radarsim.physics.motion import transition
+from radarsim.kernels.likelihood import log_likelihood_of_tracks, start_factor, with_lasting_errors
+from radarsim.physics.motion import transitions
 from radarsim.studies.error_law import EXPLANATIONS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.range_doppler.config import Filter, Keys
@@ -18,6 +19,7 @@ from radarsim.studies.range_doppler.kernels import recorded_rows
 from radarsim.studies.range_doppler.tracking import MEASURED, START_RANGES, configured_variances
 from radarsim.studies.recording_interface import usual_interval_s
 
+BATCH_ROWS = 20_000  # of tracks that the kernel takes together
 MIN_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 WIDE_VELOCITY_MPS, WIDE_ACCELERATION_MPS2 = 3e4, 3e3  # standard deviations before the first plot: nothing is known
 
@@ -54,7 +56,7 @@ class PlotLikelihood:
         self.given_tracks = list(tracks)
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, START_RANGES) for columns in tracks]
         problems = (self._problem(number, columns) for number, columns in enumerate(self.cleaned_tracks))
-        self.problems = [problem for problem in problems if problem is not None]
+        self.batches = [_joined(batch) for batch in _batches(problem for problem in problems if problem is not None)]
 
     def _problem(self, track: int, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
         """A track from its first range on; None where it has none."""
@@ -68,42 +70,44 @@ class PlotLikelihood:
         first_scored_row = int(np.searchsorted(np.cumsum(present[:, 0]), START_RANGES, side="right"))
         present[0, 0] = False  # it starts the track
         dt = np.diff(t, prepend=t[0])
-        F, Q = np.stack([transition(step) for step in dt]), np.empty((len(dt), 6))
+        Q = np.empty((len(dt), 6))
         recorded_rows.fill_noise(self.noise, dt, Q)
         H = np.tile(observation(self.observes), (len(t), 1, 1))
-        model = F, unpack(Q.T), H
-        return _Problem(
-            track, rows, *model, np.where(present, z, 0.0), z[0, 0], present, first_scored_row, dt / self.usual_s
-        )
+        model = transitions(dt), unpack(Q.T), H
+        start = np.array([[z[0, 0], 0.0, 0.0]])
+        numbers = np.where(present, z, 0.0), present, dt / self.usual_s
+        is_scored = np.arange(len(t)) >= first_scored_row
+        counts = np.array([first_scored_row]), np.array([len(t)])
+        return _Problem([(track, rows)], *model, *numbers, is_scored, start, *counts)
 
-    def _score(self, problem: "_Problem", values: np.ndarray, law: ErrorLaw) -> tuple[np.ndarray, np.ndarray]:
-        """The log-densities (n, m) of a track's numbers, and their probabilities to be no outliers."""
+    def _score(self, batch: "_Problem", values: np.ndarray, law: ErrorLaw) -> tuple[np.ndarray, np.ndarray]:
+        """The log-densities (n, m) of the numbers of some tracks, and their probabilities to be no outliers."""
         outliers, correlation = law.outlier_rows(self.observes), law.correlation
         variances, manoeuvre = np.square(values[: self.observes]), float(values[self.observes])
-        x, P = np.zeros(3), np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
+        P = np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
         P[0, 0] *= start_factor(outliers[0])
-        x[0] = problem.start
-        score, soundness, spread = (*np.empty((2, *problem.z.shape)), np.tile(variances, (len(problem.z), 1)))
+        score, soundness, spread = (*np.empty((2, *batch.z.shape)), np.tile(variances, (len(batch.z), 1)))
         offset = np.zeros(self.observes)
         offset[1:] = law.bias * values[1 : self.observes]
-        z = problem.z - offset if law.bias else problem.z
-        model, scale, white = (x, P, problem.F, problem.Q, problem.H), manoeuvre, 1.0
+        z = batch.z - offset if law.bias else batch.z
+        model, scale, white = (batch.start.copy(), P, batch.F, batch.Q, batch.H), manoeuvre, 1.0
         if correlation:
             error_covariance = np.zeros((3, self.observes))  # it is where the first plot is, and errs by its error
             error_covariance[0, 0] = -math.sqrt(variances[0])
-            noise, shares_left = manoeuvre * problem.Q, correlation**problem.intervals
-            model = with_lasting_errors(x, P, error_covariance, problem.F, noise, problem.H, spread, shares_left)
+            noise, shares_left = manoeuvre * batch.Q, correlation**batch.intervals
+            model = with_lasting_errors(batch.start, P, error_covariance, batch.F, noise, batch.H, spread, shares_left)
             scale, white = 1.0, 0.0
-        errors = outliers, problem.first_scored_row, law.manoeuvres, self.span, white
-        log_likelihood(*model, z, spread, problem.present, scale, *errors, score, soundness)
+        numbers = z, spread, batch.present, scale
+        errors = outliers, batch.first_scored_rows, law.manoeuvres, self.span, white
+        log_likelihood_of_tracks(batch.lengths, *model, *numbers, *errors, score, soundness)
         return score, soundness
 
     def _scores(self, values: np.ndarray, law: ErrorLaw) -> np.ndarray:
         """Sums over all tracks for each number that counts; the first plots, which find the state, are left out."""
         total = np.zeros(self.observes)
-        for problem in self.problems:
-            score, _ = self._score(problem, values, law)
-            total += score[problem.first_scored_row :].sum(axis=0)
+        for batch in self.batches:
+            score, _ = self._score(batch, values, law)
+            total += score[batch.is_scored].sum(axis=0)
         return total
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
@@ -112,8 +116,11 @@ class PlotLikelihood:
 
     def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; zero of gross errors before the start."""
-        scored = [(problem.track, problem.rows, self._score(problem, values, law)[1]) for problem in self.problems]
-        return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, scored)
+        judged = []
+        for batch in self.batches:
+            parts = np.split(self._score(batch, values, law)[1], np.cumsum(batch.lengths)[:-1])
+            judged += [(*track_and_rows, part) for track_and_rows, part in zip(batch.tracks, parts, strict=True)]
+        return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of range and velocity."""
@@ -122,15 +129,36 @@ class PlotLikelihood:
 
 
 class _Problem(NamedTuple):
-    """A track for the kernel: its number, and its rows from the first range on."""
+    """Tracks for the kernel, one after the other: of each its number, and its rows from the first range on."""
 
-    track: int
-    rows: np.ndarray  #: (n,)
+    tracks: list[tuple[int, np.ndarray]]
     F: np.ndarray  #: (n, 3, 3) transitions to each row
     Q: np.ndarray  #: (n, 3, 3) process noise of unit variance
     H: np.ndarray  #: (n, m, 3)
     z: np.ndarray  #: (n, m) the numbers
-    start: float  #: the first range
     present: np.ndarray  #: (n, m) which numbers count
-    first_scored_row: int  #: row from which the state is known
     intervals: np.ndarray  #: (n,) time since the row before, in usual intervals
+    is_scored: np.ndarray  #: (n,) whether the state is known before the row
+    start: np.ndarray  #: (tracks, 3) the states at the first rows
+    first_scored_rows: np.ndarray  #: (tracks,) of each, the row from which the state is known
+    lengths: np.ndarray  #: (tracks,) the numbers of their rows
+
+
+def _batches(problems: Iterable[_Problem]) -> Iterator[list[_Problem]]:
+    """Tracks in batches of about BATCH_ROWS rows: one call for each of many short tracks would take most of the time,
+    and arrays of all rows too much memory."""
+    batch, rows = list[_Problem](), 0
+    for problem in problems:
+        batch.append(problem)
+        rows += len(problem.z)
+        if rows >= BATCH_ROWS:
+            yield batch
+            batch, rows = [], 0
+    if batch:
+        yield batch
+
+
+def _joined(problems: list[_Problem]) -> _Problem:
+    """The tracks of several problems as one."""
+    first, *arrays = zip(*problems, strict=True)
+    return _Problem(list(itertools.chain(*first)), *map(np.concatenate, arrays))
