@@ -157,7 +157,9 @@ class SweptGrid:
             axis_positions(members[0], key, v) for key, v in zip(keys, self.ranked, strict=True)
         )
 
-    def panel(self, title: str, label: str, values: Mapping[str, Sequence[float]]) -> Panel | None:
+    def panel(
+        self, title: str, label: str, values: Mapping[str, Sequence[float]], is_error: bool = False
+    ) -> Panel | None:
         """A map of a value of each case, by its name, with half the width of its interval if that is to be written;
         None if there is no value."""
         cells = np.full((2, len(self.y), len(self.x)), np.nan)
@@ -170,7 +172,8 @@ class SweptGrid:
             return None
         across, up = (_map_axis(self.members[0], key, v) for key, v in zip(self.keys, self.ranked, strict=True))
         half_widths = cells[1] if np.isfinite(cells[1]).any() else None
-        return Panel(across, up, (Heat(self.x, self.y, cells[0], label, half_widths=half_widths),), title)
+        heat = Heat(self.x, self.y, cells[0], label, half_widths=half_widths, is_error=is_error)
+        return Panel(across, up, (heat,), title)
 
     def figure(self, name: str, title: str, caption: str, maps: Sequence[Panel]) -> Figure:
         """A figure of maps."""
@@ -191,13 +194,14 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
     maps = list[Panel]()
     for f in filters[:MOST_PANELS]:
         finals = {result.name: final_sigma(result, f, component, curves)[:1] for result in members}
-        panel = grid.panel(key_labels.escape_dollars(f), label, finals)
+        panel = grid.panel(key_labels.escape_dollars(f), label, finals, is_error=True)
         maps += [panel] if panel else []
     if not maps:
         return None
     first, second = (key_labels.key_label(members[0], key).text for key in keys)
     caption = tr(
-        "σ of {component} at the last scan over the {first} and the {second}, of {realisations} in each cell.",
+        "σ of {component} at the last scan over the {first} and the {second}, of {realisations} in each cell; the "
+        "least of each map is framed.",
         component=component,
         first=first,
         second=second,

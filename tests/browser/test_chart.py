@@ -67,6 +67,14 @@ def test_it_loads_offline_without_a_word_in_the_console(page, live):
     assert page.evaluate("document.querySelectorAll('svg.live path.l').length") == 12
 
 
+def test_ticks_are_where_the_curves_are_and_at_the_last_scan(page, live):
+    page.open(live)
+    texts = page.evaluate("[...document.querySelectorAll('#sigma-2 text.soft')].map((text) => text.textContent)")
+    assert "290" in texts
+    lowest = sigmas(2, 2, 25, 5, 10, 1e-3, 30)[1:, 2].min()
+    assert min(float(text) for text in texts[texts.index("290") + 1 :]) < 2 * lowest
+
+
 def test_a_slider_by_keyboard_moves_number_curve_and_address(page, live):
     page.open(live)
     before = page.evaluate("document.querySelector('#sigma-0 path.two').getAttribute('d')")

@@ -20,7 +20,7 @@ from radarsim.report import (
     wording,
 )
 from radarsim.report.drawing import canvas as drawing_canvas
-from radarsim.report.drawing import legend_placement, line_names, line_points, page_figure, style
+from radarsim.report.drawing import legend_placement, line_names, line_points, marks, page_figure, style
 from radarsim.report.drawing.model import Axis, Bars, Figure, Heat, Line, Note, Panel, Reference, Style
 from radarsim.report.quantities import Component
 from radarsim.studies.range_doppler import figures as range_doppler_figures
@@ -299,6 +299,7 @@ def test_log_axes_have_round_ticks():
         return [text.get_text() for text in axes.get_yticklabels() if low <= text.get_position()[1] <= high]
 
     assert ticks(6, 95) == ["10", "20", "50", "100"]
+    assert ticks(0.26, 6000) == ["0.2", "1", "10", "100", "1000", "5000"]  # those beyond the powers of ten
     assert ticks(0.91, 0.99) == ["0.92", "0.94", "0.96", "0.98"]
     assert ticks(1e-4, 1) == ["0.0001", "0.001", "0.01", "0.1", "1"]
     assert ticks(1e-5, 0.1) == ["10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹"]  # all raised, not some
@@ -331,6 +332,14 @@ def test_maps_side_by_side_have_one_scale_of_colours():
     both = tuple(Panel(Axis("x"), Axis("y"), (heat,)) for heat in heats)
     axes = drawing_canvas.render(Figure("f", "", "", both, columns=2)).axes[:2]
     assert {one.collections[0].get_clim() for one in axes} == {(1.0, 6.0)}
+
+
+def test_the_least_cells_of_a_map_of_errors_are_framed_as_far_as_they_are_written_alike():
+    values = np.array([[93.104, 93.098, np.nan], [120.0, 93.2, 94.0]])
+    errors, shares = (Heat(np.arange(3), np.arange(2), values, "σ, m", is_error=is_error) for is_error in (True, False))
+    assert marks.best_cells(errors) == [(0, 0), (0, 1)]
+    assert marks.best_cells(shares) == marks.best_cells(replace(errors, values=np.full((2, 3), np.nan))) == []
+    assert [patch.get_xy() for patch in drawn(one(errors)).patches] == [(-0.5, -0.5), (0.5, -0.5)]
 
 
 def test_a_share_just_under_one_is_never_written_as_one():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import FuncNorm, LogNorm, Normalize
+from matplotlib.patches import Rectangle
 
 from radarsim.language.translate import tr
 from radarsim.report.drawing import scales
@@ -17,6 +18,7 @@ from radarsim.report.drawing.model import Bars, Heat, Line, Mark, Note, Panel, R
 from radarsim.report.drawing.scales import Scale, scans_of, tick_text
 from radarsim.report.drawing.style import (
     AXIS_BREAK,
+    BEST_CELL,
     EXACT,
     ROUGH,
     SYMBOL,
@@ -59,7 +61,7 @@ def draw_panel(axes: Axes, panel: Panel, map_colours: MapColours) -> None:
     if panel.y.limits == SHARE_LIMITS and panel.x.limits[1] is None:  # a share of one is drawn whole
         for line in axes.lines:
             line.set_clip_on(False)
-    if panel.y.scale == "linear" and axes.get_ylim()[0] > 0 and not panel.y.ticks and not has_cells:
+    if panel.y.scale == "linear" and axes.get_ylim()[0] > 0 and not (panel.y.ticks or has_cells or panel.equal):
         axes.plot([0], [0.03], transform=axes.transAxes, **AXIS_BREAK)
     if panel.remark:
         axes.set_title(panel.remark, loc="right", fontsize=7)
@@ -172,6 +174,8 @@ def _draw_map(axes: Axes, heat: Heat, map_colours: MapColours) -> None:
     bar = axes.figure.colorbar(mesh, ax=axes, label=heat.label)
     ticks = norm.ticks if isinstance(norm, LossNorm) else ()
     set_ticks(bar.ax.yaxis, AxisSpec("", "log" if isinstance(norm, LogNorm) else "linear", ticks=ticks), False)
+    for i, j in best_cells(heat):
+        axes.add_patch(Rectangle((j - 0.5, i - 0.5), 1, 1, clip_on=False, **BEST_CELL))
     if heat.values.size <= MAX_WRITTEN_CELLS:
         for (i, j), value in np.ndenumerate(heat.values):
             if np.isfinite(value):
@@ -190,6 +194,15 @@ def _cell_text(heat: Heat, i: int, j: int) -> str:
     half_width, unit = float(heat.half_widths[i, j]), 10.0**places
     text = number(round(value, places) + 0.0, 6)
     return text if math.isnan(half_width) else f"{text}\n±{number(math.ceil(half_width * unit) / unit, 6)}"
+
+
+def best_cells(heat: Heat) -> list[tuple[int, int]]:
+    """The cells of a map of errors whose value, as it is written, is the least one: row and column."""
+    if not (heat.is_error and np.isfinite(heat.values).any()):
+        return []
+    written = [(cell, _cell_text(heat, *cell).partition("\n")[0]) for cell in np.ndindex(*heat.values.shape)]
+    least = written[int(np.nanargmin(heat.values))][1]
+    return [cell for cell, text in written if text == least]
 
 
 def _draw_note(axes: Axes, note: Note) -> None:

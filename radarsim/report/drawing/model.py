@@ -84,7 +84,8 @@ class Heat:
     """A map of values (len(y), len(x)) over the centres of its cells, with the label of its colour bar.
 
     Where there are few values, they are written into the cells, with half the widths of their intervals if known. Maps
-    of a figure with the same label and group share their colours."""
+    of a figure with the same label and group share their colours. is_error: the least value is the best, and has
+    a frame."""
 
     x: np.ndarray
     y: np.ndarray
@@ -92,6 +93,7 @@ class Heat:
     label: str
     group: str = ""
     half_widths: np.ndarray | None = None
+    is_error: bool = False
 
 
 @dataclass(frozen=True)

@@ -59,14 +59,15 @@ def steps(low: float, high: float, count: int) -> list[float]:
 
 
 def decades(low: float, high: float, count: int) -> list[tuple[float, str]]:
-    """Powers of ten, and 2 and 5 times these if that gives not many more than `count`."""
+    """Powers of ten, and 2 and 5 times these if that gives not many more than `count`, else only at the ends."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     stride = max(1, -(-(last - first + 1) // MAX_DECADES))
     exponents = range(first, last + 1, stride)
     ticks = list(zip((10.0**n for n in exponents), powers(exponents), strict=True))
     multiples = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
     if stride > 1 or len(ticks) + len(multiples) > count + MAX_EXTRA_TICKS:
-        return ticks
+        ends = (min(multiples, default=low), max(multiples, default=high))
+        multiples = [v for v in ends if stride == 1 and ticks and not ticks[0][0] <= v <= ticks[-1][0]]
     return sorted([*ticks, *((v, tick_text(v)) for v in multiples)])
 
 

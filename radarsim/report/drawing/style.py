@@ -48,6 +48,7 @@ AXIS_BREAK: dict[str, Any] = {  # two strokes across an axis that does not begin
     "clip_on": False,
     "zorder": 5,
 }
+BEST_CELL: dict[str, Any] = {"fill": False, "edgecolor": "#d62828", "linewidth": 1.8, "zorder": 4}
 ROUGH: dict[str, Any] = {"linewidth": 0.5, "alpha": 0.6, "markeredgewidth": 0.5, "mfc": "white"}
 ROUGH_KEY = Style(GREY, 0, 0, width_pt=0.5)
 STYLE: dict[Any, Any] = {  # Matplotlib names every key that it knows as a type of its own

@@ -47,6 +47,7 @@ COMPONENTS = (
 SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"), "$\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
+POINT_SIZES_PT = (7.0, 5.8, 4.6, 3.4)  # of points that may coincide, each drawn on those before it
 STAGE_SPREAD = 0.5  # width over which a stage's points are spread; stages are one apart
 MAX_LOOKS = 8  # filters with distinct colours, dashes and markers
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
@@ -215,26 +216,17 @@ def _stage_lines(results: Sequence[CaseResult]) -> tuple[Reference | Note, ...]:
 
 
 def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str) -> Figure | None:
-    """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case."""
+    """σ of height or climb against time on a logarithmic scale (figures 5 and 6), a panel for each case; of many
+    filters one for each family too."""
     rows = tables.group_by(curves[curves["component"] == component], "case", "filter")
-    quantity, symbol, unit = SIGMAS[component]
-    sigma_panels = []
-    for result in results:
-        marks: list = list(_stage_lines([result]))
-        for f, style in zip(result.axes.filters, _styles(result), strict=True):
-            filter_rows = rows.get((result.name, f))
-            if filter_rows is not None:
-                marks.append(
-                    figure_lines.line_from_rows(
-                        filter_rows, figure_lines.SIGMA[:4], key_labels.escape_dollars(f), replace(style, marker=None)
-                    )
-                )
-        y = Axis(key_labels.label_with_unit(tr("full r.m.s. error of {symbol}", symbol=symbol), unit), "log")
-        sigma_panels.append(
-            Panel(panel_layout.time_axis(), y, tuple(marks), _title(result, results), direct=len(results) == 1)
-        )
+    quantity = SIGMAS[component][0]
+    sigma_panels = [
+        panel for result in results for panel in _sigma_panels(result, rows, component, _title(result, results))
+    ]
     if len(sigma_panels) > 1 and len(results[0].axes.filters) <= MAX_PANEL_LINES:
         sigma_panels = _with_legend(sigma_panels, results[0], marker=None)
+    elif len(sigma_panels) > 1:
+        sigma_panels = panel_layout.share_y_axis(sigma_panels)
     caption = tr(
         "Root-mean-square error of {quantity} about the truth, of {count:,} realisations. Dotted: ends of the stages.",
         quantity=quantity,
@@ -246,6 +238,25 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
     if figure is None:
         return None
     return _with_paper_number(figure, results, {"y": "5", "vy": "6"}[component])
+
+
+def _sigma_panels(result: CaseResult, rows: Mapping, component: str, title: str) -> list[Panel]:
+    """The panels of σ of one case: one, or one for each family of more filters than a panel can hold."""
+    _, symbol, unit = SIGMAS[component]
+    lines: dict[str, list[Line]] = {}
+    has_families = len(result.axes.filters) > MAX_PANEL_LINES
+    for f, options, style in zip(result.axes.filters, result.spec.filters, _styles(result), strict=True):
+        if (result.name, f) in rows:
+            family = tr(FAMILIES.get(options.family, options.family)) if has_families else ""
+            name, look = key_labels.escape_dollars(f), replace(style, marker=None)
+            line = figure_lines.line_from_rows(rows[result.name, f], figure_lines.SIGMA[:4], name, look)
+            lines.setdefault(family, []).append(line)
+    y = Axis(key_labels.label_with_unit(tr("full r.m.s. error of {symbol}", symbol=symbol), unit), "log")
+    stage_lines = _stage_lines([result])
+    return [
+        Panel(panel_layout.time_axis(), y, (*stage_lines, *family_lines), ", ".join(filter(None, (title, family))))
+        for family, family_lines in lines.items()
+    ]
 
 
 def _with_paper_number(figure: Figure | None, results: Sequence[CaseResult], number: str) -> Figure | None:
@@ -322,16 +333,13 @@ def families(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure |
             x = Axis(tr("merging rule"), ticks=tuple((i, rule.replace("_", "\n")) for i, rule in enumerate(RULES)))
             y = Axis(tr("family"), ticks=tuple(enumerate(map(tr, FAMILIES.values()))))
             title = ": ".join(filter(None, (_title(result, results), tr(str(stage)))))
+            label = key_labels.sigma_axis_label("$y$", "m")
             heat_panels.append(
-                Panel(
-                    x,
-                    y,
-                    (Heat(np.arange(4), np.arange(3), grid, key_labels.sigma_axis_label("$y$", "m"), case),),
-                    title,
-                )
+                Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, label, f"{case}, {stage}", is_error=True),), title)
             )
     caption = tr(
-        "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots."
+        "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots. Each "
+        "map has its own scale; its least value is framed."
     )
     titles = [panel.title for panel in heat_panels]
     caption += case_selection.left_out_remark(titles, case_selection.pick_evenly(titles, case_selection.MAX_PANELS))
@@ -352,9 +360,9 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
     )
     styles = dict(zip(result.axes.filters, _styles(result), strict=True))
     for stage, stage_rows in rows.groupby("stage", sort=False):
-        marks = []
+        marks: list[Line] = []
         for _, row in stage_rows.iterrows():
-            style = replace(styles[row["filter"]], dash=None, size_pt=4.5)
+            style = replace(styles[row["filter"]], dash=None, size_pt=POINT_SIZES_PT[len(marks) % len(POINT_SIZES_PT)])
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
             marks.append(Line(count, value, key_labels.escape_dollars(row["filter"]), style, lo, hi))
@@ -363,7 +371,8 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
         cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     cost_panels = _with_legend(cost_panels, result, dash=None)
     caption = tr(
-        "σ of the height over a stage and the mean count of arithmetic operations of one update.{of_case}",
+        "σ of the height over a stage and the mean count of arithmetic operations of one update; where points "
+        "coincide, the smaller marks lie on the larger ones.{of_case}",
         of_case=_case_sentence(result, results),
     )
     return _figure_of_panels("cost", tr("Cost and accuracy"), caption, cost_panels, 62)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MIN_REALISATIONS_OF_POINT = 30  # for a point to be drawn
+MIN_LOSSES = 2  # points of a line of losses: one alone is in the table
 ROOM = 0.06  # of an axis' length, beside its points
 DRAWN_FROM = {"threshold": ("locks", "curves"), "measured": ("estimates",)}
 
@@ -64,7 +65,7 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
         return {}
     caption = tr(
         "P(not locked): share of bursts, at the worst scan, whose velocity (or acceleration, where used) is in error "
-        "by more than five times its Cramér–Rao bound; no point where all lock."
+        "by more than five times its Cramér–Rao bound; no point where all lock, and no estimator with a single point."
     )
     figure = Figure(
         "threshold",
@@ -89,7 +90,7 @@ def _with_room(axis: Axis, x: np.ndarray) -> Axis:
 def _threshold_panels(
     members: Sequence[Result], x: np.ndarray, axis: Axis, tables_by_name: "Mapping[str, pd.DataFrame]"
 ) -> list[Panel]:
-    """The two panels of cases in the order of their swept values x (n,)."""
+    """The two panels of cases in the order of their swept values x (n,); none if no estimator fails often enough."""
     locks: list[Line] = []
     sigmas: list[Line] = []
     curves = tables.group_by(tables_by_name["curves"], "case", "filter", "component")
@@ -103,12 +104,12 @@ def _threshold_panels(
             locks.append(Line(x, shares[:, 0], label, style, shares[:, 1], shares[:, 2]))
     y = panel_layout.fitting_axis(tr("$\\sigma$ of $r$ at the end, m"), sigmas)
     range_panel = Panel(axis, y, tuple(sigmas), key_labels.config_device(members[0]))
-    lines_of_losses = tuple(line for line in map(panel_layout.complement_line, locks) if (line.y > 0).any())
+    losses = map(panel_layout.complement_line, locks)
+    lines_of_losses = tuple(line for line in losses if np.count_nonzero(line.y > 0) >= MIN_LOSSES)
+    if not lines_of_losses:
+        return []
     axis_y = panel_layout.loss_axis(tr("P(not locked)"), lines_of_losses)
-    return [
-        *([Panel(axis, axis_y, lines_of_losses, key_labels.config_device(members[0]))] if lines_of_losses else []),
-        range_panel,
-    ]
+    return [Panel(axis, axis_y, lines_of_losses, key_labels.config_device(members[0])), range_panel]
 
 
 def _locked(result: Result, locks: "pd.DataFrame", name: str) -> tuple[float, float, float]:

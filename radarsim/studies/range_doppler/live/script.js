@@ -102,9 +102,14 @@ const radar = (() => {
 
   function ticks(low, high, log) {
     if (log) {
-      const found = [], step = Math.max(1, Math.ceil(Math.log10(high / low) / 6));
-      for (let n = Math.ceil(Math.log10(low) - 1e-9); 10 ** n <= high * (1 + 1e-9); n += step) found.push(10 ** n);
-      if (found.length >= 2) return found;
+      const powers = [], decades = Math.log10(high / low), step = Math.max(1, Math.ceil(decades / 6));
+      for (let n = Math.ceil(Math.log10(low) - 1e-9); 10 ** n <= high * (1 + 1e-9); n += step) powers.push(10 ** n);
+      const multiples = [];
+      for (let n = Math.floor(Math.log10(low)); 10 ** n <= high; n++) multiples.push(2 * 10 ** n, 5 * 10 ** n);
+      const inside = multiples.filter((v) => v >= low && v <= high && step === 1);
+      const some = decades <= 2.5 ? inside : [inside[0], inside[inside.length - 1]].filter((v) => v < powers[0] || v > powers[powers.length - 1]);
+      const all = [...powers, ...some].sort((a, b) => a - b);
+      if (all.length >= 3) return all;
     }
     const raw = (high - low) / 5, unit = 10 ** Math.floor(Math.log10(raw));
     const step = unit * [1, 2, 5, 10].find((m) => m * unit >= raw * 0.999), found = [];
@@ -120,7 +125,9 @@ const radar = (() => {
       return (v) => a + ((b - a) * (f(v) - f(low))) / (f(high) - f(low));
     };
     const px = scale(x, LEFT, RIGHT), py = scale(y, BOTTOM, TOP);
-    for (const v of ticks(...x)) {
+    const across = ticks(...x);
+    if (!x[2]) across.splice(0, across.length, ...across.filter((v) => px(x[1]) - px(v) > 30), x[1]);  // the last scan is named
+    for (const v of across) {
       put(svg, "line", { class: "grid", x1: px(v), x2: px(v), y1: TOP, y2: BOTTOM });
       const anchor = px(v) > RIGHT - 12 ? "end" : "middle";
       put(svg, "text", { class: "soft", x: anchor === "end" ? RIGHT : px(v), y: BOTTOM + 15, "text-anchor": anchor }, short(v, 3));

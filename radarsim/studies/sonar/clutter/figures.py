@@ -24,6 +24,7 @@ SWEPT_KEYS = {  # columns of the table `tracking`, and the keys whose values the
 }
 LIFE_CAPTION = term("mean time between ends of confirmed tracks, extrapolated from those within the run")
 ENDS_CAPTION = term("probability, by importance sampling, that the target's first confirmed track has ended")
+CONFIRMATION_PANELS = 3  # in one row: the time to confirmation over the swept key is in `track_life`
 ZERO_FACTOR = 3.0  # between zero and the smallest positive value on a logarithmic axis
 UPPER_END_STYLE = Style(GREY, None, 4)
 MAX_LEVEL_SHARE = 0.02  # of its largest value: a quantity that changes less over a sweep is not drawn, only named
@@ -95,7 +96,7 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
     groups = tables.group_by(tracks, "case", "filter")
     confirmed = ("t_s", "confirmed_share", "confirmed_share_lo", "confirmed_share_hi", "exact_confirmed_share")
     figure_panels: list[Panel] = []
-    shown_results = case_selection.pick_evenly(results, case_selection.MAX_CASES)
+    shown_results = case_selection.pick_evenly(results, CONFIRMATION_PANELS)
     for result in shown_results:
         marks = []
         for n, f in enumerate(result.axes.filters):
@@ -123,7 +124,7 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
         )
     ) + case_selection.cases_left_out_remark(results, shown_results)
     title, columns = tr("Probability of a confirmed track"), min(3, len(figure_panels))
-    return Figure("confirmation", title, caption, tuple(figure_panels), columns, PAGE_MM, 50.0)
+    return Figure("confirmation", title, caption, tuple(figure_panels), columns, PAGE_MM, 50.0, share_y=columns > 1)
 
 
 def _swept_values(result: CaseResult[ClutterAxes]) -> str:
@@ -192,7 +193,7 @@ def _life_quantities(
     at_end = tables.select_rows(tables_by_name["curves"], component="r", k=last_scan).merge(
         cases, on="case", how="left"
     )
-    life = _LifeQuantity("life_s", tr("track life"), "s", True, tracking, tr(LIFE_CAPTION))
+    life = _LifeQuantity("life_s", tr("track life, extrapolated"), "s", True, tracking, tr(LIFE_CAPTION))
     rare_events = tables_by_name.get("rare")
     if rare_events is not None:
         ended = rare_events[rare_events["sought"] & (rare_events["event"] == ENDED_TRACK_EVENT)]

@@ -19,7 +19,7 @@ from radarsim.studies.sonar.clutter.tracker_design import (
 )
 from radarsim.studies.sonar.config import Keys
 
-MAP_MARGIN_M = 2500.0  # around the target's course
+MAP_MARGIN_M = 1000.0  # around the target's course
 GATE_INTERVAL_SCANS = 4  # scans between the gates that the map shows
 Curve = tuple[np.ndarray, np.ndarray]  # distances north and east, m
 
@@ -43,8 +43,8 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     )
     for label, group, style in curves:
         marks += [_map_line(curve, "" if n else label, style) for n, curve in enumerate(group)]
-    marks.append(_map_line(course, tr("target"), Style(1, 1, None)))
-    marks.append(_map_line(_north_east(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
+    marks.insert(1, _map_line(_north_east(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
+    marks.append(_map_line(course, tr("target"), Style(0, 1, None, 1.8)))
     caption = tr(
         "Realisation 0 of {name}, tracker {tracker}: {tracks} confirmed tracks near the target among {false} false "
         "plots of {k} scans; gates of every fourth scan.",
