@@ -59,6 +59,15 @@ ROOMS = {
     "studies.floors": ("engine.results", "report", "studies.interface"),
     "studies.counted_scans": ("config.experiment", "engine.results", "studies.interface"),
     "studies.long_run": ("config.experiment", "studies.counted_scans", "studies.interface"),
+    "studies.best_gain_answer": ("language", "report"),
+    "studies.process_noise_answer": (
+        *("config.study_keys", "engine.results", "language", "report", "studies.best_gain_answer"),
+        *("studies.counted_scans", "studies.interface"),
+    ),
+    "studies.process_noise_remedy": (
+        *("config.experiment", "config.study_keys", "engine.results", "language", "report", "studies.counted_scans"),
+        "studies.interface",
+    ),
     "studies.interface": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "report", "report.drawing"),
         *("studies.counted_scans", "studies.floors", "studies.long_run", "studies.recording_interface"),
@@ -66,7 +75,7 @@ ROOMS = {
     "studies.onefile": (
         *("config.experiment", "config.model", "config.study_keys", *SUMS, "language", "report", "report.drawing"),
         *("studies.interface", "studies.onefile_recordings", "studies.plot_arrays", "studies.recording_interface"),
-        "user_code.errors",
+        *("studies.process_noise_answer", "studies.process_noise_remedy", "user_code.errors"),
     ),
     "studies.onefile_recordings": (
         *("config.experiment", "studies.onefile", "studies.plot_arrays", "studies.recording_interface"),
@@ -193,7 +202,10 @@ ROLES = {
     "cost": (("kernels", "system.threads"), COMPUTED),
     "tables": ((*DISPLAY, "bursts"), DISPLAYED),
     "figures": ((*DISPLAY, "report.drawing", "language"), DISPLAYED),
-    "answer": ((*DISPLAY, "language"), (*DISPLAYED, "answer")),
+    "answer": (
+        (*DISPLAY, "language", "studies.best_gain_answer", "studies.process_noise_answer"),
+        (*DISPLAYED, "answer"),
+    ),
     "chart": ((*DISPLAY, "report.drawing", "language"), (*COMPUTED, "figures")),
     "tracking": (
         (*NUMBERS, "studies.missed_scans", "studies.noise", "studies.plot_arrays", "studies.recording_interface"),
@@ -211,7 +223,7 @@ ROLES = {
         (
             *("config.experiment", "engine.results", "language", "report", "report.drawing", "studies.floors"),
             *("studies.counted_scans", "studies.interface", "studies.plot_arrays", "studies.radial_truth"),
-            "studies.recording_interface",
+            *("studies.process_noise_answer", "studies.process_noise_remedy", "studies.recording_interface"),
         ),
         (*DISPLAYED, "answer", "chart", "floor", "recorded_plots", "tracking"),
     ),

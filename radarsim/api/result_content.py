@@ -23,6 +23,7 @@ from radarsim.report import (
 from radarsim.report import tables as common
 from radarsim.report.drawing.model import Figure, reworded
 from radarsim.report.math_text import plain_text
+from radarsim.report.page_sentences import split_long_sentence
 from radarsim.report.quantities import GAIN
 from radarsim.report.sentences import Sentence
 from radarsim.report.user_filters import rows as user_filters_rows
@@ -126,10 +127,11 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
     """The answer of an experiment: on user filters, of its study, and gains against further baselines."""
     study_tables = with_first_baseline(user_filters_rows.without_user_filters(tables_by_name, results), results)
     further_baselines = [gain for result in results for gain in result.further_baselines]
-    main, details = _user_filter_answer(results, tables_by_name)
-    answer = [
-        *main,
-        *details,
+    names = config_names(results)
+    main, details = (
+        _short_sentences(long_sentences, names) for long_sentences in _user_filter_answer(results, tables_by_name)
+    )
+    of_study = [
         *(
             sentences.as_sentence(sentence, study_tables)
             for sentence in study(results[0].study).answer(results, study_tables)
@@ -140,8 +142,8 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
             for sentence in _gains_against(baseline, tables_by_name)
         ),
     ]
-    names = config_names(results)
-    texts = [translate_names(str(sentence), names) for sentence in answer]
+    answer = [*main, *details, *_short_sentences(of_study, names)]
+    texts = [sentence.text for sentence in answer]
     tables = [frozenset(interval.table for interval in sentence.intervals) for sentence in answer]
     if further_baselines:
         texts.append(tr("Further gains are in gains.csv."))
@@ -150,6 +152,15 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
         translate_names(line, names) for line in answer_warnings.answer_warnings(results, tables_by_name, answer)
     ]
     return Answer(tuple(texts), tuple(warnings), len(main), tuple(tables))
+
+
+def _short_sentences(long_sentences: Iterable[Sentence], names: frozenset[str]) -> list[Sentence]:
+    """The sentences with names in the language in use, the long ones split."""
+    return [
+        sentence.with_text(part)
+        for sentence in long_sentences
+        for part in split_long_sentence(translate_names(sentence.text, names))
+    ]
 
 
 def question_text(experiment: Experiment) -> str:

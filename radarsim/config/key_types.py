@@ -9,7 +9,7 @@ import pydantic
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, StringConstraints
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from radarsim.config.marks import OnlyForMark
+from radarsim.config.marks import OnlyForMark, ProcessNoiseMark
 
 Item = TypeVar("Item")
 
@@ -110,16 +110,20 @@ def key(
     symbol: str | None = None,
     unit: str | None = None,
     only: Mapping[str, str | tuple[str, ...]] | None = None,
+    process_noise: bool = False,
     **limits: Any,
 ) -> Any:
     """A key: its title, its description with unit, its default (without one it is required), and its symbol.
 
     unit: that of the value, if the name does not end in it. only: the values of other keys for which this key exists
-    and its default holds; for others it is None. limits: further arguments of `pydantic.Field`."""
+    and its default holds; for others it is None. process_noise: whether the answer names the best of several values,
+    and what is gained with each filter at its best. limits: further arguments of `pydantic.Field`."""
     extra: Any = {name: text for name, text in (("symbol", symbol), ("unit", unit)) if text is not None}
     field_default = default if only is None else None
     field = Field(field_default, title=title, description=about, json_schema_extra=extra or None, **limits)
     if only is not None:
         where = {name: (values,) if isinstance(values, str) else values for name, values in only.items()}
         field.metadata.append(OnlyForMark(where, None if default is ... else default, default is ...))
+    if process_noise:
+        field.metadata.append(ProcessNoiseMark())
     return field

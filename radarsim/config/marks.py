@@ -15,6 +15,10 @@ class DesignMark:
     """Marks a field that designs filters or limits the observation: it is no part of the world nor of its noise."""
 
 
+class ProcessNoiseMark:
+    """Marks a key of filters for the manoeuvre that they allow for. Of several values the answer names the best."""
+
+
 class LaterKeyMark:
     """Marks a key that earlier versions lacked. At its default, which keeps their behaviour, it is no part of a case's
     identity nor of its noise, so that both stay the same."""

@@ -8,12 +8,16 @@ from typing import Annotated, Any, ClassVar, Protocol, TypeVar, cast, get_args
 
 import pydantic
 from pydantic import AfterValidator, Field
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from radarsim.config.cross_checks import CheckError, check_error, cross_check
 from radarsim.config.key_types import Name, WholeNumber, key
-from radarsim.config.marks import DesignMark, DisplayMark, NameIn
+from radarsim.config.marks import DesignMark, DisplayMark, NameIn, ProcessNoiseMark
 from radarsim.config.model import Model, annotation_parts
+
+VARIANCE_FACTORS = tuple(10.0**power for power in range(-2, 4))  # of a sweep, times the given value
+SIGMA_FACTORS = (0.1, 0.3, 1, 3, 10)
 
 
 class StudyKeys(Model):
@@ -38,7 +42,17 @@ class StudyKeys(Model):
 
     @classmethod
     def sample_sweep(cls, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
-        """A sweep for a new config with this data, which stands there as a comment, and what it shows."""
+        """A sweep for a new config with this data, which stands there as a comment, and what it shows: of the process
+        noise, where filters share its value."""
+        members = [member for member in data.get(cls.bare_keys, ()) if isinstance(member, Mapping)]
+        for name, field in _process_noise_fields(cls).items():
+            values = [member[name] for member in members if name in member]
+            if len(values) > 1 and values.count(values[0]) == len(values) and _is_number(values[0]) and values[0] > 0:
+                factors = SIGMA_FACTORS if name.startswith("sigma") else VARIANCE_FACTORS
+                extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+                label = extra.get("symbol", field.title)
+                purpose = f"uncomment: each filter at its best {label}, and the gain then"
+                return {name: [float(f"{factor * values[0]:.4g}") for factor in factors]}, purpose
         return {"some_key": [1, 2, 3]}, ""
 
     @property
@@ -62,6 +76,36 @@ class StudyKeys(Model):
                     if getattr(self, field_name) not in names:
                         member_word = mark.field.removesuffix("s")
                         yield check_error(field_name, f"must be the name of a {member_word}: {', '.join(names)}")
+
+
+def is_process_noise(keys: type[StudyKeys], key: str) -> bool:
+    """Whether a bare key is one of process noise, of the filters of a study."""
+    return key in _process_noise_fields(keys)
+
+
+def process_noise_key(member: Model) -> str:
+    """The first key of process noise that a filter has, with a number above zero; else empty."""
+    values = ((name, getattr(member, name)) for name in _marked_fields(type(member)))
+    return next((name for name, value in values if _is_number(value) and value > 0), "")
+
+
+def _process_noise_fields(keys: type[StudyKeys]) -> dict[str, FieldInfo]:
+    """The keys of process noise of a study's filters, by name."""
+    annotation = keys.model_fields[keys.bare_keys].annotation if keys.bare_keys in keys.model_fields else None
+    models = [part for part in annotation_parts(annotation) if isinstance(part, type) and issubclass(part, Model)]
+    return {name: field for model in models for name, field in _marked_fields(model).items()}
+
+
+def _marked_fields(model: type[Model]) -> dict[str, FieldInfo]:
+    return {
+        name: field
+        for name, field in model.model_fields.items()
+        if any(isinstance(mark, ProcessNoiseMark) for mark in field.metadata)
+    }
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def possible_kinds(keys: type[Model]) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ from urllib.parse import quote
 from radarsim.errors import StoreError
 from radarsim.extensions import extensions
 from radarsim.report import atomic_files, provenance
-from radarsim.report.page_sentences import headline
 from radarsim.report.render_page import render_page
 from radarsim.report.stored_tables import find_record
 
@@ -40,7 +39,7 @@ def _index_row(path: Path) -> dict | None:
         row = {
             "name": path.parent.name,
             "address": f"{quote(path.parent.name)}/report.html",
-            "answer": headline(answer),
+            "answer": next(iter(answer), ""),
             "study": str(record["study"]),
             "realisations": provenance.span(sorted({int(case["done"]) for case in record["cases"].values()})),
             "finished": _finish_time(record, path),

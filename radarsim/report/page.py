@@ -14,7 +14,7 @@ from radarsim.report.drawing.model import COLUMN_MM
 from radarsim.report.drawing.page_figure import DrawnFigure
 from radarsim.report.math_text import plain_text
 from radarsim.report.page_links import tables_behind_figure
-from radarsim.report.page_sentences import count_visible_sentences, split_into_clauses
+from radarsim.report.page_sentences import count_visible_sentences
 from radarsim.report.page_tables import column_heading, page_table, page_tables, row_table, translated_table
 from radarsim.report.render_page import render_page
 from radarsim.report.settings_tables import settings_tables
@@ -55,14 +55,13 @@ def report_page(
     sources = {name: tables_behind_figure(name, drawn_from, written) for name in names}
     titles = {drawing.figure.name: plain_text(drawing.figure.title) for drawing in figures}
     sections = _sections(tables, titles, sources, written, experiment.study)
-    sentences = split_into_clauses(answer)
     return render_page(
         "report.html.j2",
         experiment=experiment,
         question=question,
         target=target_words(experiment.cases),
-        answer=sentences,
-        visible_sentences=count_visible_sentences(sentences),
+        answer=answer,
+        visible_sentences=count_visible_sentences(answer),
         inputs=None if inputs is None else translated_table(tr("inputs"), inputs),
         settings=[translated_table(title, table) for title, table in settings_tables(experiment.cases).items()],
         agreement=None if agreement is None else translated_table(tr("exact against Monte-Carlo"), agreement),

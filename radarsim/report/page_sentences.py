@@ -1,24 +1,44 @@
-"""The sentences of an answer as a page shows them: which are split, and which are folded."""
+"""The sentences of an answer as they are shown: at most three lines of a terminal, the first above its figure."""
 
+import re
+import textwrap
 from collections.abc import Sequence
 
 from radarsim.report import wording
 
+LINE_LETTERS, MAX_LINES = 80, 3  # of a sentence on a terminal
+SENTENCE_END = re.compile(r"(?<=[\w%)\]]\.) (?=[A-ZА-ЯЁ])")
 MAX_VISIBLE_LETTERS = 200  # of an answer above its figure
-MAX_SENTENCE_LETTERS = 300  # of a sentence that is not split into its clauses
 
 
-def split_into_clauses(answer: Sequence[str]) -> list[str]:
-    """The sentences of an answer, long ones in their clauses."""
-    split = [
-        wording.split_clauses(sentence) if len(sentence) > MAX_SENTENCE_LETTERS else [sentence] for sentence in answer
-    ]
-    return [f"{clause};" if clause is not clauses[-1] else clause for clauses in split for clause in clauses]
+def split_long_sentence(sentence: str) -> list[str]:
+    """A sentence; in place of one that is too long several of its clauses, each after what the first colon is behind.
+
+    >>> split_long_sentence(f"of A: {'x' * 90}; {'y' * 90}; {'z' * 90}.") == [
+    ...     f"of A: {'x' * 90}; {'y' * 90}.", f"of A: {'z' * 90}."
+    ... ]
+    True
+    """
+    if is_short(sentence):
+        return [sentence]
+    if SENTENCE_END.search(sentence):  # several, which belong together
+        return [part for whole in SENTENCE_END.split(sentence) for part in split_long_sentence(whole)]
+    first, *others = wording.split_clauses(sentence.removesuffix("."))
+    subject, colon, _ = first.partition(": ")
+    parts = [first]
+    for clause in others:
+        if is_short(f"{parts[-1]}; {clause}."):
+            parts[-1] += f"; {clause}"
+        else:
+            parts.append(f"{subject}: {clause}" if colon else clause[:1].upper() + clause[1:])
+    end = "." if sentence.endswith(".") else ""
+    return [f"{part}{end}" for part in parts]
 
 
-def headline(answer: Sequence[str]) -> str:
-    """The first sentence of an answer as the page shows it, of a long one its first clause; empty without any."""
-    return split_into_clauses(answer)[0].removesuffix(";") if answer else ""
+def is_short(sentence: str) -> bool:
+    """Whether a sentence takes no more than three lines of a terminal."""
+    text = wording.with_unbroken_units(sentence)
+    return len(textwrap.wrap(text, LINE_LETTERS, break_long_words=False, break_on_hyphens=False)) <= MAX_LINES
 
 
 def count_visible_sentences(answer: Sequence[str]) -> int:

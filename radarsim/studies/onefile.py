@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from radarsim.report.drawing.model import Figure
     from radarsim.report.sentences import Sentence
     from radarsim.studies.plot_arrays import DrawPlots
+    from radarsim.studies.process_noise_remedy import Settings
     from radarsim.studies.recording_interface import Tracker
 
 
@@ -318,14 +319,21 @@ class OneFile(Study):
         self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]"
     ) -> "Sequence[str | Sentence]":
         from radarsim.report import case_selection, key_labels, sentences
+        from radarsim.studies.process_noise_answer import best_noise
+        from radarsim.studies.process_noise_remedy import remedy_sentence
 
         reported, remark = case_selection.select_reported(results)
         has_several_configs = len(case_selection.group_by_config(results)) > 1  # of an `include`
-        answer = []
+        answer = best_noise(self, results, tables).sentences
         for result in reported:
             prefix = f"{key_labels.config_stem(result)}: " if has_several_configs else ""
             answer += [sentence.with_text(prefix + sentence.text) for sentence in self._sentences(result, tables)]
-        return [*answer, *map(sentences.Sentence, remark)]
+        return [*answer, *remedy_sentence(self, reported, tables, self.alternatives), *map(sentences.Sentence, remark)]
+
+    def alternatives(self, spec: Any, index: int) -> "Sequence[Settings]":
+        """What is tried of a case for a filter, by index, that is worse than the baseline and that a larger process
+        noise alone does not help. Default: nothing."""
+        return ()
 
     def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """σ of the leading component at the last scan, and the gain of each filter."""

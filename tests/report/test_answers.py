@@ -1,4 +1,4 @@
-"""Answers are whole in every language, and a config draws no more figures than a page holds."""
+"""Answers are whole and short in every language, and a config draws no more figures than a page holds."""
 
 import pytest
 
@@ -13,21 +13,22 @@ FEW = ("rls2", "pulses_rls5", "ambiguous_rls2")
 
 
 def unclosed(answer):
-    """The paragraphs of an answer whose brackets do not close."""
-    parts = page_sentences.split_into_clauses(answer)
-    return [part for part in parts if any(part.count(a) != part.count(b) for a, b in ("[]", "()"))]
+    """The sentences of an answer whose brackets do not close."""
+    return [text for text in answer if any(text.count(a) != text.count(b) for a, b in ("[]", "()"))]
 
 
 def check_answer(config, n):
     result = run(config, realisations=n)
     for code in current.language_codes():
         with current.use_language(code):
-            assert unclosed(result_content.make_answer(result.cases, result._tables).texts) == [], code
+            texts = result_content.make_answer(result.cases, result._tables).texts
+        assert unclosed(texts) == [], code
+        assert [text for text in texts if not page_sentences.is_short(text)] == [], code
     return result
 
 
 @pytest.mark.parametrize("config", FEW)
-def test_paragraphs_of_an_answer_close_their_brackets(config):
+def test_sentences_of_an_answer_close_their_brackets_and_take_three_lines(config):
     check_answer(config, 300)
 
 

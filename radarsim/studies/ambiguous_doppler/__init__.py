@@ -110,9 +110,10 @@ class AmbiguousDoppler(Study):
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.ambiguous_doppler import answer
         from radarsim.studies.counted_scans import result_scans
+        from radarsim.studies.process_noise_answer import best_noise
 
         scans = {result.name: result_scans(self, result) for result in results if result.axes.combines.any()}
-        return answer.answer(results, tables, scans)
+        return answer.answer(results, tables, scans, best_noise(self, results, tables))
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
         from radarsim.studies.ambiguous_doppler import answer

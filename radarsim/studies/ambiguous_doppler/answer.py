@@ -15,6 +15,7 @@ from radarsim.report.statistics import Estimate
 from radarsim.studies.ambiguous_doppler import remedy_answer
 from radarsim.studies.ambiguous_doppler.tables import BEYOND_SHARE, Result
 from radarsim.studies.counted_scans import CountedScans
+from radarsim.studies.process_noise_answer import BestNoise
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,19 +54,21 @@ def question(experiment: Experiment) -> str:
 
 
 def answer(
-    results: Sequence[Result], tables_by_name: TablesByName, scans: Mapping[str, CountedScans]
+    results: Sequence[Result], tables_by_name: TablesByName, scans: Mapping[str, CountedScans], noise: BestNoise
 ) -> list[Sentence]:
     """For each case: from which scan on folded velocity is as good as unfolded, within 5 %; how often it is right.
 
     Of filters of several orders: the largest error of each over the scans, beside that of the best single order.
-    First, of all cases: the filter of the least error, or in how many folded velocity is as good. scans: those that
-    count, of each case that combines orders."""
+    First, of all cases: the best D_M and the gain then; the filter of the least error, or in how many folded velocity
+    is as good. scans: those that count, of each case that combines orders."""
     reported, remark = case_selection.select_reported(results, 6)
+    if noise.cases:
+        reported, remark = [result for result in results if result.name in noise.cases], []
     of_all_cases = [*_least_error_of_all(results, tables_by_name, scans), *_as_good_in_cases(results, tables_by_name)]
     of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name, scans)]
     filters = [(result, name) for result in reported for name in _reported_filters(result)]
     remedies = remedy_answer.remedy_sentence(filters, tables_by_name)
-    if not (answered := [*of_all_cases[:1], *of_cases, *remedies]):
+    if not (answered := [*noise.sentences, *of_all_cases[:1], *of_cases, *remedies]):
         return list(map(Sentence, remark))
     return [*answered, _prior_sentence(results), *map(Sentence, remark)]
 
@@ -77,7 +80,8 @@ def _prior_sentence(results: Sequence[Result]) -> Sentence:
         for name in ("sigma_velocity_mps", "sigma_acceleration_mps2")
     )
     text = tr(
-        "Prior of the filters: σ of the velocity {velocity} m/s, of the acceleration {acceleration} m/s².",
+        "Prior of the filters: σ of the velocity {velocity} m/s, of the acceleration {acceleration} m/s²; D: "
+        "unambiguous interval of the velocity.",
         velocity=velocity,
         acceleration=acceleration,
     )
@@ -194,8 +198,8 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
         for _, row in worst.iterrows()
     ]
     remark = _scans_remark(row for _, row in worst.iterrows())
-    text = tr("largest σ of the range {since}: {filters}", since=wording.since(*counted), filters="; ".join(errors))
-    clauses = [text + remark]
+    subject = tr("largest σ of the range {since}", since=wording.since(*counted))
+    clauses = ["; ".join(errors)]
     axes = result.axes
     best_order, best_combination = (
         float(np.min(np.max(sigma[axes.combines, counted.k - 1 :, 0], axis=1)))
@@ -212,7 +216,7 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
         )
     elif np.isfinite(best_order):
         clauses.append(tr("with the trajectory known, the best order of each scan gives {best:.4g} m", best=best_order))
-    text = f"{key_labels.plain_case_label(result)}: {'; '.join(clauses)}."
+    text = f"{key_labels.plain_case_label(result)}, {subject}{remark}: {'; '.join(clauses)}."
     intervals = [interval for _, row in worst.iterrows() for interval in _largest_sigma(row).intervals]
     return [Sentence(text, tuple(intervals))]
 
@@ -308,8 +312,8 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, loo
     fields = {"above": above.text("%", ".3g") + above.choice_remark(), "k": final["k"]}
     if final["excess_over_oracle_percent"] <= AS_GOOD_PERCENT:
         text = tr(
-            "σ of the velocity is {above} above that of unfolded velocity at scan {k}, the last: too few realisations "
-            "to tell whether within {percent:g} %",
+            "σ of the velocity is {above} above that of unfolded velocity at scan {k}, the last: perhaps within "
+            "{percent:g} %",
             percent=AS_GOOD_PERCENT,
             **fields,
         )
@@ -323,8 +327,7 @@ def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
     beyond = Estimate(*(float(folds[key]) for key in (BEYOND_SHARE, f"{BEYOND_SHARE}_lo", f"{BEYOND_SHARE}_hi")))
     share = ComparedValue(beyond, is_exact=False, kind="share").chosen_among(looks)
     text = tr(
-        "at scan {k}, the last, the velocity is off by more than half the unambiguous interval in {share} of "
-        "realisations",
+        "at scan {k} the velocity is off by more than D/2 in {share} of realisations",
         k=k,
         share=wording.share(*(100 * end for end in share.estimate)) + share.choice_remark(),
     )

@@ -197,6 +197,7 @@ class Filter(Model):
         " order 1, velocity (m/s)² of order 0; a list for several orders, in their order",
         symbol="D_M",
         unit="",
+        process_noise=True,
     )
     hypotheses: Annotated[int, WholeNumber(1, MAX_HYPOTHESES)] | None = key(
         "hypotheses kept",

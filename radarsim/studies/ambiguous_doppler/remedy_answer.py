@@ -1,7 +1,7 @@
 """What helps a filter that folded velocities make worse than the range alone, tried on realisations of the case."""
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -27,9 +27,9 @@ LOST_SHARE = 0.5  # of realisations, from which a filter counts as lost
 TRIAL_REALISATIONS = 400  # a share of a tenth is known to 1.5 points
 MAX_TRIAL_REALISATIONS = 4096  # a second or two for each remedy
 MAX_LOST_SHARE = 0.1  # of realisations, up to which a remedy helps
-MAX_NAMED = 2  # remedies in the sentence, the first that help
+MAX_NAMED = 2  # remedies in the answer, the first that help
 SMOOTH_MPS2 = 10.0  # acceleration that the model of order 1 allows for: what keeps the lock through turns of some g
-LARGER = 100.0  # times the manoeuvre variance
+LARGER = (10.0, 100.0, 1e3, 1e4)  # times the manoeuvre variance
 STAGGER = (1.0, 7 / 6, 4 / 3)  # times the repetition rate, used in turn
 MORE_HYPOTHESES = 4  # times the hypotheses kept
 PRIOR_FACTOR = 2.0  # between the prior's σ of velocity and that which fits the target's speed, from which that is tried
@@ -45,6 +45,10 @@ class Trial(NamedTuple):
     @property
     def helps(self) -> bool:
         return self.share <= MAX_LOST_SHARE and not self.gain <= 0
+
+    @property
+    def merit(self) -> float:
+        return -self.share if math.isnan(self.gain) else self.gain
 
 
 def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: TablesByName) -> list[Sentence]:
@@ -62,23 +66,27 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
                 **fields,
             )
             return [Sentence(text)]
-        cures_text = "; ".join(_trial_text(settings, trial) for settings, trial in tried)
-        text = tr(
-            "{case}, {filter}: what helps (tried on {count} realisations; add to the command, with --out cured): "
-            "{cures}.",
-            cures=cures_text,
-            **fields,
-        )
-        return [Sentence(text)]
+        return [
+            Sentence(
+                tr(
+                    "{case}, {filter}: what helps (tried on {count} realisations; add to the command, with --out "
+                    "cured): {settings}, {gains}.",
+                    settings=settings,
+                    gains=_trial_text(trial),
+                    **fields,
+                )
+            )
+            for settings, trial in tried
+        ]
     return []
 
 
-def _trial_text(settings: str, trial: Trial) -> str:
+def _trial_text(trial: Trial) -> str:
     share = numeral(f"{100 * trial.share:.2g}")
     if math.isnan(trial.gain):
-        return tr("{settings} ({share} % lost)", settings=settings, share=share)
+        return tr("{share} % lost", share=share)
     gain = numeral(f"{trial.gain:.0f}")
-    return tr("{settings} ({share} % lost, gain in range {gain} %)", settings=settings, share=share, gain=gain)
+    return tr("{share} % lost, gain in range {gain} %", share=share, gain=gain)
 
 
 def _is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:
@@ -116,22 +124,25 @@ def cures(
     swept: keys that the config sweeps, which no setting may change beside it. count: realisations of those that help on
     a few: rare losses decide a gain, and few realisations have none."""
     alone = next((f for f in spec.filters if f.doppler == "none" and f.combine is None), None)
-    for remedy in _remedies(spec, name):
-        if any(f"{setting}.".startswith(f"{key}.") for setting in remedy.settings for key in swept):
-            continue
+
+    def trial(remedy: _Remedy, realisations: int) -> Trial:
         filters = (remedy.filter,) if alone is None else (remedy.filter, alone)
         changes = {"radar": remedy.radar, "filters": filters, "baseline": None, "rare": None, "prior": remedy.prior}
-        changed = spec.model_copy(update=changes)
-        trial = _trial(changed, TRIAL_REALISATIONS)
-        if trial.helps and count > TRIAL_REALISATIONS:
-            trial = _trial(changed, count)
-        if trial.helps:
-            yield remedy.options, trial
+        return _trial(spec.model_copy(update=changes), realisations)
+
+    for group in _remedies(spec, name):
+        allowed = [r for r in group if not any(f"{s}.".startswith(f"{key}.") for s in r.settings for key in swept)]
+        promising = [remedy for remedy in allowed if trial(remedy, TRIAL_REALISATIONS).helps]
+        if promising:
+            trials = [(trial(remedy, max(count, TRIAL_REALISATIONS)), remedy.options) for remedy in promising]
+            best, options = max(trials, key=lambda tried: tried[0].merit)
+            if best.helps:
+                yield options, best
 
 
-def _remedies(spec: Any, name: str) -> Iterable[_Remedy]:
-    """What is tried, the least changes first: a larger manoeuvre variance, staggered repetition rates, a prior that
-    fits the target's speed, two orders with a smoother one, more hypotheses."""
+def _remedies(spec: Any, name: str) -> Iterator[list[_Remedy]]:
+    """What is tried, the least changes first, in groups: a larger manoeuvre variance, staggered repetition rates, a
+    prior that fits the target's speed, two orders with a smoother one, more hypotheses."""
     index, lost = next((i, f) for i, f in enumerate(spec.filters) if f.name == name)
     key, radar, prior = f"filters.{index}", spec.radar, spec.prior
     (variance, *_), rates = lost.variances, spec.radar.rates_hz
@@ -139,30 +150,31 @@ def _remedies(spec: Any, name: str) -> Iterable[_Remedy]:
     in_turn = {"radar.repetition_rate_hz": f"[{','.join(f'{rate:g}' for rate in staggered)}]"}
     rates_in_turn = radar.model_copy(update={"repetition_rate_hz": staggered})
     if lost.combine is None:
-        larger = {f"{key}.manoeuvre_variance": f"{LARGER * variance:g}"}
-        quicker = lost.model_copy(update={"manoeuvre_variance": LARGER * variance})
-        yield _Remedy(larger, quicker, radar, prior)
+        larger = [float(f"{factor * variance:.4g}") for factor in LARGER]
+        quicker = [lost.model_copy(update={"manoeuvre_variance": value}) for value in larger]
+        settings = [{f"{key}.manoeuvre_variance": f"{value:g}"} for value in larger]
+        yield [_Remedy(s, f, radar, prior) for s, f in zip(settings, quicker, strict=True)]
         if len(rates) == 1:
-            yield _Remedy(larger | in_turn, quicker, rates_in_turn, prior)
+            yield [_Remedy(s | in_turn, f, rates_in_turn, prior) for s, f in zip(settings, quicker, strict=True)]
     if len(rates) == 1:
-        yield _Remedy(in_turn, lost, rates_in_turn, prior)
+        yield [_Remedy(in_turn, lost, rates_in_turn, prior)]
     fitted = Prior.model_validate({}).fitted_to(spec.target)
     ratio = fitted.sigma_velocity_mps / prior.sigma_velocity_mps
     if states_speed(spec.target) and not 1 / PRIOR_FACTOR < ratio < PRIOR_FACTOR:
-        settings = {f"prior.{key}": f"{value:g}" for key, value in fitted}
-        yield _Remedy(settings, lost, radar, fitted)
+        yield [_Remedy({f"prior.{key}": f"{value:g}" for key, value in fitted}, lost, radar, fitted)]
     if lost.combine is None:
         both = {"orders": (1, 2), "combine": "likelihood", "manoeuvre_variance": (SMOOTH_MPS2**2, variance)}
-        settings = {
+        combined = {
             f"{key}.orders": "[1,2]",
             f"{key}.combine": "likelihood",
             f"{key}.manoeuvre_variance": f"[{SMOOTH_MPS2**2:g},{variance:g}]",
         }
-        yield _Remedy(settings, lost.model_copy(update=both | {"stay_probability": 0.95}), radar, prior)
+        yield [_Remedy(combined, lost.model_copy(update=both | {"stay_probability": 0.95}), radar, prior)]
     if lost.combine is None and lost.hypotheses and lost.merge == "never":
         more = min(MORE_HYPOTHESES * lost.hypotheses, MAX_HYPOTHESES)
         if more > lost.hypotheses:
-            yield _Remedy({f"{key}.hypotheses": f"{more}"}, lost.model_copy(update={"hypotheses": more}), radar, prior)
+            with_more = lost.model_copy(update={"hypotheses": more})
+            yield [_Remedy({f"{key}.hypotheses": f"{more}"}, with_more, radar, prior)]
 
 
 @lru_cache(maxsize=64)  # the answer is made for the page, and again where a program asks for it

@@ -44,10 +44,16 @@ class Filter(Member):
     sigma_acceleration_mps2: NonNegative = key(
         "σ of the acceleration",
         "of either coordinate, constant over a scan, m/s²",
+        symbol="σ_a",
         only={"model": ("velocity", "turn")},
+        process_noise=True,
     )
     sigma_jerk_mps3: NonNegative = key(
-        "σ of the jerk", "of either coordinate, constant over a scan, m/s³", only={"model": "acceleration"}
+        "σ of the jerk",
+        "of either coordinate, constant over a scan, m/s³",
+        symbol="σ_j",
+        only={"model": "acceleration"},
+        process_noise=True,
     )
     sigma_turn_rate_radps: NonNegative = key(
         "σ of the turn rate", "of its step in a scan, rad/s", only={"model": "turn"}
@@ -211,6 +217,11 @@ class Plane(PlanarStudy):
 
     def columns(self, spec, filter_keys):
         return super().columns(spec, filter_keys)[: 3 if filter_keys.doppler else 2]
+
+    def alternatives(self, spec, index):
+        """Higher repetition rates, with which velocities fold less."""
+        rate = spec.radar.repetition_rate_hz
+        return [] if rate is None else [(("radar.repetition_rate_hz", factor * rate),) for factor in (2.0, 4.0)]
 
     def tracker(self, case):
         if self.false_places(case.spec):

@@ -91,9 +91,10 @@ class PulsesToTracks(Study):
         return answer.question(experiment)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+        from radarsim.studies.process_noise_answer import best_noise
         from radarsim.studies.pulses_to_tracks import answer
 
-        return answer.answer(results, tables)
+        return [*best_noise(self, results, tables).sentences, *answer.answer(results, tables)]
 
     def warnings(self, experiment: "Experiment") -> Sequence[str]:
         from radarsim.studies.pulses_to_tracks import answer

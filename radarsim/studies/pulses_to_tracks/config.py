@@ -123,6 +123,7 @@ class Filter(Model):
         "variance of the random jerk it allows for, (m/s³)²; as in P1, not during its initial scans",
         symbol="D_M",
         unit="(m/s³)²",
+        process_noise=True,
     )
     process_noise: Literal["random_jerk", "white_jerk", "white_acceleration"] = key(
         "process noise",

@@ -143,9 +143,10 @@ class RangeDoppler(Study):
         return answer.question(experiment)
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
+        from radarsim.studies.process_noise_remedy import remedy_sentence
         from radarsim.studies.range_doppler import answer
 
-        return answer.answer(results, tables)
+        return [*answer.answer(results, tables), *remedy_sentence(self, results, tables, answer.alternatives)]
 
     def recording_interface(self) -> "RangeDopplerRecordedPlots":
         from radarsim.studies.range_doppler.recorded_plots import RangeDopplerRecordedPlots

@@ -1,7 +1,7 @@
 """What the report of P1's experiments asks and answers, in sentences."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.language.translate import join_names, plural, tr
@@ -37,14 +37,22 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
     Of cases that nothing is swept in, where there are such; with the greatest loss of any case at any scan. Further:
     the best D_M where several are tried, first where nothing but D_M is swept, and the worst error where a target
     breaks the model; the D_M that was looked for; and whether the radar's velocities are folded."""
-    gains = gain_answer.answer_gains(results, tables_by_name)
     best = variance_answer.best_variances(results, tables_by_name)
+    is_about_variance = variance_answer.sweeps_variance_only(results)
+    gains = gain_answer.answer_gains(results, tables_by_name, omits_range=is_about_variance and len(best) > 1)
     return [
-        *([*best, *gains] if variance_answer.sweeps_variance_only(results) else [*gains, *best]),
+        *([*best, *gains] if is_about_variance else [*gains, *best]),
         *_broken_model_sentences(results, tables_by_name),
         *variance_answer.optimised_variances(results[:MAX_CASES]),
         *_ambiguity_sentences(results),
     ]
+
+
+def alternatives(spec: Any, index: int) -> list[tuple[tuple[str, Any], ...]]:
+    """Other forms of the process noise of a filter, by index, that suit a manoeuvre that begins within a scan."""
+    given = getattr(spec.filters[index], "process_noise", None)
+    forms = () if given is None else ("white_jerk", "white_acceleration")
+    return [((f"filters.{index}.process_noise", form),) for form in forms if form != given]
 
 
 def _broken_model_sentences(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:

@@ -1,8 +1,8 @@
 """Keys of the range_doppler study (P1): a radar, a target in range, linear filters with and without the velocity."""
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -16,8 +16,6 @@ from radarsim.config.radial_keys import MAX_SCANS
 
 FOLDED_STUDY = "study=ambiguous_doppler"  # takes the same config over
 PLOTS_NEEDED = {1: 3, 2: 2}  # scans that determine range, velocity and acceleration, by the number of things observed
-
-SWEPT_POWERS = range(-2, 4)  # of ten, times a D_M
 
 
 class Radar(radial_keys.Radar):
@@ -206,6 +204,7 @@ class Filter(FilterKeys):
         "variance of the random jerk it allows for, (m/s³)²: D_M; or the error that it minimises",
         symbol="D_M",
         unit="(m/s³)²",
+        process_noise=True,
     )
     process_noise: Noise = key(
         "process noise",
@@ -236,15 +235,6 @@ class Keys(radial_keys.TimedStudyKeys):
     baseline: study_keys.Baseline = study_keys.BASELINE
     scans: Annotated[Annotated[int, key_types.WholeNumber(2, MAX_SCANS)] | None, marks.DesignMark()] = study_keys.SCANS
     duration_s: Annotated[Positive | None, marks.DesignMark(), LaterKeyMark()] = study_keys.DURATION
-
-    @classmethod
-    def sample_sweep(cls, data: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
-        """The D_M about that of the filters, where they have one."""
-        variances = {f.get("manoeuvre_variance") for f in data.get("filters", ()) if isinstance(f, Mapping)}
-        if len(variances) != 1 or not isinstance(variance := variances.pop(), int | float):
-            return super().sample_sweep(data)
-        values = [float(f"{variance * 10.0**power:.4g}") for power in SWEPT_POWERS]
-        return {"manoeuvre_variance": values}, "uncomment: each filter at its best D_M, and what Doppler is worth then"
 
     @model_validator(mode="after")
     def _completed(self) -> Self:

@@ -26,8 +26,10 @@ LONG_RUN_MARGIN = 1.0  # per cent: a gain further than this from that of the lon
 MIN_LOSS = 1.0  # per cent: from this loss on a case's worst gain is in the answer
 
 
-def answer_gains(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """A sentence on the gains in each component; of an experiment with a single filter one on its σ."""
+def answer_gains(results: Sequence[Result], tables_by_name: TablesByName, omits_range: bool = False) -> list[Sentence]:
+    """A sentence on the gains in each component; of an experiment with a single filter one on its σ.
+
+    omits_range: whether other sentences tell of the gain in range, so that this is on the greatest loss alone."""
     unswept_results = case_selection.unswept_cases(results)
     unswept_gains = tables_by_name["gains"]
     unswept_gains = unswept_gains[unswept_gains["case"].isin([result.name for result in unswept_results])]
@@ -41,11 +43,12 @@ def answer_gains(results: Sequence[Result], tables_by_name: TablesByName) -> lis
             component.words,
             labels,
             {result.name: case_scans(result.spec, result.axes.manoeuvre_variance, c) for result in results},
+            omits_range and c == 0,
         )
         for c, component in enumerate(RADIAL)
         if (component.name,) in gains
     ]
-    return of_components or [_sigma_sentence(results[0], tables_by_name["curves"])]
+    return [*filter(None, of_components)] or [_sigma_sentence(results[0], tables_by_name["curves"])]
 
 
 def _gain_sentence(
@@ -55,17 +58,21 @@ def _gain_sentence(
     quantity: str,
     labels: Mapping[str, str],
     scans: Mapping[str, CountedScans],
-) -> Sentence:
+    is_on_loss: bool,
+) -> Sentence | None:
     """The gain in one quantity at the last scan, or at the last common time.
 
     gains: of the cases in the sentence; all_gains: of all cases, among which the greatest loss is looked for; scans:
-    those of each case that count for extremes."""
+    those of each case that count for extremes; is_on_loss: on the greatest loss alone, if any."""
     if all(gain_sentences.is_equal(compared_value.row_value(row, GAIN)) for _, row in all_gains.iterrows()):
         return _equality(results, all_gains, quantity)
     best_clause: list[Sentence] = []
     compared, time_text = _rows_compared(gains)
     baseline = _than_baseline(results)
     has_several_filters = gains["filter"].nunique() > 1
+    if is_on_loss:
+        loss = _worst_loss(all_gains, None, labels, scans)
+        return loss[0].with_text(f"{_capitalised(quantity)}: {loss[0].text}, {baseline}.") if loss else None
     if len(compared) > 1:
         lowest, highest = (compared_value.extreme(compared, GAIN, largest) for largest in (False, True))
         clauses = [
@@ -98,7 +105,7 @@ def _gain_sentence(
         clauses = [Sentence(text, final_gain.intervals), *_long_run_clause(_long_run_gain(results, shown))]
         if not all(map(follows_the_model, results)):  # else, once settled, the gain stays what it is at the end
             best_clause = _best_gain(gains, shown, scans)
-    clauses += [*best_clause, *_worst_loss(all_gains, shown, labels, scans, says_since=not best_clause)]
+    clauses += [*best_clause, *_worst_loss(all_gains, shown.name, labels, scans)]
     sentence = sentences.join("; ", clauses)
     return sentence.with_text(f"{sentence.text}.")
 
@@ -151,19 +158,19 @@ def _range_of_gains(
         "quantity": _capitalised(quantity),
         "when": time_text,
         "base": baseline,
-        "least": _extreme_text(lowest[1]),
+        "least": gain_sentences.comparison_text(lowest[1]),
         "low": _case_label(lowest[0], labels, has_several_filters),
-        "most": _extreme_text(highest[1]),
+        "most": gain_sentences.comparison_text(highest[1]),
         "high": _case_label(highest[0], labels, has_several_filters),
+        "remark": lowest[1].choice_remark() or highest[1].choice_remark(),
     }
     if not compared_value.are_distinguished(lowest[1], highest[1]):
         text = tr(
-            "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), not significantly different from "
-            "each other, {base}",
+            "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), not significantly different, {base}{remark}",
             **fields,
         )
     else:
-        text = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}", **fields)
+        text = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}{remark}", **fields)
     return Sentence(text, (*lowest[1].intervals, *highest[1].intervals))
 
 
@@ -215,17 +222,14 @@ def _best_gain(
 
 
 def _worst_loss(
-    all_gains: "pd.DataFrame",
-    sentence_row: "pd.Series[Any]",
-    labels: Mapping[str, str],
-    scans: Mapping[str, CountedScans],
-    says_since: bool,
+    all_gains: "pd.DataFrame", stated: Any, labels: Mapping[str, str], scans: Mapping[str, CountedScans]
 ) -> list[Sentence]:
-    """The greatest loss of any case at the scans that count, unless it may be none or is the gain already given."""
+    """The greatest loss of any case at the scans that count, unless it may be none or is the gain already stated, by
+    its label in the table."""
     first_scan = all_gains["case"].map({case: counted.k for case, counted in scans.items()})
     all_gains = all_gains[all_gains["k"] >= first_scan]
     worst, loss = compared_value.extreme(all_gains, GAIN, largest=False)
-    if not loss.estimate.hi < -MIN_LOSS or worst.name == sentence_row.name:
+    if not loss.estimate.hi < -MIN_LOSS or worst.name == stated:
         return []
     has_several_filters = all_gains["filter"].nunique() > 1
     fields = {"gain": _extreme_text(loss), "t_s": worst["t_s"]}
@@ -235,7 +239,7 @@ def _worst_loss(
     else:
         text = tr("at worst {gain}, at {t_s:g} s", **fields)
     counted = scans[worst["case"]]
-    if says_since and counted.reason != "last":
+    if counted.reason != "last":
         text = f"{wording.since(*counted)} {text}"
     return [Sentence(text, loss.intervals)]
 

@@ -1,20 +1,28 @@
 """The answer's sentences on the manoeuvre variance D_M: the best of those tried, and those that were optimised."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.language.translate import join_names, plural, term, tr
-from radarsim.report import case_selection, compared_value, key_labels, tables, wording
+from radarsim.language.translate import plural, term, tr
+from radarsim.report import case_selection, key_labels, tables
 from radarsim.report.compared_value import ComparedValue
-from radarsim.report.quantities import SIGMA
+from radarsim.report.quantities import RADIAL
 from radarsim.report.sentences import Sentence
-from radarsim.report.statistics import Estimate, simultaneous_sizes
+from radarsim.report.statistics import Estimate
+from radarsim.studies import best_gain_answer
+from radarsim.studies.best_gain_answer import FilterChoices, NoiseKey
 from radarsim.studies.counted_scans import CountedScans
-from radarsim.studies.range_doppler import best_gain_answer, best_variance, settling
-from radarsim.studies.range_doppler.best_gain_answer import FilterChoices
+from radarsim.studies.process_noise_answer import (
+    WorstError,
+    best_values_sentence,
+    filter_choices,
+    measured_worst_errors,
+)
+from radarsim.studies.range_doppler import best_variance, settling
 from radarsim.studies.range_doppler.config import Best, Filter
 from radarsim.studies.range_doppler.designed_case import design_case
 from radarsim.studies.range_doppler.gain_answer import TablesByName
@@ -24,7 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MAX_COMPUTED_SCANS = 1000  # of a run: 0.3 s for each D_M
-MIN_RANGE = 3  # values next to each other that are named as a range
+D_M = NoiseKey("D_M", partial(key_labels.format_value, powers=True))
 CRITERION_TEXTS = {
     "worst": term("{error} is least at its worst from {t_s:g} s on"),
     "mean": term("{error} is least on average from {t_s:g} s on"),
@@ -45,7 +53,7 @@ def best_variances(results: Sequence[Result], tables_by_name: TablesByName) -> l
 def _best_settled_variances(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
     """The best manoeuvre variance of each radar and filter where several were tried, by exact values."""
     table = tables_by_name["steady"]
-    lines: list[str] = []
+    sentences: list[Sentence] = []
     gains: list[Sentence] = []
     for members in case_selection.group_by_config(results).values():
         rows = table[table["case"].isin([result.name for result in members]) & (table["component"] == "r")]
@@ -53,16 +61,16 @@ def _best_settled_variances(results: Sequence[Result], tables_by_name: TablesByN
             rows_with_variance = rows[rows["manoeuvre_variance"].notna()]  # a filter of a package may have none
             best = [_best_variance(rows, str(name)) for name, rows in rows_with_variance.groupby("filter", sort=False)]
             name = key_labels.without_markup(key_labels.config_device(members[0]))
-            lines.append(f"{name}: {'; '.join(best)}.")
-            gains += _gains_over(members[0], name, "sigma_r", "steady", _steady_choices(rows_with_variance))
-    rule = plural(
-        "Best manoeuvre variance D_M, (m/s³)² (least steady σ of the range among those that settle in under {count} "
-        "scan period).",
-        "Best manoeuvre variance D_M, (m/s³)² (least steady σ of the range among those that settle in under {count} "
-        "scan periods).",
-        PERIODS,
-    )
-    return [*_with_rule(rule, lines), *gains]
+            text = plural(
+                "{name}, best D_M, by the steady σ of the range, settled in under {count} scan period: {filters}.",
+                "{name}, best D_M, by the steady σ of the range, settled in under {count} scan periods: {filters}.",
+                PERIODS,
+                name=name,
+                filters="; ".join(best),
+            )
+            sentences.append(Sentence(text))
+            gains += _gains_over(members[0], name, 0, "steady", _steady_choices(rows_with_variance))
+    return [*sentences, *gains]
 
 
 def _steady_choices(rows: "pd.DataFrame") -> list[FilterChoices]:
@@ -76,20 +84,15 @@ def _steady_choices(rows: "pd.DataFrame") -> list[FilterChoices]:
 
 
 def _gains_over(
-    result: Result, subject: str, error: str, measure: str, choices: Sequence[FilterChoices]
+    result: Result, subject: str, component: int, measure: str, choices: Sequence[FilterChoices]
 ) -> list[Sentence]:
-    """The gains over a case's baseline, where that is among the filters with several D_M."""
+    """The gains over a case's baseline in σ of a component, if the baseline has several D_M."""
     baseline_name = result.axes.filters[result.axes.baseline]
     baseline = next((choice for choice in choices if choice.name == baseline_name), None)
     if baseline is None:
         return []
     others = [choice for choice in choices if choice.name != baseline_name]
-    return best_gain_answer.gain_sentences(subject, error, measure, baseline, others)
-
-
-def _with_rule(rule: str, lines: Sequence[str]) -> list[Sentence]:
-    """The lines as sentences, the first of them after the rule by which all were chosen."""
-    return [Sentence(f"{rule} {line}" if i == 0 else line) for i, line in enumerate(lines)]
+    return best_gain_answer.gain_sentences(subject, RADIAL[component].words, measure, D_M, baseline, others)
 
 
 def _best_variance(rows: "pd.DataFrame", filter_name: str) -> str:
@@ -136,7 +139,7 @@ def _has_swept_variance(result: Result) -> bool:
 def _best_variances_by_worst(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
     """The D_M of those tried with which the worst error is least, by radar and filter."""
     rows = tables.group_by(tables.select_rows(tables_by_name["curves"], component="r"), "case", "filter")
-    lines: list[str] = []
+    sentences: list[Sentence] = []
     gains: list[Sentence] = []
     for group, members in cases_over_variance(results).items():
         scans, name = _member_scans(members), key_labels.without_markup(group)
@@ -145,15 +148,10 @@ def _best_variances_by_worst(results: Sequence[Result], tables_by_name: TablesBy
             for f, filter_name in enumerate(members[0].axes.filters)
             if not np.isnan(members[0].axes.manoeuvre_variance[f])
         }
-        best = [_least_worst_error(filter_name, worst) for filter_name, worst in by_filter.items()]
-        lines.append(f"{name}, {wording.since(*scans)}: {'; '.join(best)}.")
-        choices = [
-            FilterChoices(filter_name, {v: error.bounds for v, error in worst.items()}, _equally_good(worst))
-            for filter_name, worst in by_filter.items()
-        ]
-        gains += _gains_over(members[0], name, "sigma_r", "worst", choices)
-    rule = tr("Best manoeuvre variance D_M, (m/s³)² (least worst σ of the range).")
-    return [*_with_rule(rule, lines), *gains]
+        sentences.append(best_values_sentence(name, RADIAL[0].words, tr("m"), scans, D_M, by_filter))
+        choices = [filter_choices(filter_name, worst) for filter_name, worst in by_filter.items()]
+        gains += _gains_over(members[0], name, 0, "worst", choices)
+    return [*sentences, *gains]
 
 
 def _member_scans(members: Sequence[Result]) -> CountedScans:
@@ -162,25 +160,9 @@ def _member_scans(members: Sequence[Result]) -> CountedScans:
     return max([scans for scans in counted if scans.reason != "last"] or counted)
 
 
-class _WorstError(NamedTuple):
-    """The greatest σ of a filter over the scans that count, and its time, s; with the ends of intervals that hold for
-    all scans, D_M and filters at once, so that the least of several may be taken."""
-
-    sigma: ComparedValue
-    t_s: float
-    bounds: Estimate
-
-
-def _worst_bounds(rows: "pd.DataFrame", looks: int) -> Estimate:
-    """The greatest σ of rows of `curves`, with an interval of which so many hold at once."""
-    measured = Estimate(*(rows[name].to_numpy(dtype=float) for name in ("sigma", "sigma_lo", "sigma_hi")))
-    widened, exact = simultaneous_sizes(measured, looks), rows["exact_sigma"].to_numpy(dtype=float)
-    return Estimate(*(float(np.nanmax(np.where(np.isnan(exact), end, exact))) for end in widened))
-
-
 def _worst_errors(
     f: int, members: Sequence[Result], rows: "Mapping[tuple[str, str], pd.DataFrame]", scans: CountedScans
-) -> dict[float, _WorstError]:
+) -> dict[float, WorstError]:
     """The worst error of filter f by its D_M; computed where the tables have it measured alone, so that noise does not
     decide."""
     variances = [float(member.axes.manoeuvre_variance[f]) for member in members]
@@ -190,17 +172,11 @@ def _worst_errors(
         if not np.isnan(sigma).any():
             t_s = members[0].axes.t_s[scans.k - 1 :]
             return {
-                variance: _WorstError(ComparedValue(worst, True), float(t_s[values.argmax()]), worst)
+                variance: WorstError(ComparedValue(worst, True), float(t_s[values.argmax()]), worst)
                 for variance, values in zip(variances, sigma, strict=True)
                 for worst in [Estimate(*[float(values.max())] * 3)]
             }
-    counted_rows = [table[table["k"] >= scans.k] for table in tables_of_members]
-    looks = len(members[0].axes.filters) * sum(map(len, counted_rows))
-    worst_rows = [compared_value.extreme(table, SIGMA) for table in counted_rows]
-    return {
-        variance: _WorstError(value, float(row["t_s"]), _worst_bounds(table, looks))
-        for variance, (row, value), table in zip(variances, worst_rows, counted_rows, strict=True)
-    }
+    return measured_worst_errors(variances, tables_of_members, scans, len(members[0].axes.filters))
 
 
 def _computed_sigma(result: Result, f: int, variances: np.ndarray) -> np.ndarray:
@@ -217,47 +193,6 @@ def _computed_sigma(result: Result, f: int, variances: np.ndarray) -> np.ndarray
     designed = design_case(Case(result.name, key_labels.config_stem(result), result.study, spec, (), 1, 1))
     filter_inputs = best_variance.FilterInputs(designed.plots, designed.x, designed.dt, designed.random_truth)
     return best_variance.errors(filter_, variances, filter_inputs)
-
-
-def _least_worst_error(filter_name: str, worst_by_variance: Mapping[float, _WorstError]) -> str:
-    """The D_M of a filter with the least worst σ; those together that differ by no more than their noise."""
-    ranked, equal = sorted(worst_by_variance), _equally_good(worst_by_variance)
-    best = min(ranked, key=lambda variance: worst_by_variance[variance].sigma.value)
-    least = worst_by_variance[best].sigma
-    if len(equal) == 1:
-        return tr(
-            "{filter} {variance} (σ at worst {sigma:.4g} m, at {t_s:g} s)",
-            filter=filter_name,
-            variance=key_labels.format_value(best, powers=True),
-            sigma=least.value,
-            t_s=worst_by_variance[best].t_s,
-        )
-    return tr(
-        "{filter} {variances} do equally well (σ at worst {low:.4g} to {high:.4g} m)",
-        filter=filter_name,
-        variances=_value_range(equal, ranked),
-        low=least.value,
-        high=max(worst_by_variance[variance].sigma.value for variance in equal),
-    )
-
-
-def _equally_good(worst_by_variance: Mapping[float, _WorstError]) -> list[float]:
-    """The D_M with the least worst σ, and those that differ from it by no more than their noise."""
-    least = min((worst.sigma for worst in worst_by_variance.values()), key=lambda sigma: sigma.value)
-    return [
-        variance
-        for variance in sorted(worst_by_variance)
-        if compared_value.is_equal(worst_by_variance[variance].sigma, least)
-    ]
-
-
-def _value_range(values: Sequence[float], ranked: Sequence[float]) -> str:
-    """Several of the ranked values, in words: as a range where there are some that are next to each other."""
-    names = [key_labels.format_value(value, powers=True) for value in values]
-    first = ranked.index(values[0])
-    if len(values) >= MIN_RANGE and list(values) == list(ranked[first : first + len(values)]):
-        return tr("{low} to {high}", low=names[0], high=names[-1])
-    return join_names(names)
 
 
 def _optimised_filters(result: Result) -> list[tuple[str, Best, float]]:
@@ -295,7 +230,8 @@ def _optimised_gains(result: Result, case: str) -> list[Sentence]:
         values = best_variance.objective(criterion, sigma)
         sigmas = {variance: Estimate(*[float(v)] * 3) for variance, v in zip(variances, values, strict=True)}
         choices.append(FilterChoices(axes.filters[f], sigmas, (float(axes.manoeuvre_variance[f]),)))
-    return _gains_over(result, case, criterion.minimise, str(criterion.over), choices)
+    component = best_variance.COMPONENTS[criterion.minimise]
+    return _gains_over(result, case, component, str(criterion.over), choices)
 
 
 def _optimised_variance(result: Result, filter_name: str, objective: Best, variance: float) -> str:

@@ -108,9 +108,11 @@ class Smoothing(Part):
 
     def answer(self, results: "Sequence[CaseResult]", tables: "Mapping[str, pd.DataFrame]") -> "Sequence[Sentence]":
         from radarsim.studies.counted_scans import result_scans
+        from radarsim.studies.process_noise_answer import best_noise
         from radarsim.studies.sonar import answer
 
-        return answer.answer(results, tables, {result.name: result_scans(STUDY, result) for result in results})
+        scans = {result.name: result_scans(STUDY, result) for result in results}
+        return [*best_noise(STUDY, results, tables).sentences, *answer.answer(results, tables, scans)]
 
     def drawing(self, case: "Case") -> "DrawPlots":
         from radarsim.studies.sonar import tracking

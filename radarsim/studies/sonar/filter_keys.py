@@ -62,6 +62,7 @@ class Filter(Model):
         symbol="D_M",
         unit="",
         only={"kind": MODELLED},
+        process_noise=True,
     )
     error_correlation: key_types.Correlation | Correlations | None = key(
         "correlation of neighbouring errors",

@@ -9,8 +9,9 @@ from scipy import linalg
 import radarsim
 from radarsim.api import new_configs
 from radarsim.report.statistics import Estimate, root_mean_square, simultaneous_sizes
+from radarsim.studies.best_gain_answer import FilterChoices, gain_sentences
 from radarsim.studies.range_doppler import variance_answer
-from radarsim.studies.range_doppler.best_gain_answer import FilterChoices, gain_sentences
+from radarsim.studies.range_doppler.variance_answer import D_M
 
 SIGMA, DT = np.array([15.0, 0.8]), 2.5
 RADAR = {"name": "mine", "wavelength_m": 0.032, "sigma_range_m": 15, "sigma_velocity_mps": 0.8, "scan_period_s": DT}
@@ -154,12 +155,12 @@ def test_with_missed_plots_a_straight_target_has_its_sentence_too():
 def test_values_that_tie_make_a_span():
     r = FilterChoices("r", {0.1: Estimate(10, 10, 10), 1.0: Estimate(10.05, 10.05, 10.05)}, (0.1, 1.0))
     v = FilterChoices("v", {0.1: Estimate(5, 5, 5), 1.0: Estimate(5.02, 5.02, 5.02)}, (0.1, 1.0))
-    (sentence,) = gain_sentences("mine", "sigma_r", "worst", r, [v])
+    (sentence,) = gain_sentences("mine", "range", "worst", D_M, r, [v])
     assert "49.8 to 50.2 % with each at its best D_M; with one D_M for both" in sentence.text
     alone = [choice._replace(best=(0.1,)) for choice in (r, v)]
-    (sentence,) = gain_sentences("mine", "sigma_r", "worst", alone[0], alone[1:])
+    (sentence,) = gain_sentences("mine", "range", "worst", D_M, *alone[:1], alone[1:])
     assert ": 50.0 % with each at its best D_M" in sentence.text
-    assert gain_sentences("mine", "sigma_r", "worst", r._replace(best=()), [v]) == []
+    assert gain_sentences("mine", "range", "worst", D_M, r._replace(best=()), [v]) == []
 
 
 def test_interval_of_the_gain_holds_whichever_was_picked():
@@ -175,8 +176,8 @@ def test_interval_of_the_gain_holds_whichever_was_picked():
         return FilterChoices(name, sigmas, [min(sigmas, key=lambda v: sigmas[v].value)])
 
     for _ in range(runs):
-        (sentence,) = gain_sentences("mine", "sigma_r", "worst", choices("r", 2.0), [choices("v", 1.0)])
-        low, high = map(float, re.search(r"([\d.]+) to ([\d.]+) % \(95 % interval\) with each", sentence.text).groups())
+        (sentence,) = gain_sentences("mine", "range", "worst", D_M, choices("r", 2.0), [choices("v", 1.0)])
+        low, high = map(float, re.search(r"([\d.]+) … ([\d.]+) % with each", sentence.text).groups())
         covered += low <= 50 <= high
     assert covered >= 0.95 * runs
 
@@ -211,5 +212,5 @@ def test_measured_errors_have_intervals_for_all_scans_variances_and_filters_at_o
         widened[(widened["filter"] == name) & (widened["case"].str.endswith("0.1"))][["value", "lo", "hi"]].max()
         for name in ("r", "r+Vr")
     )
-    ends = f"{100 * (1 - v['hi'] / r['lo']):.1f} to {100 * (1 - v['lo'] / r['hi']):.1f} % (95 % interval) (10⁻¹)"
+    ends = f"{100 * (1 - v['hi'] / r['lo']):.1f} … {100 * (1 - v['lo'] / r['hi']):.1f} % (10⁻¹)"
     assert ends.replace("-", "−") in gain_sentence(result)

@@ -278,7 +278,7 @@ def test_answer_tells_the_greatest_loss(expected_radar):
     results = [expected_radar("rls2", 1e-4, target=BRAKING, radar=sharp)]
     made = made_of(results)
     words = greatest_loss(made)
-    assert answer_texts(answer, results, made)[0].endswith(f"; {words}.")
+    assert answer_texts(answer, results, made)[0].endswith(f"; from the manoeuvre on (54 s) {words}.")
     others = [expected_radar("rls2", name="calm"), expected_radar("rls5", name="fine"), *results]
     made = made_of(others)
     words = greatest_loss(made)
@@ -295,8 +295,8 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
 
 def test_answer_tells_the_best_variance(swept):
     told = answer_texts(answer, swept, made_of(swept))[0]  # before the gains: it is what is asked
-    assert told.startswith("Best manoeuvre variance D_M")
-    assert "RLS 2: r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
+    assert told.startswith("RLS 2, best D_M, by the steady σ of the range, settled in under 10 scan periods: ")
+    assert ": r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
 
 
 def test_a_target_that_breaks_the_model(expected_radar):
@@ -345,17 +345,17 @@ def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, r
     source = {**radar_config("rls2", target=BRAKING), "sweep": {"manoeuvre_variance": values}}
     results = [expected_case(case) for case in load(source).cases]
     worst = np.array([result.axes.exact_sigma[:, 5:, 0].max(axis=1) for result in results])
-    told = next(one for one in told_of(results) if one.startswith("Best manoeuvre variance"))
+    told = next(one for one in told_of(results) if ", best D_M, by the worst σ of the range" in one)
     for f, name in enumerate(("r", "r+Vr")):
         best = values[int(worst[:, f].argmin())]
         equal = [value for value, sigma in zip(values, worst[:, f], strict=True) if sigma < 1.01 * worst[:, f].min()]
         texts = [key_labels.format_value(value, powers=True) for value in equal]
         if name == "r+Vr":
             assert equal == [best]
-            assert f"{name} {texts[0]} (σ at worst {worst[:, f].min():.4g} m, at " in told
+            assert f"{name} {texts[0]} (σ {worst[:, f].min():.4g} m, at " in told
         else:
             ends = " to ".join(f"{sigma:.4g}" for sigma in sorted(worst[worst[:, f] < 1.01 * worst[:, f].min(), f]))
-            assert f"{name} {texts[0]} and {texts[1]} do equally well (σ at worst {ends} m)" in told
+            assert f"{name} {texts[0]} and {texts[1]} do equally well (σ {ends} m)" in told
     assert not any("further cases break the model" in one for one in told_of(results))
 
 

@@ -1,0 +1,98 @@
+"""The answer's sentences on a gain with each filter at its best process noise, beside that at the same one for both.
+
+A paper asks for the second; whoever chooses a filter for a radar, for the first."""
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from radarsim.language.numerals import numeral
+from radarsim.language.translate import term, tr
+from radarsim.report.sentences import Sentence
+from radarsim.report.statistics import Estimate
+
+MEASURE_TEXTS = {
+    "worst": term("{component} at worst"),
+    "mean": term("{component} on average"),
+    "last": term("{component} at the last scan"),
+    "steady": term("{component} once settled"),
+}
+
+
+class NoiseKey(NamedTuple):
+    """A key of process noise in sentences: its letter, or its name; and how a value of it is written."""
+
+    symbol: str
+    value_text: Callable[[Any], str]
+
+
+class FilterChoices(NamedTuple):
+    """A filter with several values of its process noise: σ by value, its ends the same where it is known, else of
+    intervals that all hold at once; and the best values, of which there are several where noise or too little parts
+    them."""
+
+    name: str
+    sigmas: Mapping[Any, Estimate]
+    best: Collection[Any]
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether noise is in any σ."""
+        return any(sigma.lo < sigma.hi for sigma in self.sigmas.values())
+
+    @property
+    def best_sigma(self) -> Estimate:
+        """σ with any of the best values: the least, and the ends of all of them."""
+        sigmas = [self.sigmas[value] for value in self.best]
+        return Estimate(*(pick(float(s[i]) for s in sigmas) for i, pick in enumerate((min, min, max))))
+
+
+def gain_sentences(
+    subject: str, quantity: str, measure: str, key: NoiseKey, baseline: FilterChoices, others: Collection[FilterChoices]
+) -> list[Sentence]:
+    """How much each of the others gains over the baseline in σ of a quantity; measure: over scans as."""
+    what = tr(MEASURE_TEXTS[measure], component=tr("σ of the {quantity}", quantity=quantity))
+    return [
+        Sentence(
+            tr(
+                "{subject}, gain in {what}, {filter} over {baseline}{remark}: {clauses}.",
+                subject=subject,
+                what=what,
+                filter=other.name,
+                baseline=baseline.name,
+                remark=f" ({tr('95 % intervals')})" if baseline.is_measured or other.is_measured else "",
+                clauses="; ".join(_clauses(key, baseline, other)),
+            )
+        )
+        for other in others
+        if baseline.best and other.best
+    ]
+
+
+def _clauses(key: NoiseKey, baseline: FilterChoices, other: FilterChoices) -> Iterator[str]:
+    is_measured = baseline.is_measured or other.is_measured
+    gain = _span_text(_gain(baseline.best_sigma, other.best_sigma), is_measured)
+    yield tr("{gain} with each at its best {symbol}", gain=gain, symbol=key.symbol)
+    gains = {
+        value: _gain(baseline.sigmas[value], sigma) for value, sigma in other.sigmas.items() if value in baseline.sigmas
+    }
+    ends = dict.fromkeys(pick(gains, key=lambda value: gains[value].value) for pick in (min, max) if gains)
+    texts = [f"{_span_text(gains[value], is_measured)} ({key.value_text(value)})" for value in ends]
+    if texts:
+        gains_text = texts[0] if len(texts) == 1 else tr("{low} to {high}", low=texts[0], high=texts[1])
+        yield tr("with one {symbol} for both {gains}", symbol=key.symbol, gains=gains_text)
+
+
+def _gain(baseline: Estimate, sigma: Estimate) -> Estimate:
+    """The gain, per cent, with the ends that those of both σ allow."""
+    ratios = sigma.value / baseline.value, sigma.hi / baseline.lo, sigma.lo / baseline.hi
+    return Estimate(*(100 * (1 - float(ratio)) for ratio in ratios))
+
+
+def _span_text(gain: Estimate, is_measured: bool) -> str:
+    """A gain, or its span where its ends differ as they are shown: of D_M that are equally good, or of noise."""
+    value, low, high = (numeral(f"{end:.1f}") for end in gain)
+    if low == high:
+        return tr("{value} %", value=value)
+    if is_measured:
+        return tr("{low} … {high} %", low=low, high=high)
+    return tr("{low} to {high} %", low=low, high=high)
