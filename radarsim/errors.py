@@ -36,6 +36,20 @@ class ConfigError(RadarsimError):
     exit_code = 2
 
 
+class UnknownConfig(ConfigError):
+    """No config has this name; the api words it in the language in use.
+
+    meant: the name that is meant, or empty; nearest: else the nearest ones, of so many."""
+
+    def __init__(self, name: str, meant: str, nearest: tuple[str, ...], count: int):
+        others = f"the nearest: {', '.join(nearest)}; `radarsim list configs` has all {count}"
+        super().__init__(f"{name}: no such config; {f'did you mean {meant}?' if meant else others}")
+        self.name, self.meant, self.nearest, self.count = name, meant, nearest, count
+
+    def __reduce__(self) -> tuple[type[RadarsimError], tuple[object, ...]]:
+        return type(self), (self.name, self.meant, self.nearest, self.count)
+
+
 class PlotFault(ConfigError):
     """A row of recorded plots that a filter cannot take, and why; row counts from 0 in the columns that were fed."""
 

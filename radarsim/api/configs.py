@@ -9,7 +9,7 @@ from typing import Any
 from radarsim.config import find_files, overrides
 from radarsim.config import load as config_loading
 from radarsim.config.experiment import Case, Experiment
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, UnknownConfig
 from radarsim.extensions import extensions
 from radarsim.language import current
 from radarsim.language.translate import tr
@@ -29,10 +29,25 @@ def load(source: Config, overrides: Overrides = ()) -> Experiment:
     also in the claims of an installed package's study."""
     if isinstance(source, Experiment):
         return source
-    experiment = config_loading.load(source, overrides, registry)
+    try:
+        experiment = config_loading.load(source, overrides, registry)
+    except UnknownConfig as error:
+        raise ConfigError(_unknown_config_text(error)) from None
     if experiment.study not in registry.SHIPPED and (faults := _extension_faults(experiment.study)):
         raise ConfigError(*faults)
     return experiment
+
+
+def _unknown_config_text(error: UnknownConfig) -> str:
+    """The message that no config has a name, in the language in use."""
+    if error.meant:
+        return tr("{name}: no such config; did you mean {meant}?", name=error.name, meant=error.meant)
+    return tr(
+        "{name}: no such config; the nearest: {nearest}; `radarsim list configs` has all {count}",
+        name=error.name,
+        nearest=", ".join(error.nearest),
+        count=error.count,
+    )
 
 
 @cache

@@ -22,6 +22,8 @@ STUDY_OR_INCLUDED = re.compile(
     r"""^(study|include):[\s\[\-"']*([\w.-]+)""", re.MULTILINE
 )  # of several included configs the first
 
+MIN_VARIANTS = 6  # of a config, from which they are folded
+
 
 def config_description(text: str) -> str:
     """The first line of a YAML file's leading comment, without the file's name; empty where there is none."""
@@ -84,6 +86,25 @@ def inventory() -> Inventory:
         (term("Studies (study: NAME)"), ("name", "paper and question"), study_rows),
         (term("Filters"), ("study", "keys", "what it is"), filters),
     ]
+
+
+def fold_families(entries: Inventory, words: Sequence[str]) -> tuple[Inventory, dict[str, int]]:
+    """An inventory without the many variants of a config, whose names begin with its name; and how many each has.
+
+    Those stay that the words name: all configs, or a part of the config's name."""
+    folded: dict[str, int] = {}
+    kinds = {title.partition(" ")[0].lower() for title, _, _ in entries}
+    shown = []
+    for title, columns, rows in entries:
+        if not kinds.issuperset(map(str.lower, words)):
+            for name, *_ in rows if "paper" in columns else ():
+                is_meant = any(word.lower() in name.lower() for word in words)
+                if (count := sum(other.startswith(f"{name}_") for other, *_ in rows)) >= MIN_VARIANTS and not is_meant:
+                    folded[name] = count
+        shown.append(
+            (title, columns, [row for row in rows if not any(row[0].startswith(f"{name}_") for name in folded)])
+        )
+    return shown, folded
 
 
 def filter_inventory(entries: Inventory, words: Sequence[str]) -> Inventory:

@@ -14,7 +14,7 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
     """List configs, scenarios, studies and filters.
 
     Prints their names on one screen. With WORD, prints a line on each match: configs, scenarios, studies or filters, a
-    paper (P2), or text in a name or line.
+    paper (P2), or text in a name or line. Many variants of a config share its line, unless its name is given.
 
     \b
     Examples
@@ -24,7 +24,7 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
       radarsim list sonar clutter
       radarsim list --json | jq -r '.configs[].name'
     """
-    from radarsim.api.inventory import filter_inventory, inventory
+    from radarsim.api.inventory import filter_inventory, fold_families, inventory
 
     matches = filter_inventory(inventory(), words)
     if as_json:
@@ -34,7 +34,7 @@ def list_(words: tuple[str, ...], as_json: bool) -> None:
         return
     from radarsim.cli import print_inventory
 
-    print_inventory.print_inventory(matches) if words else print_inventory.print_names(matches)
+    print_inventory.print_inventory(*fold_families(matches, words)) if words else print_inventory.print_names(matches)
 
 
 @main.command()

@@ -97,9 +97,19 @@ def print_names(inventory: "Inventory") -> None:
     print_line(tr("A line each: `radarsim list configs`, scenarios, studies, filters, P2, any word"))
 
 
-def print_inventory(inventory: "Inventory") -> None:
-    """Filters, studies, scenarios and configs, with a line on each: the most useful last."""
+def print_inventory(inventory: "Inventory", folded: Mapping[str, int]) -> None:
+    """Filters, studies, scenarios and configs, with a line on each: the most useful last. folded: how many variants of
+    a config are left out."""
     for n, (title, columns, rows) in enumerate(reversed(inventory)):
         if n:
             print_line("")
         print_table(tr(title), columns, [(*row[:-1], tr(row[-1])) for row in rows])
+    for name, count in folded.items():
+        print_line(
+            plural(
+                "{count} variant of {name}: `radarsim list {name}`",
+                "{count} variants of {name}: `radarsim list {name}`",
+                count,
+                name=name,
+            )
+        )

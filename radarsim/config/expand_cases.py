@@ -13,15 +13,7 @@ from radarsim.config.document import Document
 from radarsim.config.drafts import Draft, Expansion, OverlaidKeys, changes_included, config_name
 from radarsim.config.error_list import ABSENT, ErrorList, Origin
 from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches_pattern
-from radarsim.config.find_files import (
-    RESERVED,
-    available_stems,
-    config_file,
-    did_you_mean,
-    is_reserved,
-    is_stem,
-    known_names_hint,
-)
+from radarsim.config.find_files import RESERVED, available_stems, config_file, did_you_mean, is_reserved, is_stem
 from radarsim.config.inline_files import (
     ConfigFiles,
     ReadDocument,
@@ -51,15 +43,11 @@ MAX_CASES = 10_000
 MAX_INCLUDE_DEPTH = 5
 
 
-def no_such_config(name: str, studies: Studies, list_names: bool = False) -> str:
-    """The message that no config has this name: why its package cannot be used, or the nearest name.
-
-    list_names: whether to list all names where none is near."""
+def no_such_config(name: str, studies: Studies) -> str:
+    """The message that no config has this name: why its package cannot be used, or the nearest name."""
     if reasons := studies.reasons_for_missing_config(name):
         return f"no such config: {'; '.join(reasons)}"
-    available = available_stems("configs")
-    hint = known_names_hint(name, available, "configs") if list_names else did_you_mean(name, available)
-    return f"no such config{hint}"
+    return f"no such config{did_you_mean(name, available_stems('configs'))}"
 
 
 class Expander:

@@ -87,10 +87,19 @@ def is_reserved(stem: str) -> bool:
 
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """`; did you mean X?` for the nearest known name, or nothing."""
+    return f"; did you mean {meant}?" if (meant := meant_name(name, known_names)) else ""
+
+
+def meant_name(name: str, known_names: Iterable[str]) -> str:
+    """The known name that is meant; empty where none is near."""
     name, known_names = str(name)[:100], list(known_names)
     beginnings = [full for full in known_names if len(name) > 2 and full.lower().startswith(name.lower())]
-    matches = beginnings or difflib.get_close_matches(name, known_names, n=1, cutoff=0.6)
-    return f"; did you mean {matches[0]}?" if matches else ""
+    return next(iter(beginnings or difflib.get_close_matches(name, known_names, n=1, cutoff=0.6)), "")
+
+
+def nearest_names(name: str, known_names: Iterable[str]) -> tuple[str, ...]:
+    """The three known names that are nearest."""
+    return tuple(difflib.get_close_matches(str(name)[:100], list(known_names), n=3, cutoff=0.0))
 
 
 def known_names_hint(name: str, known_names: Iterable[str], kind: str) -> str:
@@ -100,5 +109,5 @@ def known_names_hint(name: str, known_names: Iterable[str], kind: str) -> str:
         return suggestion
     if len(known_names) <= MAX_NAMES_LISTED:
         return f"; there are: {', '.join(known_names)}"
-    nearest = difflib.get_close_matches(str(name)[:100], known_names, n=3, cutoff=0.0)
-    return f"; the nearest: {', '.join(nearest)}; `radarsim list {kind}` has all {len(known_names)}"
+    nearest = ", ".join(nearest_names(name, known_names))
+    return f"; the nearest: {nearest}; `radarsim list {kind}` has all {len(known_names)}"

@@ -10,12 +10,21 @@ from radarsim.config.complete_config import CONFIG_FILE
 from radarsim.config.document import Document
 from radarsim.config.drafts import changes_included
 from radarsim.config.error_list import ErrorList, Origin
-from radarsim.config.expand_cases import Expander, no_such_config
+from radarsim.config.expand_cases import Expander
 from radarsim.config.experiment import Experiment
-from radarsim.config.find_files import RESERVED, config_file, is_reserved, is_stem
+from radarsim.config.find_files import (
+    RESERVED,
+    available_stems,
+    config_file,
+    is_reserved,
+    is_stem,
+    meant_name,
+    nearest_names,
+)
 from radarsim.config.overrides import Overrides, override_texts, parse_setting
 from radarsim.config.scalars import from_python
 from radarsim.config.yaml_io import read_document
+from radarsim.errors import UnknownConfig
 
 
 def load(source: str | os.PathLike[str] | Mapping[str, Any], overrides: Overrides, studies: Studies) -> Experiment:
@@ -73,8 +82,11 @@ def _find_config(source: str | bytes | os.PathLike[str], studies: Studies, fault
     is_path = os.path.isfile(name) and (bool(Path(name).suffix) or config_path is None)
     file = None if is_path else config_path
     if file is None and is_stem(name) and not is_path and not Path(name).suffix and not _is_result(name):
-        faults.add(Origin(name), (), no_such_config(name, studies, list_names=True))
-        return None
+        if reasons := studies.reasons_for_missing_config(name):
+            faults.add(Origin(name), (), f"no such config: {'; '.join(reasons)}")
+            return None
+        known = available_stems("configs")
+        raise UnknownConfig(name, meant_name(name, known), nearest_names(name, known), len(known))
     file = file or Path(name)
     if os.path.isdir(file):
         file = file / CONFIG_FILE

@@ -54,3 +54,24 @@ def test_what_a_name_may_begin_with_is_told_in_one_line(tmp_path, name, shown):
     assert line.endswith("that begins with a letter, a digit or _")
     assert "\n" not in line
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("code", "meant", "nearest"),
+    [
+        ("en", "rsl2: no such config; did you mean rls2?", "nosuch: no such config; the nearest: "),
+        ("ru", "rsl2: такой конфигурации нет; возможно, rls2?", "nosuch: такой конфигурации нет; ближайшие: "),
+    ],
+)
+def test_an_unknown_config_is_answered_in_the_language_in_use(monkeypatch, code, meant, nearest):
+    monkeypatch.setenv("RADARSIM_LANGUAGE", code)
+    assert meant in command("check", "rsl2", code=2).output
+    assert nearest in command("check", "nosuch", code=2).output
+
+
+def test_a_list_shows_a_family_of_variants_in_one_line_unless_they_are_meant():
+    shown = command("list", "P4").output
+    assert "16 variants of discriminator: `radarsim list discriminator`" in shown
+    assert "discriminator_tails" not in shown
+    for words in (("discriminator",), ("configs",), ("P4", "tails")):
+        assert "discriminator_tails" in command("list", *words).output
