@@ -187,7 +187,7 @@ ROOMS = {
 # Inside a study: what each role may import of the rooms, and of its own study's roles.
 NUMBERS = (
     *("errors", "user_code.errors", "system.threads", "constants", "kernels", "physics", "bursts", "bursts.kernels"),
-    *(*CASE, *SUMS, "studies.counted_scans"),
+    *(*CASE, *SUMS, "studies.counted_scans", "studies.long_run"),
 )
 DISPLAY = ("config.experiment", "engine.results", "kernels", "report", "studies.counted_scans")
 DESIGN = ("kernels", "config", "design")

@@ -21,6 +21,7 @@ from radarsim.api.precision_target import (
     check_precision,
     heavy_tailed_table,
     unknown_quantity,
+    with_long_run,
 )
 from radarsim.api.progress import seconds_each
 from radarsim.engine.collect import collect
@@ -164,8 +165,9 @@ def check(
     threads = available_cores() if threads is None else max(threads, 1)
     if precision is not None:
         check_precision([experiment], precision, of)
+        (experiment,), of = with_long_run([experiment], of)
     cases: list[CaseCost] = []
-    quantity = SIGMA if precision is None else registry.quantity(of, experiment.cases[0])
+    quantity = SIGMA if precision is None else registry.quantity(asked_phrase(of).name, experiment.cases[0])
     largest_size, preparation_s = 0, 0.0
     study = registry.study(experiment.study)
     study.prepare(experiment.cases[0])  # imports are not to be timed

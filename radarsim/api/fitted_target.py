@@ -97,9 +97,12 @@ def settled_s(case: Case) -> float | None:
     or is not known before a search for D_M."""
     study = registry.study(case.study)
     has_variances = all(isinstance(getattr(f, "manoeuvre_variance", 0.0), float) for f in case.spec.members)
-    if not (has_known_settling(case) and has_variances) or (long_case := study.in_the_long_run(case)) is None:
+    if not (has_known_settling(case) and has_variances):
         return None
-    scans = study.counted_scans(long_case, "r")
+    try:
+        scans = study.counted_scans(study.in_the_long_run(case), "r")
+    except ConfigError:  # filters do not settle
+        return None
     return None if scans is None or scans.reason == "last" else scans.t_s
 
 

@@ -5,9 +5,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from radarsim.api.case_work import CaseWork
 from radarsim.config.experiment import Case, Experiment
-from radarsim.config.quantity_phrase import OVER_SCANS, PhraseError, QuantityPhrase, is_counted, parse_phrase
+from radarsim.config.quantity_phrase import (
+    OVER_SCANS,
+    TIME_ROUNDING,
+    PhraseError,
+    QuantityPhrase,
+    is_counted,
+    parse_phrase,
+)
 from radarsim.engine.results import CaseResult
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, argument
 from radarsim.report.quantities import GAIN, Quantity
 from radarsim.studies import registry
 from radarsim.studies.registry import study
@@ -61,12 +68,20 @@ def quantity_table(case: Case, quantity: Quantity) -> "Table":
 def asked_phrase(text: str) -> QuantityPhrase:
     """What a precision is asked for: a quantity's name, of all its rows, or a phrase. Raises ConfigError."""
     try:
-        phrase = parse_phrase(text)
+        return parse_phrase(text)
     except PhraseError as error:
-        raise ConfigError(f"of: {error}") from None
-    if phrase.over == "long run":
-        raise ConfigError(f"of: a run ends at its last scan: give a time, or a longer run by scans: N, got {text!r}")
-    return phrase
+        raise ConfigError(f"{argument('of', '--for')}: {error}") from None
+
+
+def with_long_run(experiments: Sequence[Experiment], text: str) -> tuple[list[Experiment], str]:
+    """The experiments in which a phrase is read, and the phrase for them: for the long run their cases last until the
+    filters have settled, without a manoeuvre, and it is asked of their end. Raises ConfigError where they do not."""
+    phrase = asked_phrase(text)
+    if phrase.over != "long run":
+        return list(experiments), text
+    from radarsim.api.long_experiment import long_experiment
+
+    return [long_experiment(experiment) for experiment in experiments], f"{phrase.name} {phrase.component or ''}"
 
 
 def asked_table(case: Case, text: str) -> "Table":
@@ -80,19 +95,33 @@ def asked_table(case: Case, text: str) -> "Table":
 
     def rows(results: Sequence[CaseResult]) -> Any:
         found = table(results)
-        if phrase.component is not None:
+        if phrase.component is not None and len(found):
+            from radarsim.api.design.quantities import check_name
+
             column = quantity.per or "filter"
-            found = found[found[column].astype(str) == phrase.component]
-        if "k" not in found or not len(found):
-            return found
-        if phrase.over in OVER_SCANS:
-            return found[is_counted(found["t_s"], from_s)]
-        if phrase.at_s is not None:
-            distance = (found["t_s"] - phrase.at_s).abs()
-            return found[distance == distance.min()]
-        return found[found["k"] == (phrase.at_k or found["k"].max())]
+            names = found[column].astype(str)
+            check_name(phrase.component, list(dict.fromkeys(names)), column)
+            found = found[names == phrase.component]
+        return found if "k" not in found or not len(found) else found[_is_asked(phrase, found, from_s)]
 
     return rows
+
+
+def _is_asked(phrase: QuantityPhrase, rows: Any, from_s: float | None) -> Any:
+    """Which rows lie at the scans of a phrase, by default at the last. Raises ConfigError for a scan beyond the run."""
+    last_k, last_s = rows["k"].max(), rows["t_s"].max() if "t_s" in rows else 0.0
+    option = argument("of", "--for")
+    for time_s in (phrase.at_s, from_s):
+        if time_s is not None and not 0 <= time_s <= last_s * (1 + TIME_ROUNDING):
+            raise ConfigError(f"{option}: must be from 0 to {last_s:g} s, the last scan's time, got {time_s:g}")
+    if phrase.over in OVER_SCANS:
+        return is_counted(rows["t_s"], from_s)
+    if phrase.at_s is not None:
+        distance = (rows["t_s"] - phrase.at_s).abs()
+        return distance == distance.min()
+    if phrase.at_k is not None and not (rows["k"] == phrase.at_k).any():
+        raise ConfigError(f"{option}: must be a scan of the tables, to {last_k}, got {phrase.at_k}")
+    return rows["k"] == (last_k if phrase.at_k is None else phrase.at_k)
 
 
 def unknown_quantity(case: Case, quantity: Quantity) -> str:

@@ -62,17 +62,17 @@ def run(
     `{"radar.sigma_range_m": 300}`, or texts, `["radar.sigma_range_m=300"]`.
 
     With a precision, in per cent, a case ends at the first of 2000, 4000, 8000 …, N realisations at which the 95 %
-    half-width of every σ is below it; `of` names another quantity of the study (gain, lock, …). If errors are not known
-    to be Gaussian, σ and gains are not judged before 64,000, or before 512,000 after large errors. decide: all cases
-    end at the first of these numbers at which every claim of the config is decided. time_limit is in seconds, including
-    tables and figures, or a condition that is already running. `result.unmet` names the targets that were not reached.
-    workers: number of processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already
-    open. width_mm: width of the figures, instead of their own. replace: whether tables of other settings or another
-    seed, or of more realisations, may be replaced in the folder of the result; otherwise ConfigError is raised before
-    anything is computed, and of more realisations the stored ones are shown. runs: scans, `2:60` or `all`, for the
-    table `runs` of each run's root-mean-square error over them (`Result.add_runs_table`), in place of those of the
-    config. progress is called with the realisations that are done, are to be done, and were stored, where cases are
-    weighed by their time.
+    half-width of every σ is below it; `of` names another quantity of the study (gain, lock, …), or is a phrase as in
+    `solve`; for the long run the cases last until their filters have settled. If errors are not known to be Gaussian, σ
+    and gains are not judged before 64,000, or before 512,000 after large errors. decide: all cases end at the first of
+    these numbers at which every claim of the config is decided. time_limit is in seconds, including tables and figures,
+    or a condition that is already running. `result.unmet` names the targets that were not reached. workers: number of
+    processes on this machine; scheduler: address of a Dask scheduler; executor: one that is already open. width_mm:
+    width of the figures, instead of their own. replace: whether tables of other settings or another seed, or of more
+    realisations, may be replaced in the folder of the result; otherwise ConfigError is raised before anything is
+    computed, and of more realisations the stored ones are shown. runs: scans, `2:60` or `all`, for the table `runs` of
+    each run's root-mean-square error over them (`Result.add_runs_table`), in place of those of the config. progress is
+    called with the realisations that are done, are to be done, and were stored, where cases are weighed by their time.
 
     Raises ConfigError for an invalid config, StoreError for a disk fault, NonFiniteError for a filter that diverged,
     TargetUnmet if the time did not suffice for a single block, and Interrupted on a signal; finished blocks are then
@@ -98,9 +98,10 @@ def run(
         parse_span(runs)
         experiment = experiment.with_runs(runs)
     if precision is not None:
-        from radarsim.api.precision_target import check_precision
+        from radarsim.api import precision_target
 
-        check_precision([experiment], precision, of)
+        precision_target.check_precision([experiment], precision, of)
+        (experiment,), of = precision_target.with_long_run([experiment], of)
     rule = required_stop_rule() if decide else None
     if rule is not None:
         rule.check(experiment)

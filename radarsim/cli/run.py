@@ -107,7 +107,7 @@ def run(
 
         overrides = load_experiments.combine_overrides(overrides, realisations, seed)
         names = [name for name, _ in sources]
-        loaded = _load_experiments(names, overrides, None if precision is None else (precision, of), decide)
+        loaded, of = _load_experiments(names, overrides, precision, of, decide, quiet or as_json)
         loaded = hand_over.named_by_results(loaded, sources, out)
         if not quiet:
             hand_over.print_large_runs(loaded, sources)
@@ -170,18 +170,23 @@ def _refuse_incompatible(shard: object, precision: object, cluster: object, thre
 
 
 def _load_experiments(
-    configs: Sequence[str], overrides: tuple[str, ...], precision: tuple[float, str] | None, decide: bool
-) -> "list[Experiment]":
-    """The experiments, all checked, with the quantities that their claims and a precision need."""
-    from radarsim.api import load_experiments, precision_target
+    configs: Sequence[str], overrides: tuple[str, ...], precision: float | None, of: str, decide: bool, quiet: bool
+) -> "tuple[list[Experiment], str]":
+    """The experiments, all checked, with the quantities that their claims and a precision need; and what that is of."""
+    from radarsim.api import load_experiments, long_experiment, precision_target
     from radarsim.api import run as api_run
+    from radarsim.cli import console
 
     loaded = load_experiments.load_all(configs, overrides)
     if precision is not None:
-        precision_target.check_precision(loaded, *precision)
+        precision_target.check_precision(loaded, precision, of)
+        of_config = of
+        loaded, of = precision_target.with_long_run(loaded, of)
+        for line in long_experiment.long_run_notes(loaded) if of != of_config and not quiet else ():
+            console.print_error_line(tr("note: {words}", words=line))
     for experiment in loaded if decide else ():
         api_run.required_stop_rule().check(experiment)
-    return loaded
+    return loaded, of
 
 
 def _print_user_code(loaded: "list[Experiment]", quiet: bool) -> None:

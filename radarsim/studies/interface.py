@@ -139,9 +139,9 @@ class Study(ABC):
 
         return without_manoeuvre(spec)
 
-    def in_the_long_run(self, case: "Case", filter_names: "Collection[str] | None" = None) -> "Case | None":
-        """A case whose last scan is that of the same filters once settled, without a manoeuvre; None where those named,
-        by default all, do not settle. Default: with so many scans that σ stays, exact or of a few realisations."""
+    def in_the_long_run(self, case: "Case", filter_names: "Collection[str] | None" = None) -> "Case":
+        """A case whose last scan is that of the same filters once settled, without a manoeuvre. Raises ConfigError
+        where those named, by default all, do not settle. Default: so many scans that σ stays, exact or sampled."""
         from radarsim.studies.long_run import extended_case
 
         return extended_case(self, case, filter_names)

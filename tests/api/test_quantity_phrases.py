@@ -5,7 +5,7 @@ import pytest
 
 import radarsim
 from radarsim.api.configs import load
-from radarsim.api.design import quantities
+from radarsim.api.design import objective
 from radarsim.config.quantity_phrase import PhraseError, QuantityPhrase, parse_phrase
 from radarsim.errors import ConfigError
 from tests.program import command
@@ -119,7 +119,10 @@ def test_tune_and_sensitivity_take_the_worst_error():
         ),
         (["solve", "rls2", SIGMA_V, "--for", "sigma r", "--sigma", "r", "--equals", "3"], "got sigma, --for"),
         (["sensitivity", "rls2", "--for", "sigma r", "--component", "r"], "--component: stands in --for already"),
-        (["sensitivity", "multimodel", "--for", "sigma x in the long run"], "do not settle, or settle only beyond"),
+        (
+            ["sensitivity", "multimodel", "--for", "sigma x in the long run"],
+            "the run lasts as long as the target's flight",
+        ),
     ],
 )
 def test_what_goes_against_a_phrase_is_refused(words, message):
@@ -160,8 +163,14 @@ def test_a_precision_is_asked_of_a_phrase():
     assert set(late["t_s"]) == {100.0, 110.0, 120.0, 130.0, 140.0}
     assert set(at_60_s["component"]) == set(late["component"]) == {"r"}
     assert (last["k"].tolist(), last["component"].tolist()) == ([15], ["Vr"])
-    with pytest.raises(ConfigError, match="a run ends at its last scan"):
-        asked_table(case, "sigma r in the long run")
+    for text, message in (
+        ("sigma q", "no component 'q'; there are: r, Vr, ar"),
+        ("sigma r at 1e9 s", "must be from 0 to 140 s, the last scan's time, got 1e\\+09"),
+        ("worst sigma r from 999 s", "must be from 0 to 140 s"),
+        ("sigma r at k 99", "must be a scan of the tables, to 15, got 99"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            asked_table(case, text)(result.cases)
 
 
 @pytest.mark.slow
@@ -199,7 +208,7 @@ def test_an_exact_long_run_is_solved_once(monkeypatch):
 
     calls, steady = [], long_run.steady_sigma
     monkeypatch.setattr(long_run, "steady_sigma", lambda case: calls.append(case) or steady(case))
-    quantities.steady_sigma.cache_clear()
+    objective.steady_sigma.cache_clear()
     radarsim.sensitivity(MINE, wanted="sigma r in the long run")
     assert len(calls) == len(set(calls))
 
@@ -211,3 +220,72 @@ def test_a_sampled_gain_is_solved_where_a_further_quantity_has_no_column():
         **{"wanted": "gain r", "filter": "no memory", "equals": 30, "between": (1, 3), "realisations": 60},
     )
     assert not answer.exact
+
+
+def test_a_precision_of_the_long_run_extends_the_run_until_its_filters_have_settled(tmp_path):
+    """The case that its config.yaml describes: the same σ at its last scan as Riccati's."""
+    result = radarsim.run(
+        MINE | {"name": "mine"},
+        precision=20,
+        of="sigma r in the long run",
+        realisations=4000,
+        out=tmp_path,
+        figures=False,
+    )
+    last = result.curves[result.curves["component"] == "r"].groupby("filter").last().loc["r+Vr"]
+    assert last["exact_sigma"] == pytest.approx(steady_sigma(0.8), rel=1e-6)
+    assert last["k"] > MINE["scans"]
+    written = load(str(tmp_path / "mine" / "config.yaml"))
+    assert [case.spec for case in written.cases] == [case.spec for case in result.experiment.cases]
+    assert result.facts["command"] == "radarsim run config.yaml"
+
+
+def test_cases_of_a_long_run_last_equally_long():
+    from radarsim.api.long_experiment import long_experiment, long_run_notes
+
+    both = long_experiment(load(MINE | {"sweep": {"manoeuvre_variance": [1e-5, 1e-1]}}))
+    (scans,) = {case.spec.scans for case in both.cases}
+    assert both.content["include" if "include" in both.content else "scans"]
+    assert long_run_notes([both]) == [
+        f"{both.stem}: the long run is {scans} scans without a manoeuvre, to {2.5 * (scans - 1):g} s"
+    ]
+
+
+def test_the_exact_gain_of_a_config_needs_no_realisations():
+    """Its baseline has none: that is no gap."""
+    found = radarsim.sensitivity(MINE, wanted="gain r", realisations=2)
+    assert found.table["exact"].all()
+    assert found.without_estimate == ()
+
+
+@pytest.mark.parametrize("verb", ["solve", "tune"])
+def test_a_quantity_without_its_component_is_refused_with_those_there_are(verb):
+    words = [SIGMA_V, "--equals", "3"] if verb == "solve" else []
+    result = command(verb, "rls2", *words, "--for", "sigma", "--filter", "r", code=2)
+    assert "--for: σ is of a component: name one, such as sigma r; there are: r, Vr, ar" in result.output
+    values = ["sensor.sigma_range_m", "--equals", "3"] if verb == "solve" else []
+    result = command(verb, "multimodel", *values, "--for", "probability", "--filter", "MMA2-11", "-n", "2", code=2)
+    assert "name one, such as probability 1; there are: 1, 2" in result.output
+
+
+def test_check_takes_a_phrase_too():
+    assert "known from" in command("check", "rls2", "--precision", "1", "--for", "gain of Vr at the end").output
+    outlook = radarsim.check(MINE, realisations=4000, precision=1, of="sigma r in the long run")
+    assert outlook.cases[0].scans > MINE["scans"]
+
+
+def test_a_long_run_is_never_shorter_than_the_config():
+    """Keys may name scans of it, as the uses of a manoeuvre detector do."""
+    from radarsim.studies import registry
+
+    (case,) = load("plane_aspect").cases[:1]
+    scans = registry.study(case.study).in_the_long_run(case).spec.scans
+    assert scans >= case.spec.scans
+
+
+def test_noise_is_common_at_the_same_scan_or_the_same_time():
+    from radarsim.api.design.objective import have_common_noise
+
+    assert have_common_noise({(15, 140.0), (15, 154.0)})  # a longer period
+    assert have_common_noise({(25, 0.3), (21, 0.3)})  # other windows over the same burst
+    assert not have_common_noise({(15, 140.0), (17, 160.0)})  # a longer run

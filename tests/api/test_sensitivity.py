@@ -8,7 +8,6 @@ import pytest
 
 from radarsim.api.configs import load
 from radarsim.api.design import jackknife, tornado
-from radarsim.api.design import quantities as design_quantities
 from radarsim.api.design import sensitivity as design_sensitivity
 from radarsim.api.design.sensitivity import sensitivity
 from radarsim.errors import ConfigError
@@ -96,10 +95,9 @@ def test_the_last_scans_time_is_kept_when_the_period_grows():
 
 
 @pytest.mark.slow
-def test_sampled_changes_are_paired_and_near_the_exact_ones(exact, monkeypatch):
-    """With exact values withheld: within four standard errors, and far narrower than two runs of their own."""
-    monkeypatch.setattr(design_quantities, "exact_value", lambda *_: np.nan)
-    found = sensitivity("rls2", at_s=60.0, realisations=4000)
+def test_sampled_changes_are_paired_and_near_the_exact_ones(exact):
+    """Sampled though known: within four standard errors, and far narrower than two runs of their own."""
+    found = sensitivity("rls2", at_s=60.0, realisations=4000, sampled=True)
     for key in ("radar.sigma_range_m", "radar.sigma_velocity_mps"):
         one, known = row(found, key), row(exact, key)
         assert not one["exact"]
@@ -195,11 +193,10 @@ def test_items_of_a_list_are_raised_though_the_config_gives_degrees():
 
 
 @pytest.mark.slow
-def test_a_changed_period_is_not_paired_and_has_more_realisations(monkeypatch):
-    """With exact values withheld: its interval holds the exact change, and the others stay paired."""
+def test_a_changed_period_is_not_paired_and_has_more_realisations():
+    """Sampled though known: its interval holds the exact change, and the others stay paired."""
     known = sensitivity("rls2", overrides=["scans=7"])
-    monkeypatch.setattr(design_quantities, "exact_value", lambda *_: np.nan)
-    found = sensitivity("rls2", overrides=["scans=7"], realisations=2000)
+    found = sensitivity("rls2", overrides=["scans=7"], realisations=2000, sampled=True)
     assert found.not_paired == ("radar.scan_period_s",)
     one, exactly = (row(of, "radar.scan_period_s")["sigma_change_percent"] for of in (found, known))
     whole = row(found, "radar.scan_period_s")

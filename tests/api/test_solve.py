@@ -11,10 +11,11 @@ import pytest
 from click.testing import CliRunner
 
 import radarsim
-from radarsim.api.design import quantities, question, root_search, sampled_solve
+from radarsim.api.design import question, root_search, sampled_solve
 from radarsim.api.design import solve as design_solve
-from radarsim.api.design.quantities import QuantityName, check_quantity
-from radarsim.api.design.question import Cases, Curve
+from radarsim.api.design.objective import Curve, Objective, have_common_noise
+from radarsim.api.design.quantities import QuantityName, check_quantity, estimate_at, quantity_table, series_by_filter
+from radarsim.api.design.question import Cases
 from radarsim.cli.command_group import main
 from radarsim.errors import ConfigError
 from radarsim.report.statistics import Z95, Estimate
@@ -233,7 +234,7 @@ def test_the_interval_holds_the_root_where_the_quantity_s_own_interval_there_hol
     exact = solve("rls2", key, quantity, equals, overrides=overrides, between=between).value
     for seed in range(seeds):
         cases = Cases("rls2", (*overrides, f"seed={seed}"))
-        at_root = Curve(cases, key, check_quantity(quantity, cases.base), 1, None, 400).simulate(exact, 400)
+        at_root = Curve(cases, key, Objective([check_quantity(quantity, cases.base)], 1), 400).simulate(exact, 400)
         found = solve(
             *("rls2", key, quantity, equals),
             **{"overrides": cases.overrides, "between": between, "sampled": True, "realisations": 400, "threads": 1},
@@ -264,7 +265,7 @@ def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
     assert said[-1] == words
     assert found.lo <= exact.value <= found.hi
     cases = Cases("rls2", tuple(MOVED["overrides"]))
-    more = Curve(cases, "radar.scan_period_s", check_quantity(SEEN, cases.base), 1, None, 800)
+    more = Curve(cases, "radar.scan_period_s", Objective([check_quantity(SEEN, cases.base)], 1), 800)
     assert found.attained == more.simulate(found.value, 800).value
 
 
@@ -274,10 +275,10 @@ def test_a_key_that_moves_the_scans_is_said_not_to_be_paired():
 )
 def test_a_key_that_leaves_the_scans_is_paired(key, quantity):
     cases = Cases("rls2", ("duration_s=140",))
-    curve = Curve(cases, key, check_quantity(quantity, cases.base), 1, None, 100)
+    curve = Curve(cases, key, Objective([check_quantity(quantity, cases.base)], 1), 100)
     for value in (6, 7, 8):
         curve.simulate(value, 100)
-    assert len(curve.scans) == 1
+    assert have_common_noise(curve.scans)
 
 
 @pytest.mark.slow
@@ -418,11 +419,11 @@ def test_what_comes_later_is_left_out_and_changes_nothing(at, overrides):
     case = load("rls2", overrides).cases[0]
     whole = registry.study(case.study).prepare(case).axes
     for kind, name in (("gain", "r+Vr"), ("sigma", "r")):
-        quantity = check_quantity(QuantityName(kind, name, "r", **at), case)
-        part = quantities.plan_labels(quantity, case)
+        objective = Objective([check_quantity(QuantityName(kind, name, "r", **at), case)])
+        part = objective.labels(case)
         assert len(part.k) < len(whole.k) or not at
-        expected = quantities.exact_value(quantity, case, whole)
-        assert_rounded(quantities.exact_value(quantity, case, part), expected, max(abs(expected), 100), operations=4)
+        (expected,), (value,) = objective.exact_values(case, whole), objective.exact_values(case, part)
+        assert_rounded(value, expected, max(abs(expected), 100), operations=4)
 
 
 def test_a_variance_that_is_looked_for_is_of_the_whole_run():
@@ -430,7 +431,7 @@ def test_a_variance_that_is_looked_for_is_of_the_whole_run():
 
     best = ["target=turn", "manoeuvre_variance={minimise: sigma_r, over: worst}", "scans=20"]
     case = load("rls2", best).cases[0]
-    assert len(quantities.plan_labels(check_quantity(QuantityName("sigma", "r", "r", at_k=4), case), case).k) == 20
+    assert len(Objective([check_quantity(QuantityName("sigma", "r", "r", at_k=4), case)]).labels(case).k) == 20
 
 
 def test_a_value_that_makes_the_run_impossible_is_refused_though_only_its_beginning_is_asked():
@@ -596,19 +597,21 @@ def test_the_run_that_a_sampled_answer_names_confirms_it(kind):
     overrides = [words[i + 1] for i, word in enumerate(words) if word == "--set"]
     result = radarsim.run(words[2], overrides=overrides, realisations=1000)
     one = next(one for one in result.cases if one.name == given.get("case", one.name))
-    seen, _ = quantities.sampled_value(check_quantity(quantity, one), one)
+    measured = check_quantity(quantity, one)
+    series = series_by_filter(measured.definition, quantity_table(measured.definition, one))
+    seen = estimate_at(measured, series[measured.filter, measured.component or ""])
     half = (seen.hi - seen.lo) / 2
     assert abs(seen.value - equals) <= 2 * math.sqrt(2) * half, (seen, found)
 
 
 def test_a_fault_of_a_study_is_not_taken_for_a_quantity_without_values(monkeypatch):
-    exact = quantities.exact_value
+    exact = Objective.exact_values
 
-    def failing(quantity, case, axes):
+    def failing(self, case, axes=None):
         if case.spec.radar.sigma_velocity_mps > 1000:
             raise np.linalg.LinAlgError("Singular matrix")
-        return exact(quantity, case, axes)
+        return exact(self, case, axes)
 
-    monkeypatch.setattr(quantities, "exact_value", failing)
+    monkeypatch.setattr(Objective, "exact_values", failing)
     with pytest.raises(np.linalg.LinAlgError):
         solve("rls2", "radar.sigma_velocity_mps", GAIN, 30)

@@ -8,7 +8,8 @@ import pytest
 import radarsim
 from radarsim.api.configs import load
 from radarsim.api.design import tuning_search, tuning_space
-from radarsim.api.design.quantities import QuantityName, check_quantity, exact_value, parse_quantity, plan_labels
+from radarsim.api.design.objective import Objective
+from radarsim.api.design.quantities import QuantityName, check_quantity, parse_quantity
 from radarsim.api.design.solve import solve
 from radarsim.api.design.tune import tune
 from radarsim.errors import ConfigError
@@ -28,8 +29,8 @@ FAMILY = ("turn", "jerk_pulse", "polynomial", "acceleration_start")
 def sigma(config, *overrides, name="r+Vr", at_s=60.0):
     """The exact σ of the range."""
     (case,) = load(config, overrides).cases
-    asked = check_quantity(QuantityName("sigma", name, "r", at_s), case)
-    return exact_value(asked, case, plan_labels(asked, case))
+    (value,) = Objective([check_quantity(QuantityName("sigma", name, "r", at_s), case)]).exact_values(case)
+    return float(value)
 
 
 def with_variance(value, target):
@@ -402,7 +403,7 @@ def test_the_command_prints_and_writes(tmp_path):
     ],
 )
 def test_what_is_wanted_is_read_from_text(text, asked):
-    assert parse_quantity(text, "f") == asked
+    assert parse_quantity(text, "f") == asked._replace(in_phrase=True)
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,7 @@ def test_solve_takes_one_from_a_table_of_exact_values_alone(radarsim):
     assert least["value"] == pytest.approx(known.value, rel=PRECISION)
     for option, value in (("--at", 3), ("--at-k", 2)):
         words = ("solve", "a.yaml", KEY, "--limit", "r+Vr", "--equals", 100, option, value)
-        refused = f"{option}: the smallest error has one value, not one a scan: leave it out\n"
+        refused = f"{option}: the smallest error has one value, not one a scan: leave the time out\n"
         assert radarsim(*words, code=2).stderr == refused
 
 

@@ -1,11 +1,9 @@
-"""A quantity of a case at one scan: exact where it is known, else sampled.
+"""A quantity of a case at one scan, over several, or in the long run: its name, its words, and its value in a table.
 
-Exact values follow from the plan of a case, without a realisation. Sampled ones are read from the tables by column
-names that all studies share: any study with a table `locks` has the quantity lock."""
+Tables are read by column names that all studies share: any study with a table `locks` has the quantity lock."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -31,14 +29,14 @@ OVER_TEXTS = {  # by what is taken, and whether a time is given
     ("mean", True): term("mean {what} from {t_s:g} s on"),
     ("mean", False): term("mean {what}"),
 }
-UNPAIRED_FACTOR = 4  # factor on the realisations where a change moves the scans, so that the noise is not common
+SETTLED_AT = term("{what} (settled, at {t_s:g} s)")
 
 
 class QuantityName(NamedTuple):
     """A quantity as a user names it: the names of the quantity, of the filter and of the component.
 
     A quantity over scans is taken at time at_s, linear between two scans, or at scan at_k; by default at the last. over
-    and from_s: as in `QuantityPhrase`."""
+    and from_s: as in `QuantityPhrase`; in_phrase: whether a phrase says it all, and no option."""
 
     name: str
     filter: str | None = None
@@ -47,6 +45,7 @@ class QuantityName(NamedTuple):
     at_k: int | None = None
     over: Over = "at"
     from_s: float | None = None
+    in_phrase: bool = False
 
 
 def parse_quantity(text: str, filter_name: str | None) -> QuantityName:
@@ -55,12 +54,13 @@ def parse_quantity(text: str, filter_name: str | None) -> QuantityName:
         phrase = parse_phrase(text)
     except PhraseError as error:
         raise ConfigError(f"{argument('wanted', '--for')}: {error}") from None
-    return QuantityName(filter=filter_name, **phrase._asdict())
+    return QuantityName(filter=filter_name, in_phrase=True, **phrase._asdict())
 
 
 @dataclass(frozen=True)
 class MeasuredQuantity:
-    """A quantity that a case measures; the other fields are those of `QuantityName`."""
+    """A quantity that a case measures; settled_s: the time, s, of a long run at which its filters have settled, where
+    it is no limit; the other fields are those of `QuantityName`."""
 
     definition: Quantity
     filter: str | None = None
@@ -69,11 +69,20 @@ class MeasuredQuantity:
     at_k: int | None = None
     over: Over = "at"
     from_s: float | None = None
+    in_phrase: bool = False
+    settled_s: float | None = None
 
     @property
     def is_over_scans(self) -> bool:
         """Whether it is the worst or the mean of several scans."""
         return self.over in OVER_SCANS
+
+    @property
+    def time_option(self) -> str:
+        """The argument that says its scan."""
+        if self.in_phrase:
+            return argument("wanted", "--for")
+        return argument("at_s", "--at") if self.at_k is None else argument("at_k", "--at-k")
 
     @property
     def words(self) -> str:
@@ -97,7 +106,8 @@ class MeasuredQuantity:
         if self.is_over_scans:
             return tr(OVER_TEXTS[self.over, bool(self.from_s)], what=subject, t_s=self.from_s or 0.0)
         if self.over == "long run":
-            return tr("{what} in the long run", what=subject)
+            text = tr("{what} in the long run", what=subject)
+            return text if self.settled_s is None else tr(SETTLED_AT, what=text, t_s=self.settled_s)
         if self.at_k is not None:
             return tr("{what} at k = {k}", what=subject, k=str(self.at_k))
         return subject if self.at_s is None else tr("{what} at {t_s:g} s", what=subject, t_s=self.at_s)
@@ -119,14 +129,14 @@ def parse_request(text: str, filter_name: str | None, at_s: float | None, at_k: 
     if (request.over, request.at_s, request.at_k) != ("at", None, None):
         option = argument("at_s", "--at") if at_k is None else argument("at_k", "--at-k")
         raise ConfigError(f"{option}: the time stands in {argument('wanted', '--for')} already: {text!r}")
-    return request._replace(at_s=at_s, at_k=at_k)
+    return request._replace(at_s=at_s, at_k=at_k, in_phrase=False)
 
 
 def check_quantity(request: QuantityName, case: Case, user_filters: Sequence[str] = ()) -> MeasuredQuantity:
     """Check a request before anything is prepared. Raises ConfigError for an unknown quantity or filter.
 
     user_filters: names of the config's filters that are written in Python; the case does not hold them."""
-    name, filter_name, component, at_s, at_k, over, from_s = request
+    name, filter_name, component, at_s, at_k, over, from_s, in_phrase = request
     definition = registry.quantity(name, case)
     if not definition.per:
         if filter_name is not None and component is not None:
@@ -144,7 +154,7 @@ def check_quantity(request: QuantityName, case: Case, user_filters: Sequence[str
             )
         check_name(filter_name, filter_names)
     from_s = registry.counted_from_s(case, component, over, from_s)
-    return MeasuredQuantity(definition, filter_name, component, at_s, at_k, over, from_s)
+    return MeasuredQuantity(definition, filter_name, component, at_s, at_k, over, from_s, in_phrase)
 
 
 def check_name(name: str, names: Sequence[str], item: str = "filter") -> None:
@@ -169,9 +179,23 @@ def resolve_scan(quantity: MeasuredQuantity, axes: Axes) -> MeasuredQuantity:
         raise ConfigError(
             f"filter {filter_name!r} is the baseline, against which {words}s are: its {words} is 0 % at any value"
         )
-    if quantity.component is not None and is_planned(quantity.definition):
-        check_name(quantity.component, [name for name, _ in axes.components], "component")
-    return replace(quantity, filter=filter_name)
+    if not is_planned(quantity.definition):
+        return replace(quantity, filter=filter_name)
+    return with_component(replace(quantity, filter=filter_name), [name for name, _ in axes.components])
+
+
+def with_component(quantity: MeasuredQuantity, components: Sequence[str]) -> MeasuredQuantity:
+    """The quantity with its component, which may be left out where there is one. Raises ConfigError for another."""
+    definition = quantity.definition
+    if not definition.per or quantity.component is not None:
+        check_name(quantity.component or "", components, definition.per)
+        return quantity
+    if len(components) > 1:
+        raise ConfigError(
+            f"{argument('wanted', '--for')}: {definition.words} is of a {definition.per}: name one, such as "
+            f"{definition.name} {components[0]}; there are: {', '.join(components)}"
+        )
+    return replace(quantity, component=components[0])
 
 
 def unit(quantity: MeasuredQuantity, axes: Axes) -> str:
@@ -181,123 +205,12 @@ def unit(quantity: MeasuredQuantity, axes: Axes) -> str:
     return wording.unit(quantity.definition.shown_unit(dict(axes.components).get(str(quantity.component), "")))
 
 
-def shorten_case(quantity: MeasuredQuantity, case: Case) -> Case:
-    """The case shortened to the scans that a quantity needs. Raises ConfigError where the whole case is invalid."""
-    if quantity.over == "long run" and steady_sigma(case) is not None:
-        return registry.study(case.study).shortened(case, None, 1)
-    if quantity.over != "at":
-        return case_read(quantity, case)
-    return registry.study(case.study).shortened(case, quantity.at_s, quantity.at_k)
-
-
-def case_read(quantity: MeasuredQuantity, case: Case) -> Case:
-    """The case in which a quantity is read: of the long run one that lasts until its filters have settled, without a
-    manoeuvre. Raises ConfigError where they do not settle."""
-    if quantity.over != "long run":
-        return case
-    long_case = registry.study(case.study).in_the_long_run(case, compared_filters(quantity, case))
-    if long_case is None:
-        raise ConfigError(
-            f"{case.name}: in the long run: errors of {quantity.filter or 'a filter'} do not settle, or settle only "
-            "beyond what can be computed: give a time"
-        )
-    return long_case
-
-
-def plan_labels(quantity: MeasuredQuantity, case: Case) -> Axes:
-    """The labels of a case's plan, with exact errors up to the scans that a quantity needs. Raises ConfigError."""
-    return registry.study(case.study).prepare(shorten_case(quantity, case)).axes
-
-
-def compared_filters(quantity: MeasuredQuantity, case: Case) -> set[str] | None:
-    """The names of the filters on which a quantity depends; None: all."""
-    if quantity.filter is None:
-        return None
-    baseline = {getattr(case.spec, "baseline", None) or case.spec.members[0].name}
-    return {quantity.filter} | (baseline if quantity.definition.paired else set())
-
-
-def is_settled(quantity: MeasuredQuantity, case: Case) -> bool:
-    """Whether the filters on which an error at a time depends have settled by then, or the target manoeuvres before;
-    also where that is not known."""
-    if quantity.over != "at" or not is_planned(quantity.definition):
-        return True
-    names, spec = compared_filters(quantity, case), case.spec
-    members = tuple(member for member in spec.members if names is None or member.name in names)
-    changes = {type(spec).bare_keys: members} | ({"baseline": None} if hasattr(spec, "baseline") else {})
-    compared = replace(case, spec=spec.model_copy(update=changes))
-    try:
-        scans = registry.study(case.study).counted_scans(compared, quantity.component)
-    except ConfigError:  # other keys name the filters that are left out
-        scans = registry.study(case.study).counted_scans(case, quantity.component)
-    if scans is None or scans.reason == "manoeuvre":
-        return True
-    is_late = quantity.at_s is None if quantity.at_k is None else quantity.at_k >= scans.k
-    return scans.reason == "settled" and (is_late or (quantity.at_s or 0.0) >= scans.t_s)
-
-
 PLANNED = {("curves", "sigma"): "exact_sigma", ("gains", "gain_percent"): "exact_gains"}  # by table and column
 
 
 def is_planned(definition: Quantity) -> bool:
     """Whether a plan holds exact values of a quantity: σ and gain of the common tables."""
     return (definition.table, definition.value) in PLANNED
-
-
-def exact_value(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float:
-    """The exact value from the labels of a case's plan; NaN where it is known only by sampling."""
-    if not is_planned(quantity.definition) or not registry.study(case.study).exact_errors:
-        return np.nan
-    f = axes.filters.index(str(quantity.filter))
-    c = [name for name, _ in axes.components].index(str(quantity.component))
-    if quantity.over == "long run" and (sigma := steady_sigma(case)) is not None:
-        return _steady_value(quantity, sigma[:, c], f, axes.baseline)
-    available = axes.available[f, :, c]
-    if quantity.definition.paired:
-        if f == axes.baseline:
-            return np.nan
-        available = available & axes.available[axes.baseline, :, c]
-    exact_values = np.asarray(getattr(axes, PLANNED[quantity.definition.table, quantity.definition.value]), dtype=float)
-    values = np.where(available, exact_values[f, :, c], np.nan)
-    k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
-    return float(estimate_at(quantity, Series(k, t_s, Estimate(values, values, values))).value)
-
-
-@lru_cache(maxsize=4)  # a case is asked for its axes, and then for its value
-def steady_sigma(case: Case) -> np.ndarray | None:
-    """The exact σ (F, C) of a case's filters in the long run, where its study knows it."""
-    return registry.study(case.study).steady_sigma(case)
-
-
-def _steady_value(quantity: MeasuredQuantity, sigma: np.ndarray, f: int, baseline: int | None) -> float:
-    """σ of filter f, or its gain, from σ (F,) of all."""
-    if not quantity.definition.paired:
-        return float(sigma[f])
-    return np.nan if baseline in (None, f) else float(100 * (1 - sigma[f] / sigma[baseline]))
-
-
-def sampled_value(quantity: MeasuredQuantity, result: CaseResult) -> tuple[Estimate, float]:
-    """The value with its 95 % interval from a case's tables; and the exact value if the table has one, else NaN."""
-    table = quantity_table(quantity.definition, result)
-    table = table[table["filter"] == quantity.filter]
-    return _table_value(quantity, table), float(_table_value(quantity, table, exact_only=True).value)
-
-
-def sampled_estimate(quantity: MeasuredQuantity, result: CaseResult) -> Estimate:
-    """The value with its 95 % interval from a case's tables."""
-    table = quantity_table(quantity.definition, result)
-    return _table_value(quantity, table[table["filter"] == quantity.filter])
-
-
-def _table_value(quantity: MeasuredQuantity, table: "pd.DataFrame", exact_only: bool = False) -> Estimate:
-    """The value of a quantity in the rows of its filter."""
-    if not len(table):
-        return UNKNOWN_ESTIMATE
-    series = series_by_filter(quantity.definition, table, exact_only)
-    by_component = {component: values for (_, component), values in series.items()}
-    name = quantity.component or ""
-    check_name(name, list(by_component), quantity.definition.per)
-    return estimate_at(quantity, by_component[name])
 
 
 def quantity_table(definition: Quantity, result: CaseResult) -> "pd.DataFrame":
@@ -355,16 +268,6 @@ def interval_note(quantity: MeasuredQuantity, result: CaseResult) -> str:
     return str(rows["note"].iloc[-1]) if len(rows) else ""
 
 
-def scan_number(quantity: MeasuredQuantity, axes: Axes) -> int:
-    """The scan at which a quantity is read for its time, the later of two; 0 where the scan number is given, and over
-    several scans."""
-    k, t_s = np.asarray(axes.k), np.asarray(axes.t_s, dtype=float)
-    if quantity.at_k is not None or quantity.over != "at" or not len(k):
-        return 0
-    last = len(k) - 1
-    return int(k[last if quantity.at_s is None else min(int(np.searchsorted(t_s, quantity.at_s * (1 - 1e-12))), last)])
-
-
 def estimate_at(quantity: MeasuredQuantity, series: Series) -> Estimate:
     """The series at the requested time or scan: NaN where there is no estimate. Raises ConfigError for a time or scan
     beyond the run."""
@@ -377,21 +280,22 @@ def estimate_at(quantity: MeasuredQuantity, series: Series) -> Estimate:
             f"leave {quantity.over!r} out"
         )
     if not k.any() and (quantity.at_s, quantity.at_k) != (None, None):
-        option = argument("at_s", "--at") if quantity.at_k is None else argument("at_k", "--at-k")
-        raise ConfigError(f"{option}: the {quantity.definition.words} has one value, not one a scan: leave it out")
+        raise ConfigError(
+            f"{quantity.time_option}: the {quantity.definition.words} has one value, not one a scan: leave the time out"
+        )
     if quantity.is_over_scans:
         return _over_scans(quantity, series)
     if quantity.at_k is not None:
         if quantity.at_k > k[-1] or quantity.at_k < 1:
-            option = argument("at_k", "--at-k")
-            raise ConfigError(f"{option}: must be from 1 to {k[-1]}, the last scan, got {quantity.at_k}")
+            raise ConfigError(f"{quantity.time_option}: must be from 1 to {k[-1]}, the last scan, got {quantity.at_k}")
         matches = np.flatnonzero(k == quantity.at_k)
         return Estimate(*(float(column[matches[0]]) for column in values)) if len(matches) else UNKNOWN_ESTIMATE
     if quantity.at_s is None:
         return Estimate(*(float(column[-1]) for column in values))
     if not 0 <= quantity.at_s <= t_s[-1] * (1 + 1e-12):
-        option = argument("at_s", "--at")
-        raise ConfigError(f"{option}: must be from 0 to {t_s[-1]:g} s, the last scan's time, got {quantity.at_s:g}")
+        raise ConfigError(
+            f"{quantity.time_option}: must be from 0 to {t_s[-1]:g} s, the last scan's time, got {quantity.at_s:g}"
+        )
     if quantity.at_s < t_s[0] - 1e-9 * t_s[-1]:
         return UNKNOWN_ESTIMATE
     matches_of_time = np.flatnonzero(np.isclose(t_s, quantity.at_s, rtol=1e-12, atol=0))

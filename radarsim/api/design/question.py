@@ -1,4 +1,4 @@
-"""A question about a key: its range, and a quantity as a function of its value."""
+"""A question about a key: the cases with its values, its range, and what an answer says."""
 
 import math
 import os
@@ -6,13 +6,12 @@ import shlex
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol, SupportsFloat, TypeVar
+from typing import SupportsFloat
 
-from radarsim.api.case_results import case_result
-from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import Config, load
-from radarsim.api.design import quantities, root_search
-from radarsim.api.design.quantities import UNKNOWN_ESTIMATE, MeasuredQuantity
+from radarsim.api.design import root_search
+from radarsim.api.design.objective import Curve
+from radarsim.api.design.quantities import MeasuredQuantity
 from radarsim.api.design.solve_answer import Answer, number, rounded
 from radarsim.api.repeat_command import RESULTS
 from radarsim.config import numeric_keys
@@ -20,17 +19,9 @@ from radarsim.config.experiment import Case, Experiment
 from radarsim.config.find_files import did_you_mean
 from radarsim.config.labels import label
 from radarsim.config.overrides import override_origin
-from radarsim.engine.collect import collect
-from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import term, tr
 from radarsim.report.statistics import Estimate
-
-if TYPE_CHECKING:
-    import numpy as np
-
-
-V = TypeVar("V")
 
 SOLVED_OUT = f"{RESULTS}/solved"  # where the run that confirms an answer writes
 SEARCH_FACTOR = 1000.0  # the search goes from a thousandth of a positive key's value to a thousand times it
@@ -38,8 +29,6 @@ WHOLE_NUMBER_NOTE = term("the nearest whole number that is at least as good as t
 MAX_NAMED_CASES = 6  # cases listed in a message
 JUMP_NOTE = term("the quantity jumps over the target there")
 ROUNDING_CHANGE = 1e-12  # relative change of a quantity that may be rounding
-ROUGH_VALUES = -1  # stands for a number of realisations
-BATCHES = 20  # of one case: their spread has 19 degrees of freedom
 MIN_PREDICTED_S = 2.0  # duration of a search from which it is predicted
 
 
@@ -188,134 +177,6 @@ def key_range(
 def range_option() -> str:
     """The argument that sets the search range."""
     return argument("between=(low, high)", "--between LO HI")
-
-
-class CaseFunction(Protocol):
-    """A case, and the same case with other values, which raises ConfigError if the config refuses them."""
-
-    base: Case
-
-    def case_with_value(self, key: str, value: Any) -> Case: ...
-
-
-class Curve:
-    """The quantity as a function of the key, or of several, each value computed once.
-
-    progress is called for each; `simulated` counts the simulated ones."""
-
-    def __init__(
-        self,
-        cases: "Cases | CaseFunction",
-        key: str,
-        quantity: MeasuredQuantity,
-        threads: int | None,
-        progress: Callable[[int, int, int], None] | None,
-        realisations: int,
-    ):
-        self.cases, self.key, self.quantity = cases, key, quantity
-        self.threads, self.progress, self.realisations = threads, progress, realisations
-        self.estimates: dict[tuple[Any, int], Estimate] = {}
-        self.refusals: dict[Any, ConfigError] = {}
-        self.scans = set[int]()  # scans at which the quantity was read, for simulated values
-        self.from_tables = False
-        self.has_rough_values = False  # whether cheaper approximate values exist, for a first search
-        self.completed, self.expected = 0, 0  # realisations simulated, or values that need none; 0 expected: unknown
-
-    def is_exact(self, axes: Axes) -> bool:
-        """Whether the quantity is known exactly: from the plan, or from one realisation's tables."""
-        case = self.cases.base
-        if not math.isnan(quantities.exact_value(self.quantity, case, axes)):
-            return True
-        if quantities.is_planned(self.quantity.definition):
-            return False
-        result = self._result(case, 1)
-        _, exact_value = quantities.sampled_value(self.quantity, result)
-        without_ends = self.quantity.definition.ends[0] not in quantities.quantity_table(
-            self.quantity.definition, result
-        )
-        self.from_tables = without_ends or not math.isnan(exact_value)
-        return self.from_tables
-
-    def exact_value(self, value: Any) -> float:
-        """The exact quantity at a value (None: the config's own); NaN where there is none."""
-        return self._cached(value, 0, self._exact_estimate).value
-
-    def roughly(self, value: Any) -> float:
-        """A cheaper value, to a thousandth of σ, if the study has one; else the exact quantity."""
-        if not self.has_rough_values:
-            return self.exact_value(value)
-        return self._cached(value, ROUGH_VALUES, lambda case: self._exact_estimate(replace(case, roughly=True))).value
-
-    def simulate(self, value: Any, realisations: int) -> Estimate:
-        """The quantity with its interval, from this number of realisations."""
-        return self._cached(value, realisations, lambda case: self._sampled_estimate(case, realisations))
-
-    def interval_notes(self, value: Any) -> tuple[str, ...]:
-        """The note of the tables on the interval at a value, in words."""
-        note = quantities.interval_note(
-            self.quantity, self._result(self.cases.case_with_value(self.key, value), self.realisations)
-        )
-        option = argument("realisations=…", "-n")
-        return (f"the interval may be too narrow: {note}; use more realisations, {option}",) if note else ()
-
-    def _cached(self, value: Any, count: int, compute: Callable[[Case], Estimate]) -> Estimate:
-        cache_key = (math.nan if value is None else value, count)
-        if cache_key in self.estimates:
-            return self.estimates[cache_key]
-        if value is None:
-            return compute(self.cases.base)
-        try:
-            estimate = compute(self.cases.case_with_value(self.key, value))
-        except ConfigError as error:
-            self.refusals[value] = error
-            estimate = UNKNOWN_ESTIMATE
-        self.estimates[cache_key] = estimate
-        cost = max(count, 1)
-        self.completed += cost
-        if self.expected and self.progress is not None:
-            self.expected = max(
-                self.expected, self.completed + cost
-            )  # a search that needs a value more than expected may need further ones
-            self.progress(self.completed, self.expected, 0)
-        return estimate
-
-    def _exact_estimate(self, case: Case) -> Estimate:
-        if self.from_tables:
-            value = quantities.sampled_value(self.quantity, self._read_result(case, 1))[1]
-        else:
-            value = quantities.exact_value(self.quantity, case, quantities.plan_labels(self.quantity, case))
-        return Estimate(value, value, value)
-
-    def _sampled_estimate(self, case: Case, realisations: int) -> Estimate:
-        return quantities.sampled_estimate(self.quantity, self._read_result(case, realisations))
-
-    def _read_result(self, case: Case, realisations: int) -> CaseResult:
-        """The result of a case, whose scan is noted as read."""
-        result = self._result(case, realisations)
-        self.scans.add(quantities.scan_number(self.quantity, result.axes))
-        return result
-
-    def _result(self, case: Case, realisations: int) -> CaseResult:
-        # A question is of gains against the first baseline.
-        case = replace(quantities.case_read(self.quantity, case), further_baselines=())
-        work = CaseWork(case)
-        return case_result(case, work, collect(work, realisations, threads=self.threads))
-
-
-def leave_one_out(case: Case, function: Callable[[CaseResult], V], count: int) -> tuple[V, list[V], Axes]:
-    """Apply a function to the result of all realisations of a case, and to those without each of n batches.
-
-    Returns the value of all, the n values without a batch, and the axes of the sums."""
-    work, batch_size = CaseWork(replace(case, further_baselines=())), max(2, count // BATCHES)
-    batches = [work.simulate(n * batch_size, batch_size) for n in range(BATCHES)]
-    total = sum(batches[1:], start=batches[0])
-
-    def value(packed: "np.ndarray", count: int) -> V:
-        sums = work.plan.layout.unpack(packed)
-        return function(CaseResult(case.name, case.study, case.spec, case.swept_values, count, sums, work.plan.axes))
-
-    total_value = value(total, BATCHES * batch_size)
-    return total_value, [value(total - batch, (BATCHES - 1) * batch_size) for batch in batches], work.plan.axes
 
 
 def predict_duration(notify: Callable[[str], None], work: str, seconds: float) -> None:

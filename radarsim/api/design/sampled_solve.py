@@ -12,11 +12,10 @@ from itertools import pairwise
 from typing import Any
 
 from radarsim.api.design import root_search
-from radarsim.api.design.quantities import UNPAIRED_FACTOR
+from radarsim.api.design.objective import UNPAIRED_FACTOR, Curve, have_common_noise
 from radarsim.api.design.question import (
     JUMP_NOTE,
     WHOLE_NUMBER_NOTE,
-    Curve,
     Question,
     boundary_note,
     check_effect,
@@ -117,7 +116,7 @@ def _chosen_among(question: Question, estimate: Estimate, looks: int) -> Estimat
 def unpaired_note(question: Question, curve: Curve) -> tuple[str, ...]:
     """A note if the key moves the scans, so that values are not compared with the same noise: the quantity at a time is
     then read at another scan, which has other noise."""
-    if len(curve.scans) < 2:
+    if have_common_noise(curve.scans):
         return ()
     note = tr(
         "{key} moves the scans, so the noise differs between values: each value gets {count} "
@@ -164,7 +163,8 @@ def _close_interval(question: Question, curve: Curve, start: tuple[float, float]
     def close_at(field: str, start: tuple[float, float], end: tuple[float, float]) -> float:
         # If each value has other noise, the quantity jumps; the search would close such a jump down to rounding.
         estimate = curve.simulate(start[0], count)
-        share = RESIDUE * (estimate.hi - estimate.lo) / abs(start[1] - end[1]) if len(curve.scans) > 1 else 0.0
+        is_rough = not have_common_noise(curve.scans)
+        share = RESIDUE * (estimate.hi - estimate.lo) / abs(start[1] - end[1]) if is_rough else 0.0
         width = share * abs(start[0] - end[0]) / max(abs(start[0]), abs(end[0]), 1e-300)
         return root_search.close_bracket(
             partial(difference, field),

@@ -5,10 +5,12 @@ Otherwise both cases are simulated with the same noise, in batches, and the inte
 changes without one batch each (jackknife)."""
 
 import contextlib
+import itertools
 import math
 import os
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,8 +22,9 @@ from radarsim.api.case_work import CaseWork
 from radarsim.api.configs import Config
 from radarsim.api.design import quantities
 from radarsim.api.design.jackknife import ROUNDING_PERCENT, jackknife_interval
-from radarsim.api.design.quantities import UNPAIRED_FACTOR, MeasuredQuantity
-from radarsim.api.design.question import Cases, leave_one_out, scan_options
+from radarsim.api.design.objective import UNPAIRED_FACTOR, Objective, Scan, have_common_noise
+from radarsim.api.design.quantities import MeasuredQuantity
+from radarsim.api.design.question import Cases, scan_options
 from radarsim.api.design.tornado import LOWERED, key_effect, tornado
 from radarsim.api.display import Displayable
 from radarsim.api.load_experiments import combine_overrides
@@ -31,7 +34,6 @@ from radarsim.config.labels import Label, label
 from radarsim.config.quantity_phrase import Over
 from radarsim.config.study_keys import StudyKeys
 from radarsim.engine.collect import collect
-from radarsim.engine.results import Axes, CaseResult
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import term, tr
 from radarsim.report import atomic_files, csv_text
@@ -130,6 +132,7 @@ def sensitivity(
     overrides: configs.Overrides = (),
     realisations: float | None = None,
     seed: int | None = None,
+    sampled: bool = False,
     out: str | os.PathLike[str] | None = None,
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
@@ -140,8 +143,8 @@ def sensitivity(
     wanted says quantity, component and scans in one, as in `tune`: `"worst sigma r from 60 s"`. Otherwise taken at time
     at_s, s, or at scan at_k, counted from 1; default: the last scan. Rows are sorted by `component`, by default the
     first. `table` has a row for each key, filter and component: the value, in the component's unit or per cent, and its
-    change, in per cent or points, with a 95 % interval if simulated. out: directory for table and figure.
-    Raises ConfigError.
+    change, in per cent or points, with a 95 % interval if simulated, as all are if they are to be `sampled`. out:
+    directory for table and figure. Raises ConfigError.
 
     >>> found = sensitivity("rls2", at_s=60)
     >>> first = found.table.iloc[0]
@@ -158,23 +161,25 @@ def sensitivity(
         if of is not None or component is not None:
             option = argument("of", "--of") if of is not None else argument("component", "--component")
             raise ConfigError(f"{option}: stands in {argument('wanted', '--for')} already: {wanted!r}")
-        of, _, component, at_s, at_k, over, from_s = quantities.parse_request(wanted, None, at_s, at_k)
+        of, _, component, at_s, at_k, over, from_s, _ = quantities.parse_request(wanted, None, at_s, at_k)
         from_s = registry.counted_from_s(cases.base, component, over, from_s)
     definitions = _definitions(of, cases.base)
-    is_planned = quantities.is_planned(definitions[0])
-    if is_planned:
-        has_scans = True
-        components = tuple(quantities.plan_labels(MeasuredQuantity(definitions[0], at_k=1), cases.base).components)
-    else:
-        has_scans, components = _components(definitions[0], cases.base)
-    leading = components[0][0] if component is None else component
-    quantities.check_name(leading, [name for name, _ in components], definitions[0].per or "component")
     study = registry.study(cases.base.study)
     axes = study.prepare(cases.base).axes
+    is_planned, is_known, has_scans = quantities.is_planned(definitions[0]), False, True
+    components = tuple(axes.components)
+    if not is_planned:
+        is_known, has_scans, components = _components(definitions[0], cases.base)
+    leading = components[0][0] if component is None else component
+    quantities.check_name(leading, [name for name, _ in components], definitions[0].per or "component")
     if study.exact_errors and is_planned and over == "at" and at_s is None and at_k is None:
         at_s = float(axes.t_s[-1])
-    quantity = MeasuredQuantity(definitions[0], at_s=at_s, at_k=at_k, over=over, from_s=from_s)
-    sample = SensitivitySample(quantity, definitions, axes, components, count or cases.base.realisations)
+    quantity = MeasuredQuantity(
+        definitions[0], at_s=at_s, at_k=at_k, over=over, from_s=from_s, in_phrase=wanted is not None
+    )
+    sample = SensitivitySample(
+        *(quantity, definitions, axes.filters, components, count or cases.base.realisations, is_known, sampled)
+    )
     base = sample.case_values(cases.base)
     if not np.isfinite(base.all_realisations[0]).any():
         raise ConfigError("there is no estimate there")
@@ -201,8 +206,8 @@ def sensitivity(
         without_effect=tuple(keys_without_effect),
         without_estimate=tuple(
             name
-            for name, values in zip(axes.filters, base.all_realisations[0], strict=True)
-            if not np.isfinite(values).any()
+            for f, (name, values) in enumerate(zip(axes.filters, base.all_realisations[0], strict=True))
+            if not (np.isfinite(values).any() or (definitions[0].paired and f == axes.baseline))
         ),
         not_paired=tuple(unpaired_keys),
         left_out=left_out,
@@ -241,15 +246,16 @@ def _change_keys(
     return rows, left_out, unpaired_keys
 
 
-def _components(definition: Quantity, case: Case) -> tuple[bool, tuple[tuple[str, str], ...]]:
-    """Whether a quantity's table has scans; and the components with their units, or the values of the other column that
-    distinguishes the rows of a filter."""
+def _components(definition: Quantity, case: Case) -> tuple[bool, bool, tuple[tuple[str, str], ...]]:
+    """Whether a quantity's table gives values without intervals, and whether it has scans; and the components with
+    their units, or the values of the other column that distinguishes the rows of a filter."""
     work = CaseWork(case)
     table = quantities.quantity_table(definition, case_result(case, work, collect(work, 1)))
+    facts = definition.ends[0] not in table, "k" in table
     if not definition.per:
-        return "k" in table, (("", definition.shown_unit()),)
+        return *facts, (("", definition.shown_unit()),)
     units = table["unit"] if "unit" in table else [definition.shown_unit()] * len(table)
-    return "k" in table, tuple(dict(zip(table[definition.per].astype(str), units, strict=True)).items())
+    return *facts, tuple(dict(zip(table[definition.per].astype(str), units, strict=True)).items())
 
 
 TARGET = "target"  # its keys have names that other keys have too, such as a duration or a range
@@ -296,12 +302,12 @@ def scan_text(quantity: MeasuredQuantity) -> str:
 class QuantityArrays(NamedTuple):
     """Q quantities of F filters and C components at one time.
 
-    whole (Q, F, C): of all realisations; but_one (Q, n, F, C): without each of n batches, n = 1 where exact. NaN where
-    there is no estimate. t_s (K,): times of the scans, s."""
+    all_realisations (Q, F, C); without_batch (Q, n, F, C): without each of n batches, n = 1 where exact. NaN where
+    there is no estimate. scan: the place at which they are read, as `Objective.scan_read` gives it."""
 
     all_realisations: np.ndarray
     without_batch: np.ndarray
-    t_s: np.ndarray
+    scan: Scan
 
     @property
     def exact(self) -> bool:
@@ -310,81 +316,55 @@ class QuantityArrays(NamedTuple):
 
 @dataclass(frozen=True)
 class SensitivitySample:
-    """Values of a case for every filter and component at one time, exact or in batches of realisations."""
+    """Values of a case for every filter and component, exact or in batches of realisations; is_known: whether the
+    tables give values without intervals; sampled: simulate, whatever is known."""
 
     quantity: MeasuredQuantity
     definitions: tuple[Quantity, ...]
-    axes: Axes
+    filters: tuple[str, ...]
     components: tuple[tuple[str, str], ...]
     realisations: int
+    is_known: bool
+    sampled: bool
 
     @property
-    def cells(self) -> list[tuple[int, int]]:
-        """Filters and components, by index."""
-        return [(f, c) for f in range(len(self.axes.filters)) for c in range(len(self.components))]
+    def shape(self) -> tuple[int, int, int]:
+        """Q, F and C."""
+        return len(self.definitions), len(self.filters), len(self.components)
+
+    @cached_property
+    def objective(self) -> Objective:
+        """Every quantity of every filter and component, one after the other."""
+        names = itertools.product(self.definitions, self.filters, (name or None for name, _ in self.components))
+        return Objective(
+            [replace(self.quantity, definition=d, filter=f, component=component) for d, f, component in names]
+        )
 
     def paired_values(self, case: Case, base: QuantityArrays, changed: Case) -> tuple[QuantityArrays, QuantityArrays]:
         """Values of a case, `base` with the usual realisations, and of a changed one. Raises ConfigError.
 
-        If both are sampled at a time and the scan times differ, both are computed with more realisations: the noise at
-        that time then belongs to different scans, so the interval of the change is that of two independent runs."""
+        If both are sampled and read at different scans, both are computed with more realisations: the noise is not
+        common then, so the interval of the change is that of two independent runs."""
         changed_values = self.case_values(changed)
-        if base.exact or self.quantity.at_s is None or np.array_equal(base.t_s, changed_values.t_s):
+        if base.exact or have_common_noise((base.scan, changed_values.scan)):
             return base, changed_values
         longer = replace(self, realisations=UNPAIRED_FACTOR * self.realisations)
         return longer.case_values(case), longer.case_values(changed)
 
     def case_values(self, case: Case) -> QuantityArrays:
         """Values of a case. Raises ConfigError."""
-        axes = quantities.plan_labels(self.quantity, case)
-        exact_values, without_ends = (
-            self._cell_values(lambda quantity: quantities.exact_value(quantity, case, axes)),
-            False,
-        )
-        if not quantities.is_planned(self.quantity.definition):
-            read = quantities.case_read(self.quantity, case)
-            work = CaseWork(read)
-            result = case_result(read, work, collect(work, 1))
-            exact_values = self._result_values(result, exact_only=True)
-            without_ends = self.quantity.definition.ends[0] not in quantities.quantity_table(
-                self.quantity.definition, result
-            )
-        # With only some filters' values, the others would seem to change nothing.
-        exact = without_ends or np.isfinite(exact_values[0]).any(axis=1).all()
-        if not exact:
-            return self._sampled(case)
-        return QuantityArrays(exact_values, exact_values[:, None], np.asarray(axes.t_s))
-
-    def _cell_values(self, function: Callable[[MeasuredQuantity], float]) -> np.ndarray:
-        """The values (Q, F, C) of a function of a quantity, a filter and a component."""
-        cell_names = [(self.axes.filters[f], self.components[c][0] or None) for f, c in self.cells]
-        values = [
-            function(replace(self.quantity, definition=definition, filter=filter_name, component=component))
-            for definition in self.definitions
-            for filter_name, component in cell_names
-        ]
-        return np.array(values).reshape(len(self.definitions), len(self.axes.filters), len(self.components))
-
-    def _sampled(self, case: Case) -> QuantityArrays:
-        total_values, batch_values, axes = leave_one_out(
-            quantities.case_read(self.quantity, case), self._result_values, self.realisations
-        )
-        return QuantityArrays(total_values, np.stack(batch_values, axis=1), np.asarray(axes.t_s))
-
-    def _result_values(self, result: CaseResult, exact_only: bool = False) -> np.ndarray:
-        """Measured or exact values (Q, F, C) from the tables of a case."""
-        series_by_quantity = {
-            definition: quantities.series_by_filter(
-                definition, quantities.quantity_table(definition, result), exact_only
-            )
-            for definition in self.definitions
-        }
-
-        def value(quantity: MeasuredQuantity) -> float:
-            series = series_by_quantity[quantity.definition].get((str(quantity.filter), quantity.component or ""))
-            return math.nan if series is None else float(quantities.estimate_at(quantity, series).value)
-
-        return self._cell_values(value)
+        axes = self.objective.labels(case)
+        values = self.objective.exact_values(case, axes).reshape(self.shape)
+        # With only some filters' values, the others would seem to change nothing. A baseline has no gain.
+        has_value = np.isfinite(values[0]).any(axis=1)
+        has_value[[axes.baseline] if self.definitions[0].paired else []] = True
+        is_exact = self.is_known or has_value.all()
+        if self.sampled or not is_exact:
+            batches = self.objective.batch_values(case, self.realisations).reshape(-1, *self.shape)
+            values, without_batch = batches[0], np.moveaxis(batches[1:], 0, 1)
+        else:
+            without_batch = values[:, None]
+        return QuantityArrays(values, without_batch, self.objective.scan_read(axes))
 
     def rows(
         self, case: Case, key: numeric_keys.NumericKey, value: float, base: QuantityArrays, changed: QuantityArrays
@@ -398,18 +378,18 @@ class SensitivitySample:
             for q, definition in enumerate(self.definitions)
         ]
         rows: list[dict[Hashable, Any]] = []
-        for f, c in self.cells:
+        for f, c in np.ndindex(self.shape[1:]):
             if not np.isfinite(changes[0][0][f, c]):
                 continue
             component, unit = self.components[c]
-            values = [case.name, self.axes.filters[f], component, unit, key.path, key.value, value]
+            values = [case.name, self.filters[f], component, unit, key.path, key.value, value]
             for q, (definition, (change, batch_changes)) in enumerate(zip(self.definitions, changes, strict=True)):
-                ends = jackknife_interval(batch_changes[:, f, c], change[f, c])
+                ends = jackknife_interval(batch_changes[:, f, c], float(change[f, c]))
                 values += [
                     base.all_realisations[q, f, c],
                     *(100 * math.expm1(end) if definition.kind == "size" else end for end in ends),
                 ]
-            rows.append(dict(zip(columns(self.definitions), [*values, base.exact], strict=True)))
+            rows.append(dict(zip(columns(self.definitions), [*values, base.exact and changed.exact], strict=True)))
         return rows
 
 

@@ -11,13 +11,12 @@ from functools import partial
 from radarsim.api import arguments, configs
 from radarsim.api.configs import Config
 from radarsim.api.design import quantities, root_search, solve_answer
-from radarsim.api.design.quantities import MeasuredQuantity, QuantityName
+from radarsim.api.design.objective import ROUGH_VALUES, Curve, Objective, resolve_quantity
+from radarsim.api.design.quantities import QuantityName
 from radarsim.api.design.question import (
     JUMP_NOTE,
-    ROUGH_VALUES,
     WHOLE_NUMBER_NOTE,
     Cases,
-    Curve,
     Question,
     boundary_note,
     check_effect,
@@ -35,9 +34,7 @@ from radarsim.api.design.sampled_solve import solve_by_sampling
 from radarsim.api.design.solve_answer import Answer
 from radarsim.api.load_experiments import combine_overrides
 from radarsim.config import numeric_keys
-from radarsim.config.experiment import Case
 from radarsim.config.labels import label
-from radarsim.engine.results import Axes
 from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import tr
 from radarsim.report.statistics import Estimate
@@ -49,7 +46,8 @@ JUMP = (
 )
 STEP = 1e-3  # on the scale of the search, the step of a rough derivative
 ROUGH_VALUES_PER_PLACE = 2  # rough values for each place of the scan, including those around roots and turns
-TIME_KEYS = {"scans", "duration_s", "radar.scan_period_s", "sensor.scan_period_s"}  # which move the last scan
+LENGTH_KEYS = {"scans", "duration_s"}  # of the run
+TIME_KEYS = LENGTH_KEYS | {"radar.scan_period_s", "sensor.scan_period_s"}  # which move the last scan
 TINY = 1e-300  # instead of zero
 CLOSING_VALUES = 12  # values, besides those of the scan, to close a bracket to rounding and take the slope
 TARGET_TOLERANCE = (
@@ -118,25 +116,27 @@ def solve(
         request = quantities.parse_request(wanted, filter, at_s, at_k)
     cases, count = Cases(config, texts, case), arguments.whole_number(realisations)
     matching_keys = numeric_keys.find_numeric_keys(cases.base.spec, key)
-    measured = quantities.check_quantity(request, cases.base, cases.user_filters)
-    axes = quantities.plan_labels(measured, cases.base)
-    measured = quantities.resolve_scan(measured, axes)
+    measured, axes = resolve_quantity(request, cases.base, cases.user_filters)
+    objective, moves_scans = Objective([measured], threads), key in TIME_KEYS
     search_range = key_range(matching_keys, key, between)
-    curve = Curve(cases, key, measured, threads, progress, count or cases.base.realisations)
+    curve = Curve(cases, key, objective, count or cases.base.realisations, progress, sampled)
     config_value = matching_keys[0].value if len({numeric_key.value for numeric_key in matching_keys}) == 1 else None
+    has_last_s = len(axes.t_s) and not moves_scans and not objective.is_limit(cases.base)
     question = Question(
-        *(cases, key, measured, equals, search_range, config_value, quantities.unit(measured, axes), texts, count),
-        last_s=_last_s(measured, cases.base, axes) if key not in TIME_KEYS else None,
-        settled=key in TIME_KEYS or quantities.is_settled(measured, cases.base),
+        cases,
+        key,
+        replace(measured, settled_s=None) if moves_scans else measured,
+        equals,
+        search_range,
+        config_value,
+        quantities.unit(measured, axes),
+        texts,
+        count,
+        last_s=float(axes.t_s[-1]) if has_last_s else None,
+        settled=moves_scans or objective.is_settled(cases.base),
     )
-    work = _solve_exactly if not sampled and curve.is_exact(axes) else solve_by_sampling
+    work = _solve_exactly if curve.exact else solve_by_sampling
     return work(question, curve, notify or (lambda line: None))
-
-
-def _last_s(quantity: MeasuredQuantity, case: Case, axes: Axes) -> float | None:
-    """The time of the last scan in which a quantity is read; None without scans, or of a limit."""
-    is_limit = quantity.over == "long run" and quantities.steady_sigma(case) is not None
-    return None if is_limit or not len(axes.t_s) else float(axes.t_s[-1])
 
 
 def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], None]) -> Answer:
@@ -145,8 +145,8 @@ def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], Non
     grid = question.search_range.grid()
     curve.expected = len(grid) + CLOSING_VALUES
     study = registry.study(question.cases.base.study)
-    base = quantities.shorten_case(question.quantity, question.cases.base)
-    curve.has_rough_values = study.costly(base) and not question.search_range.whole_numbers
+    base = curve.objective.shortened(question.cases.base)
+    curve.has_rough_values &= not question.search_range.whole_numbers
     probe_value = grid[len(grid) // 3]  # not the config's own value, which a study may have cached
     approximation = study.exact_but_for(base)
     rough_value_s = measure_seconds(partial(curve.roughly, probe_value))
@@ -178,9 +178,7 @@ def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], Non
         notes = boundary_note(question, curve, search_result.nearest) + _long_run_notes(question, curve)
         return answer(limit=limit, limit_at=search_result.nearest, notes=notes)
     value = nearest_value(values, question)
-    approximation = study.exact_but_for(
-        quantities.shorten_case(question.quantity, question.cases.case_with_value(question.key, value))
-    )
+    approximation = study.exact_but_for(curve.objective.shortened(question.cases.case_with_value(question.key, value)))
     attained = curve.exact_value(value)
     is_jump = not question.search_range.whole_numbers and abs(attained - question.equals) > JUMP * max(
         abs(question.equals), abs(attained_now)
@@ -199,14 +197,12 @@ def _solve_exactly(question: Question, curve: Curve, notify: Callable[[str], Non
 def _long_run_notes(question: Question, curve: Curve) -> tuple[str, ...]:
     """What is attainable in the long run, of a target that is not attainable at a time; none where that is unknown."""
     case = question.cases.base
-    study = registry.study(case.study)
-    if question.quantity.over != "at" or not quantities.is_planned(question.quantity.definition):
+    if question.quantity.over != "at" or not curve.objective.is_planned:
         return ()
     quantity = replace(question.quantity, over="long run", at_s=None, at_k=None)
     try:
-        long_case = quantities.shorten_case(quantity, case)
-        long_run = Curve(question.cases, question.key, quantity, curve.threads, None, curve.realisations)
-        long_run.has_rough_values = study.costly(long_case) and not question.search_range.whole_numbers
+        long_run = Curve(question.cases, question.key, Objective([quantity]), curve.realisations)
+        long_run.has_rough_values &= not question.search_range.whole_numbers
         result = roots(replace(question, quantity=quantity), long_run)
     except (ConfigError, root_search.UndefinedFunctionError):
         return ()
@@ -215,6 +211,8 @@ def _long_run_notes(question: Question, curve: Curve) -> tuple[str, ...]:
     if result.roots:
         return (tr("in the long run {key} = {at} attains it", **fields),)
     limit = solve_answer.with_unit(result.nearest_value + question.equals, question.unit)
+    if question.key in LENGTH_KEYS:
+        return (tr("in the long run it is {limit}", limit=limit),)
     return (tr("in the long run the nearest is {limit}, at {at}", limit=limit, **fields),)
 
 

@@ -91,8 +91,6 @@ class Answer(Displayable):
         """The quantity in words, with its time, and whether the filters have not settled by then."""
         quantity, last_s = self.quantity, self.last_s
         text = quantity.translated_words
-        if quantity.over == "long run" and last_s:
-            return tr("{what} (settled, at {t_s:g} s)", what=text, t_s=last_s)
         if last_s is not None and (quantity.over, quantity.at_s, quantity.at_k) == ("at", None, None):
             fields = {"what": text, "t_s": last_s}
             if self.settled:

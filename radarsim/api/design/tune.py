@@ -20,9 +20,11 @@ from radarsim.api import arguments, configs
 from radarsim.api.configs import Config, load
 from radarsim.api.design import quantities, question
 from radarsim.api.design.jackknife import jackknife_interval
+from radarsim.api.design.objective import BATCHES, Curve, Objective, resolve_quantity
 from radarsim.api.design.quantities import MeasuredQuantity
-from radarsim.api.design.question import Curve, measure_seconds
+from radarsim.api.design.question import measure_seconds
 from radarsim.api.design.tuned_content import tuned_content
+from radarsim.api.design.tuning_cost import FamilyCost, Variants, case_with_filters
 from radarsim.api.design.tuning_intervals import (
     FLAT_CHANGE,
     equally_good,
@@ -30,8 +32,7 @@ from radarsim.api.design.tuning_intervals import (
     has_no_effect,
     spread_of_tuning,
 )
-from radarsim.api.design.tuning_objective import Objective, Variants, case_with_filters, cost_by_quantity
-from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, objective_words
+from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, family_words
 from radarsim.api.design.tuning_search import FoundMinimum, expected_places, find_minimum
 from radarsim.api.design.tuning_space import (
     Path,
@@ -64,25 +65,25 @@ TUNED_OUT = f"{RESULTS}/tuned"  # where the run with tuned values writes
 SEARCH_SEED_OFFSET, CHOICE_SEED_OFFSET = 2**32, 2**33
 
 
-def _predict(notify: Callable[[str], None], objective: Objective, place_s: float) -> None:
+def _predict(notify: Callable[[str], None], cost: FamilyCost, place_s: float) -> None:
     """Tell the user what the search will do and how long it takes, if that is long; place_s: seconds of one place."""
-    first_places, full_places = expected_places(objective)
-    pilot, count = (1, 1) if objective.exact else (objective.pilot_realisations, objective.count)
-    for curve in objective.curves:
+    first_places, full_places = expected_places(cost)
+    pilot, count = (1, 1) if cost.exact else (cost.pilot_realisations, cost.count)
+    for curve in cost.curves:
         curve.expected = first_places * pilot + full_places * count
-    keys = plural("{count} key", "{count} keys", len(objective.searched))
+    keys = plural("{count} key", "{count} keys", len(cost.searched))
     work = tr("searches {keys}, about {count} places", keys=keys, count=first_places + full_places)
     question.predict_duration(notify, work, place_s * (first_places * pilot / count + full_places))
 
 
-def tuning_gains(objective: Objective, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[TunedQuantity]:
+def tuning_gains(cost: FamilyCost, names: Sequence[str], pairs: Sequence[np.ndarray]) -> list[TunedQuantity]:
     """The gain of each case, and the last of all; pairs (1 + n, 2) of each case: stated and tuned."""
-    gained, sign = [], -1 if objective.definition.more_is_better else 1
-    pairs_with_total = [*pairs, np.stack([objective.combined([pair[:, i] for pair in pairs]) for i in (0, 1)], axis=1)]
+    gained, sign = [], -1 if cost.definition.more_is_better else 1
+    pairs_with_total = [*pairs, np.stack([cost.combined([pair[:, i] for pair in pairs]) for i in (0, 1)], axis=1)]
     for name, pair in zip((*names, ""), pairs_with_total, strict=True):
         stated, tuned = pair.T
         with np.errstate(divide="ignore", invalid="ignore"):
-            gains = sign * (stated - tuned) * (100 / stated if objective.definition.kind == "size" else 1)
+            gains = sign * (stated - tuned) * (100 / stated if cost.definition.kind == "size" else 1)
         ends: Sequence[float] = (
             jackknife_interval(gains[1:], float(gains[0])) if len(gains) > 1 else [float(gains[0])] * 3
         )
@@ -164,35 +165,27 @@ def tune(
         raise ConfigError(f"{argument('free', '--free')}: a key is given twice")
     members = [*dict.fromkeys(text if "=" in text else f"target={text}" for text in over)] or [""]
     cases, user_filters = family_cases(config, settings, members, [case] if isinstance(case, str) else case)
-    option_names = dict.fromkeys((argument("at_k", "--at-k"), argument("at_s", "--at")), argument("wanted", "--for"))
-    with rename_arguments_in_errors(option_names):
-        quantity = quantities.check_quantity(quantities.parse_quantity(wanted, filter), cases[0], user_filters)
-    filter_name = quantities.resolve_scan(quantity, quantities.plan_labels(quantity, cases[0])).filter
-    assert filter_name is not None  # resolved
+    request = quantities.parse_quantity(wanted, filter)
+    quantity, _ = resolve_quantity(request, cases[0], user_filters)
+    filter_name = str(quantity.filter)
     searched, count = _common_keys(cases, filter_name, ranges), arguments.whole_number(realisations)
-    count = question.BATCHES * max(2, (count or cases[0].realisations) // question.BATCHES)
-    variants = [Variants(family_case, filter_name, searched, quantity.definition.paired) for family_case in cases]
-    curves = []
-    for variant in variants:
-        quantity = quantities.check_quantity(quantities.parse_quantity(wanted, filter), variant.base)
-        curves.append(Curve(variant, "", replace(quantity, filter=filter_name), threads, progress, count))
-    with rename_arguments_in_errors(option_names):
-        has_exact_values = [
-            curve.is_exact(quantities.plan_labels(curve.quantity, curve.cases.base)) for curve in curves
-        ]
-    exact = all(has_exact_values) and not sampled
-    for curve in curves:
-        curve.has_rough_values = exact and registry.study(curve.cases.base.study).costly(curve.cases.base)
-    objective = chooser = Objective(variants, curves, exact, count)
+    count = BATCHES * max(2, (count or cases[0].realisations) // BATCHES)
+    variants, curves = list[Variants](), list[Curve]()
+    for family_case in cases:
+        variants.append(variant := Variants(family_case, filter_name, searched, quantity.definition.paired))
+        quantity, _ = resolve_quantity(request, variant.base)
+        curves.append(Curve(variant, "", Objective([quantity], threads), count, progress, sampled))
+    exact = all(curve.exact for curve in curves)
+    cost = chooser = FamilyCost(variants, curves, exact, count)
     if not exact:
-        objective, chooser = objective.with_noise(SEARCH_SEED_OFFSET), objective.with_noise(CHOICE_SEED_OFFSET)
-    _predict(notify or (lambda line: None), objective, _seconds_of_start(objective))
-    found = find_minimum(objective, chooser)
+        cost, chooser = cost.with_noise(SEARCH_SEED_OFFSET), cost.with_noise(CHOICE_SEED_OFFSET)
+    _predict(notify or (lambda line: None), cost, _seconds_of_start(cost))
+    found = find_minimum(cost, chooser)
     judge = _judge_exactly if exact else _judge_by_sampling
-    pairs, ranges_by_path = judge(objective, found.place)
+    pairs, ranges_by_path = judge(cost, found.place)
     found = found._replace(other_hollows=equally_good(chooser, found.place, found.other_hollows))
     given_settings = [setting for setting in (*settings, members[0]) if setting]
-    return _tuning_result(config, cases, objective, found, ranges_by_path, pairs, given_settings)
+    return _tuning_result(config, cases, cost, found, ranges_by_path, pairs, given_settings)
 
 
 def _common_keys(
@@ -208,58 +201,54 @@ def _common_keys(
     return keys_by_case[0]
 
 
-def _seconds_of_start(objective: Objective) -> float:
+def _seconds_of_start(cost: FamilyCost) -> float:
     """The seconds that the quantity at the stated keys takes. Raises ConfigError if there is no estimate."""
-    start = tuple(key.stated for key in objective.searched)
-    seconds = measure_seconds(lambda: objective(start, 1))  # compiles
-    if not objective.exact:
-        seconds = measure_seconds(lambda: objective(start))
-    if not math.isfinite(objective(start)):
-        raise ConfigError(f"{objective.curves[0].quantity.words}: there is no estimate there")
+    start = tuple(key.stated for key in cost.searched)
+    seconds = measure_seconds(lambda: cost(start, 1))  # compiles
+    if not cost.exact:
+        seconds = measure_seconds(lambda: cost(start))
+    if not math.isfinite(cost(start)):
+        raise ConfigError(f"{cost.curves[0].quantity.words}: there is no estimate there")
     return seconds
 
 
-def _judge_exactly(objective: Objective, best: Place) -> tuple[list[np.ndarray], dict[Path, tuple[float, float]]]:
+def _judge_exactly(cost: FamilyCost, best: Place) -> tuple[list[np.ndarray], dict[Path, tuple[float, float]]]:
     """The exact quantity of each case with the stated and the tuned keys (1, 2); and the range of each key that is as
     good."""
-    objective.rough = False
-    pairs = [np.array([[curve.exact_value(None), curve.exact_value(best)]]) for curve in objective.curves]
-    objective.rough = any(curve.has_rough_values for curve in objective.curves)
-    ranges = {
-        key.path: flat_interval(objective, best, i)
-        for i, key in enumerate(objective.searched)
-        if key.largest_path is None
-    }
+    cost.rough = False
+    pairs = [np.array([[curve.exact_value(None), curve.exact_value(best)]]) for curve in cost.curves]
+    cost.rough = any(curve.has_rough_values for curve in cost.curves)
+    ranges = {key.path: flat_interval(cost, best, i) for i, key in enumerate(cost.searched) if key.largest_path is None}
     return pairs, ranges
 
 
-def _judge_by_sampling(objective: Objective, best: Place) -> tuple[list[np.ndarray], dict[Path, tuple[float, float]]]:
+def _judge_by_sampling(cost: FamilyCost, best: Place) -> tuple[list[np.ndarray], dict[Path, tuple[float, float]]]:
     """The quantity of each case with the stated and the tuned keys, of all realisations and without each of the batches
     (1 + n, 2); and the 95 % interval of each key."""
     pairs = []
-    for variant, curve in zip(objective.variants, objective.curves, strict=True):
+    for variant, curve in zip(cost.variants, cost.curves, strict=True):
         names = variant.filter_name, variant.filter_name + TUNED
-        quantity_pair = [replace(curve.quantity, filter=name) for name in names]
-        pairs.append(cost_by_quantity(variant.stated_and_tuned_case(best), quantity_pair, objective.count))
-    return pairs, spread_of_tuning(objective, best)
+        both = Objective([replace(curve.quantity, filter=name) for name in names])
+        pairs.append(both.batch_values(variant.stated_and_tuned_case(best), cost.count))
+    return pairs, spread_of_tuning(cost, best)
 
 
 def _tuning_result(
     config: Config,
     cases: Sequence[Case],
-    objective: Objective,
+    cost: FamilyCost,
     found: FoundMinimum,
     ranges: Mapping[Path, tuple[float, float]],
     pairs: Sequence[np.ndarray],
     settings: Sequence[str],
 ) -> TuningResult:
     """The result: tuned keys, gains and notes, with the command of the run that shows the gain."""
-    case, quantity, stated_keys = cases[0], objective.curves[0].quantity, objective.filter_keys
+    case, quantity, stated_keys = cases[0], cost.curves[0].quantity, cost.filter_keys
     best = found.place
     filter_name = str(quantity.filter)
     (i,) = [i for i, member in enumerate(case.spec.members) if member.name == filter_name]
     prefix, tuned_keys = f"{type(case.spec).bare_keys}.{i}.", deepcopy(dict(stated_keys))
-    tuned_values, keys = from_scale(objective.searched, best, stated_keys), []
+    tuned_values, keys = from_scale(cost.searched, best, stated_keys), []
     for path, value in tuned_values.items():
         set_at_path(tuned_keys, path, value)
         key = prefix + _dotted(path)
@@ -272,31 +261,31 @@ def _tuning_result(
                 *ranges.get(path, (None, None)),
             )
         )
-    axes = quantities.plan_labels(quantity, objective.curves[0].cases.base)
-    gains = tuning_gains(objective, [family_case.name for family_case in cases], pairs)
+    axes = cost.curves[0].objective.labels(cost.curves[0].cases.base)
+    gains = tuning_gains(cost, [family_case.name for family_case in cases], pairs)
     inert = tuple(
         prefix + _dotted(searched_key.path)
-        for i, searched_key in enumerate(objective.searched)
-        if searched_key.largest_path is None and has_no_effect(objective, best, i)
+        for i, searched_key in enumerate(cost.searched)
+        if searched_key.largest_path is None and has_no_effect(cost, best, i)
     )
     return TuningResult(
         stem=case.stem,
         filter=filter_name,
         quantity=quantity,
         unit=quantities.unit(quantity, axes),
-        minimised=objective_words(objective, len(cases)),
-        exact=objective.exact,
+        minimised=family_words(cost, len(cases)),
+        exact=cost.exact,
         keys=tuple(keys),
         cases=tuple(gains[:-1]),
         all=gains[-1],
-        training=0 if objective.exact else objective.count,
-        judged=0 if objective.exact else objective.count,
-        search_ends=objective.from_costs(found.end_costs),
+        training=0 if cost.exact else cost.count,
+        judged=0 if cost.exact else cost.count,
+        search_ends=cost.from_costs(found.end_costs),
         settings={tuned_key.key: tuned_key.tuned for tuned_key in keys},
         command=_run_command(config, settings, prefix, tuned_values, tuned_keys),
         notes=(
-            *_tuning_notes(objective, best, inert[: len(keys) - 1], tuned_values, ranges),
-            *_equality_notes(objective, found.other_hollows, ranges),
+            *_tuning_notes(cost, best, inert[: len(keys) - 1], tuned_values, ranges),
+            *_equality_notes(cost, found.other_hollows, ranges),
         ),
         inert=inert,
     )
@@ -317,14 +306,14 @@ def _run_command(
 
 
 def _tuning_notes(
-    objective: Objective,
+    cost: FamilyCost,
     best: Place,
     inert: Sequence[str],
     tuned_paths: Iterable[Path],
     ranges: Mapping[Path, tuple[float, float]],
 ) -> list[str]:
     """Notes on keys that end at the end of their range or have no effect, and on missing intervals."""
-    keys_and_values = list(zip(objective.searched, best, strict=True))
+    keys_and_values = list(zip(cost.searched, best, strict=True))
     notes = [
         tr(
             "{key} ends at {value}, the end of the searched range; --free KEY=LOW:HIGH searches elsewhere",
@@ -334,19 +323,17 @@ def _tuning_notes(
         for key, x in keys_and_values
         if is_at_end(key, x)
     ]
-    quantity_words = objective.curves[0].quantity.translated_words
+    quantity_words = cost.curves[0].quantity.translated_words
     notes += [tr("{key} has no effect on {quantity}", key=key, quantity=quantity_words) for key in inert]
     fixed_paths = {key.path for key, x in keys_and_values if key.search_range.whole_numbers or is_at_end(key, x)}
-    if not objective.exact and any(path not in ranges and path not in fixed_paths for path in tuned_paths):
+    if not cost.exact and any(path not in ranges and path not in fixed_paths for path in tuned_paths):
         notes.append(tr("no intervals of the values: the quantity is flat there, or too noisy to tell its curvature"))
     return notes
 
 
-def _equality_notes(
-    objective: Objective, ends: Sequence[Place], ranges: Mapping[Path, tuple[float, float]]
-) -> list[str]:
+def _equality_notes(cost: FamilyCost, ends: Sequence[Place], ranges: Mapping[Path, tuple[float, float]]) -> list[str]:
     """A note on ends of other searches that are as good, where they lie beyond the ranges of the keys."""
-    places = [from_scale(objective.searched, end, objective.filter_keys) for end in ends]
+    places = [from_scale(cost.searched, end, cost.filter_keys) for end in ends]
     beyond = [
         values
         for values in places
@@ -356,7 +343,7 @@ def _equality_notes(
         return []
     values_text = ", ".join(f"{_dotted(path)} = {format_number(x, '.3g')}" for path, x in beyond[0].items())
     percent = format_number(100 * FLAT_CHANGE)
-    how = tr("to {percent} %", percent=percent) if objective.exact else tr("within the interval")
+    how = tr("to {percent} %", percent=percent) if cost.exact else tr("within the interval")
     return [
         plural(
             "{count} other start is as good {how}: {values}",

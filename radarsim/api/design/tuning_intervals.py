@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from radarsim.api.design.jackknife import jackknife_interval
-from radarsim.api.design.tuning_objective import Objective, cost_by_quantity
+from radarsim.api.design.tuning_cost import FamilyCost
 from radarsim.api.design.tuning_search import move_keys
 from radarsim.api.design.tuning_space import MIN_PROBABILITY, Path, Place, ProbabilityRange, from_scale, is_at_end
 from radarsim.errors import ConfigError
@@ -18,58 +18,50 @@ NO_CHANGE = 1e-9  # of the quantity: largest change where a key has no effect
 STEP = 0.25  # on the scale of the search, of derivatives of sampled values
 
 
-def flat_interval(objective: Objective, best: Place, i: int) -> tuple[float, float]:
+def flat_interval(cost: FamilyCost, best: Place, i: int) -> tuple[float, float]:
     """The range of a key over which the exact quantity is within 0.1 % of its minimum."""
-    search_range, limit = objective.searched[i].search_range, (1 + FLAT_CHANGE) * objective(best)
+    search_range, limit = cost.searched[i].search_range, (1 + FLAT_CHANGE) * cost(best)
     ends = []
     for end in (search_range.low, search_range.high):
         inside, outside = search_range.to_scale(best[i]), search_range.to_scale(end)
-        if objective((*best[:i], end, *best[i + 1 :])) > limit:
+        if cost((*best[:i], end, *best[i + 1 :])) > limit:
             for _ in range(24):
                 middle = (inside + outside) / 2
-                is_flat = objective((*best[:i], search_range.from_scale(middle), *best[i + 1 :])) <= limit
+                is_flat = cost((*best[:i], search_range.from_scale(middle), *best[i + 1 :])) <= limit
                 inside, outside = (middle, outside) if is_flat else (inside, middle)
             outside = inside
         ends.append(search_range.from_scale(outside))
     return ends[0], ends[1]
 
 
-def has_no_effect(objective: Objective, best: Place, i: int) -> bool:
+def has_no_effect(cost: FamilyCost, best: Place, i: int) -> bool:
     """Whether a key changes nothing over the whole searched range."""
-    search_range = objective.searched[i].search_range
-    ends = (objective((*best[:i], x, *best[i + 1 :])) for x in (search_range.low, search_range.high))
-    return all(math.isclose(value, objective(best), rel_tol=NO_CHANGE) for value in ends)
+    search_range = cost.searched[i].search_range
+    ends = (cost((*best[:i], x, *best[i + 1 :])) for x in (search_range.low, search_range.high))
+    return all(math.isclose(value, cost(best), rel_tol=NO_CHANGE) for value in ends)
 
 
-def equally_good(chooser: Objective, best: Place, ends: Sequence[Place]) -> tuple[Place, ...]:
+def equally_good(chooser: FamilyCost, best: Place, ends: Sequence[Place]) -> tuple[Place, ...]:
     """The ends of other searches that are as good as the best: to 0.1 % where exact; elsewhere those whose paired
     difference on the sample that chose the best may be none."""
     if chooser.exact:
         return tuple(end for end in ends if chooser(end) <= (1 + FLAT_CHANGE) * chooser(best))
-    best_costs, equal = _batch_costs(chooser, best), list[Place]()
+    best_costs, equal = chooser.batch_costs(best), list[Place]()
     for end in ends:
-        differences = _batch_costs(chooser, end) - best_costs
+        differences = chooser.batch_costs(end) - best_costs
         _, lo, hi = jackknife_interval(differences[1:], float(differences[0]))
         equal += [end] if lo <= 0 <= hi else []
     return tuple(equal)
 
 
-def _batch_costs(objective: Objective, place: Place) -> np.ndarray:
-    """The costs at a place with all realisations, then without each of the batches (1 + batches,)."""
-    cases = [variant.case_with_value("", place) for variant in objective.variants]
-    pairs = zip(cases, objective.curves, strict=True)
-    values = [cost_by_quantity(case, (curve.quantity,), objective.count)[:, 0] for case, curve in pairs]
-    return np.asarray(objective.cost(values))
-
-
-def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[float, float]]:
+def spread_of_tuning(cost: FamilyCost, best: Place) -> dict[Path, tuple[float, float]]:
     """The 95 % intervals of the best values of real numbers, from how far they move without each of the batches.
 
     Each move is a Newton step from the best place with the gradient of the remaining batches. Empty where the quantity
     has no minimum on this scale, for instance where it is flat or jumps, or at an end of the range."""
     searched = [
         replace(key, search_range=replace(key.search_range, whole_numbers=True)) if is_at_end(key, x) else key
-        for key, x in zip(objective.searched, best, strict=True)
+        for key, x in zip(cost.searched, best, strict=True)
     ]
     scale_place = np.array(
         [
@@ -80,7 +72,7 @@ def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[floa
     )
 
     def costs(u: np.ndarray) -> np.ndarray:
-        return _batch_costs(objective, move_keys(searched, best, u))
+        return cost.batch_costs(move_keys(searched, best, u))
 
     if not len(scale_place):
         return {}
@@ -91,7 +83,7 @@ def spread_of_tuning(objective: Objective, best: Place) -> dict[Path, tuple[floa
     if not np.isfinite(curvature).all() or np.linalg.eigvalsh(curvature)[0] <= 0:
         return {}
     newton = scale_place[:, None] - np.linalg.solve(curvature, slopes - slopes[:, :1])
-    values = [from_scale(searched, move_keys(searched, best, u), objective.filter_keys) for u in newton.T]
+    values = [from_scale(searched, move_keys(searched, best, u), cost.filter_keys) for u in newton.T]
     intervals = {}
     for path in values[0]:
         matching_keys = [key for key in searched if key.path == path and key.largest_path is None]

@@ -17,7 +17,7 @@ from radarsim.report.wording import format_number, with_unit
 if TYPE_CHECKING:
     import pandas as pd
 
-    from radarsim.api.design.tuning_objective import Objective
+    from radarsim.api.design.tuning_cost import FamilyCost
 
 
 NO_GAIN = 0.1  # per cent or points of an exact gain that are called nothing
@@ -162,12 +162,12 @@ class TuningResult(Displayable):
         return [self.answer, *(f"{key.key} = {with_unit(key.tuned, key.unit)}" for key in self.keys)]
 
 
-def objective_words(objective: "Objective", cases: int) -> str:
+def family_words(family: "FamilyCost", cases: int) -> str:
     """What the search makes least, or largest, in words."""
-    quantity_words = objective.curves[0].quantity.translated_words
+    quantity_words = family.curves[0].quantity.translated_words
     if cases == 1:
         return quantity_words
     fields = {"quantity": quantity_words, "cases": str(cases)}
-    if objective.definition.kind == "size":
+    if family.definition.kind == "size":
         return tr("{quantity}, root mean square of {cases} cases", **fields)
     return tr("{quantity}, mean of {cases} cases", **fields)

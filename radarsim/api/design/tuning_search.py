@@ -61,17 +61,17 @@ class FoundMinimum(NamedTuple):
     other_hollows: tuple[Place, ...]
 
 
-def find_minimum(objective: CostFunction, chooser: CostFunction) -> FoundMinimum:
-    """The place with the smallest cost; chooser: the cost on a second sample, the objective itself where it is exact.
+def find_minimum(cost: CostFunction, chooser: CostFunction) -> FoundMinimum:
+    """The place with the smallest cost; chooser: the cost on a second sample, the cost itself where it is exact.
 
     The stated place is among those that are compared."""
-    searched, stated = objective.searched, tuple(key.stated for key in objective.searched)
-    pilot = None if objective.exact else objective.pilot_realisations
-    starts = choose_starts(searched, _evaluate(objective, first_places(objective), pilot))
-    first_ends = [search_locally(objective, start, FIRST_SEARCH[objective.exact], pilot) for start in starts]
-    finalists, others = _split_finalists(searched, _evaluate(objective, first_ends, pilot))
-    for search in FINAL_SEARCHES[objective.exact]:
-        finalists = [search_locally(objective, end, search, None) for end in finalists]
+    searched, stated = cost.searched, tuple(key.stated for key in cost.searched)
+    pilot = None if cost.exact else cost.pilot_realisations
+    starts = choose_starts(searched, _evaluate(cost, first_places(cost), pilot))
+    first_ends = [search_locally(cost, start, FIRST_SEARCH[cost.exact], pilot) for start in starts]
+    finalists, others = _split_finalists(searched, _evaluate(cost, first_ends, pilot))
+    for search in FINAL_SEARCHES[cost.exact]:
+        finalists = [search_locally(cost, end, search, None) for end in finalists]
     ends = [tuple(float(f"{x:.{DIGITS}g}") for x in end) for end in (*finalists, *others)]
     ends, best = sorted(ends, key=chooser), min((stated, *ends), key=chooser)
     other_hollows = tuple(end for end in ends if _distance(searched, end, best) > SAME_END)
@@ -90,32 +90,32 @@ def _split_finalists(
     return finalists, others
 
 
-def _evaluate(objective: CostFunction, places: Sequence[Place], count: int | None) -> list[tuple[float, Place]]:
+def _evaluate(cost: CostFunction, places: Sequence[Place], count: int | None) -> list[tuple[float, Place]]:
     """The places that have an estimate, with their costs, ascending."""
-    costs = [(objective(place, count), place) for place in dict.fromkeys(places)]
+    costs = [(cost(place, count), place) for place in dict.fromkeys(places)]
     return sorted(pair for pair in costs if math.isfinite(pair[0]))
 
 
-def first_places(objective: CostFunction) -> list[Place]:
+def first_places(cost: CostFunction) -> list[Place]:
     """Places over the whole range.
 
     For each combination of whole numbers, the real numbers are scanned one after the other from their stated values;
     then all keys change together, by a Sobol sequence."""
-    searched = objective.searched
-    pilot = None if objective.exact else objective.pilot_realisations
+    searched = cost.searched
+    pilot = None if cost.exact else cost.pilot_realisations
     whole_grids = [key.search_range.grid() if key.search_range.whole_numbers else [key.stated] for key in searched]
     if math.prod(map(len, whole_grids)) > MAX_WHOLE_COMBINATIONS:
         raise ConfigError(f"{argument('free', '--free')}: too many whole numbers to try: give KEY=LOW:HIGH")
     places = [tuple(key.stated for key in searched), *_spread_places(searched, whole_grids)]
     for combination in itertools.product(*whole_grids):
-        if not math.isfinite(objective(combination, pilot)):
+        if not math.isfinite(cost(combination, pilot)):
             continue
         best = combination
         places.append(combination)
         for i in _real_indices(searched):
-            grid = searched[i].search_range.grid(None if objective.exact else PILOT_POINTS)
+            grid = searched[i].search_range.grid(None if cost.exact else PILOT_POINTS)
             candidates = [best, *((*best[:i], x, *best[i + 1 :]) for x in grid)]
-            best = min(candidates, key=lambda place: objective(place, pilot))
+            best = min(candidates, key=lambda place: cost(place, pilot))
             places += candidates
     return places
 
@@ -126,17 +126,17 @@ def spread_count(searched: Sequence[SearchedKey]) -> int:
     return 0 if real_keys < MIN_SPREAD_KEYS else 2 ** round(math.log2(SPREAD_PLACES_PER_KEY * real_keys))
 
 
-def expected_places(objective: CostFunction) -> tuple[int, int]:
+def expected_places(cost: CostFunction) -> tuple[int, int]:
     """About how many places are tried in the first rounds, and with all realisations."""
-    searched = objective.searched
+    searched = cost.searched
     real_indices, combinations = _real_indices(searched), 1
     for key in searched:
         combinations *= len(key.search_range.grid()) if key.search_range.whole_numbers else 1
-    points = None if objective.exact else PILOT_POINTS
+    points = None if cost.exact else PILOT_POINTS
     scans = combinations * max(1, sum(len(searched[i].search_range.grid(points)) for i in real_indices))
     starts = MAX_STARTS if len(real_indices) >= MIN_SPREAD_KEYS else min(MAX_STARTS, combinations)
-    first_values = starts * FIRST_SEARCH[objective.exact].max_values_per_key * len(real_indices)
-    final_values = min(starts, MAX_FINALISTS) * EXPECTED_VALUES_PER_KEY[objective.exact] * len(real_indices)
+    first_values = starts * FIRST_SEARCH[cost.exact].max_values_per_key * len(real_indices)
+    final_values = min(starts, MAX_FINALISTS) * EXPECTED_VALUES_PER_KEY[cost.exact] * len(real_indices)
     return scans + spread_count(searched) + first_values, final_values
 
 
@@ -180,27 +180,27 @@ def linkage_distance(keys: int, places: int) -> float:
     return volume ** (1 / keys) / math.sqrt(math.pi)
 
 
-def search_locally(objective: CostFunction, start: Place, search: LocalSearch, count: int | None) -> Place:
+def search_locally(cost: CostFunction, start: Place, search: LocalSearch, count: int | None) -> Place:
     """The end of a simplex search of the real numbers from a place; count: realisations, None for all."""
     from scipy.optimize import minimize
 
-    searched = objective.searched
+    searched = cost.searched
     real_indices = _real_indices(searched)
     if not real_indices:
         return start
     scale_place = np.array([searched[i].search_range.to_scale(start[i]) for i in real_indices])
 
     def logarithm(u: np.ndarray) -> float:
-        return float(np.log(max(objective(move_keys(searched, start, u), count), 1e-300)))
+        return float(np.log(max(cost(move_keys(searched, start, u), count), 1e-300)))
 
     options: Any = {
         "initial_simplex": np.vstack([scale_place, scale_place + search.step * np.eye(len(scale_place))]),
-        "xatol": SCALE_TOLERANCE[objective.exact],
-        "fatol": COST_TOLERANCE[objective.exact],
+        "xatol": SCALE_TOLERANCE[cost.exact],
+        "fatol": COST_TOLERANCE[cost.exact],
         "maxfev": search.max_values_per_key * len(scale_place),
     }
     end = move_keys(searched, start, minimize(logarithm, scale_place, method="Nelder-Mead", options=options).x)
-    return min((start, end), key=lambda place: objective(place, count))
+    return min((start, end), key=lambda place: cost(place, count))
 
 
 def move_keys(searched: Sequence[SearchedKey], best: Place, scale_place: np.ndarray) -> Place:

@@ -75,7 +75,7 @@ class RangeDoppler(Study):
 
         return long_run.counted_scans(case, component)
 
-    def in_the_long_run(self, case: "Case", filter_names: "Collection[str] | None" = None) -> "Case | None":
+    def in_the_long_run(self, case: "Case", filter_names: "Collection[str] | None" = None) -> "Case":
         from radarsim.studies.range_doppler import long_run
 
         return long_run.in_the_long_run(case)

@@ -7,6 +7,7 @@ import numpy as np
 from radarsim.config import radial_keys
 from radarsim.config.experiment import Case
 from radarsim.studies.counted_scans import CountedScans, scan_with_plots
+from radarsim.studies.long_run import no_long_run
 from radarsim.studies.range_doppler import scenario, settling, steady_state
 from radarsim.studies.range_doppler.config import MAX_SCANS, Best, Filter, Keys, configured_variance
 from radarsim.studies.range_doppler.designed_case import design_case
@@ -39,14 +40,14 @@ def steady_sigma(case: Case) -> np.ndarray | None:
     return np.sqrt(np.stack([np.diag(covariance) for covariance in covariances]))
 
 
-def in_the_long_run(case: Case) -> Case | None:
-    """The case on a target that keeps its range, with so many scans that its filters have settled at the last; None
-    where one does not settle."""
+def in_the_long_run(case: Case) -> Case:
+    """The case on a target that keeps its range, with so many scans that its filters have settled at the last. Raises
+    ConfigError where that takes too many."""
     spec: Keys = case.spec
     variances = _variances(case)
     scans = _scans_to_settle(spec, variances)
     if scans is None:
-        return None
+        raise no_long_run(case, "the filters settle too late to be computed")
     first_range_m = float(scenario.true_motion(case)[1][0, 0])
     target = radial_keys.Polynomial(kind="polynomial", coefficients=(first_range_m,))
     filters = tuple(

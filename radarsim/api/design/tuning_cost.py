@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 
 from radarsim.api.configs import load
-from radarsim.api.design import quantities, question
-from radarsim.api.design.quantities import MeasuredQuantity
-from radarsim.api.design.question import Curve
+from radarsim.api.design.objective import Curve
 from radarsim.api.design.tuning_space import Place, SearchedKey, from_scale, set_at_path
 from radarsim.config.experiment import Case
 from radarsim.config.identity import all_keys
-from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.report.user_filters.rival_comparison import TUNED
 
@@ -81,7 +78,7 @@ def case_with_filters(case: Case, members: Sequence[Mapping[str, Any]], baseline
     return replace(case, spec=loaded.spec)
 
 
-class Objective:
+class FamilyCost:
     """What is minimised, at a place of the search: over the family the root of the mean square of a size, the mean of
     anything else; of a quantity that is better the larger, 100 % less its value."""
 
@@ -91,14 +88,14 @@ class Objective:
         self.definition = curves[0].quantity.definition
         self.rough = exact and any(curve.has_rough_values for curve in curves)
 
-    def with_noise(self, seed_offset: int) -> "Objective":
+    def with_noise(self, seed_offset: int) -> "FamilyCost":
         """The same with noise of another seed, so much more than that of the config."""
         variants = [variant.with_seed((variant.case.seed + seed_offset) % 2**64) for variant in self.variants]
         curves = [
-            Curve(variant, "", curve.quantity, curve.threads, curve.progress, curve.realisations)
+            Curve(variant, "", curve.objective, curve.realisations, curve.progress, sampled=True)
             for variant, curve in zip(variants, self.curves, strict=True)
         ]
-        return Objective(variants, curves, self.exact, self.count)
+        return FamilyCost(variants, curves, self.exact, self.count)
 
     @property
     def pilot_realisations(self) -> int:
@@ -111,7 +108,7 @@ class Objective:
         mean = sum(value**2 if is_size else value for value in values) / len(values)
         return mean**0.5 if is_size else mean
 
-    def cost(self, values: Sequence[Any]) -> Any:
+    def combined_cost(self, values: Sequence[Any]) -> Any:
         """What is minimised, from the values of the cases."""
         combined = self.combined(values)
         return 100.0 - combined if self.definition.more_is_better else combined
@@ -119,6 +116,14 @@ class Objective:
     def from_costs(self, costs: Sequence[float]) -> tuple[float, ...]:
         """The quantity at costs."""
         return tuple(100.0 - cost if self.definition.more_is_better else cost for cost in costs)
+
+    def batch_costs(self, place: Place) -> np.ndarray:
+        """The costs at a place with all realisations, then without each of the batches (1 + batches,)."""
+        values = [
+            curve.objective.batch_values(variant.case_with_value("", place), self.count)[:, 0]
+            for variant, curve in zip(self.variants, self.curves, strict=True)
+        ]
+        return np.asarray(self.combined_cost(values))
 
     def __call__(self, place: Place, count: int | None = None) -> float:
         """The cost at a place, with all training realisations or fewer; infinite if there is no estimate."""
@@ -128,16 +133,5 @@ class Objective:
             values = [curve.exact_value(place) for curve in self.curves]
         else:
             values = [curve.simulate(place, count or self.count).value for curve in self.curves]
-        cost = float(self.cost(values))
+        cost = float(self.combined_cost(values))
         return math.inf if math.isnan(cost) else cost
-
-
-def cost_by_quantity(case: Case, measured: Sequence[MeasuredQuantity], count: int) -> np.ndarray:
-    """Q quantities of a case (1 + n, Q): from all realisations, then without each of n batches."""
-
-    def values(result: CaseResult) -> list[float]:
-        return [float(quantities.sampled_estimate(quantity, result).value) for quantity in measured]
-
-    read = quantities.case_read(measured[0], case)
-    total_values, leave_one_out_values, _ = question.leave_one_out(read, values, count)
-    return np.array([total_values, *leave_one_out_values])
