@@ -158,10 +158,7 @@ def test_prior_is_in_the_answer():
     assert line.startswith("Prior of the filters: σ of the velocity 14.4 m/s, of the acceleration 0.48 m/s²")
     swept = small | {"sweep": {"target.speed_mps": [10, 20]}}
     (line,) = [line for line in radarsim.run(swept).answer if line.startswith("Prior")]
-    assert (
-        line
-        == "Prior of the filters: σ of the velocity 12 to 24 m/s, of the acceleration 0.4 to 0.8 m/s²; D: unambiguous interval of the velocity."
-    )
+    assert "σ of the velocity 12 to 24 m/s, of the acceleration 0.4 to 0.8 m/s²; D: " in line
 
 
 @pytest.mark.parametrize("config", ["ambiguous_depth", "ambiguous_manoeuvre", "ambiguous_orders", "orders"])
