@@ -153,7 +153,7 @@ def _widened_figures(drawings: Sequence[DrawnFigure], width_mm: float | None) ->
     """A line for each figure that was drawn wider than asked for."""
     return tuple(
         tr(
-            "figure {name}: drawn {width:g} mm wide, as words would be cut at {wanted:g} mm",
+            "figure {name}: drawn {width:g} mm wide, as at {wanted:g} mm words would be cut or the page exceeded",
             name=drawing.figure.name,
             width=drawing.figure.width_mm,
             wanted=width_mm,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-NEES = term("NEES per component\n(1 = consistent, below = pessimistic)")
+NEES = term("NEES per component")
 
 
 def consistency_figures(

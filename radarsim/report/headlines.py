@@ -20,6 +20,7 @@ AFTER_VALUE = rf"{POWER}(?P<unit>[ \u00a0][^\s\[(]+)?(?:[ \u00a0]\w+)?[ \u00a0]"
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 ROUNDING = 1e-9
 MAX_LETTERS = 200  # of a headline
+STRONG_PT, THIN_PT = 2.0, 0.8  # widths of lines that the headline names, and of others
 
 
 def with_headlines(
@@ -44,7 +45,47 @@ def with_headlines(
                 return text
         return plain_text(figure.title)
 
-    return {name: replace(figure, headline=headline(name, figure)) for name, figure in figures_by_name.items()}
+    return {name: emphasised(figure, headline(name, figure)) for name, figure in figures_by_name.items()}
+
+
+def emphasised(figure: Figure, headline: str) -> Figure:
+    """The figure under its headline, with strong lines for the filters that the headline names, thin ones for others.
+
+    Unchanged but for the headline if that names none of its lines, or all."""
+    names = {_line_name(mark) for panel in figure.panels for mark in panel.marks if _is_curve(mark)} - {""}
+    strong = _named_lines(headline, names)
+    figure = replace(figure, headline=headline)
+    if not strong or strong == names:
+        return figure
+
+    def weigh(mark: Mark) -> Mark:
+        if not (isinstance(mark, Line) and _line_name(mark) in names):
+            return mark
+        width_pt = STRONG_PT if _line_name(mark) in strong else THIN_PT
+        return replace(mark, style=replace(mark.style, width_pt=width_pt))
+
+    panels = (replace(panel, marks=tuple(map(weigh, panel.marks))) for panel in figure.panels)
+    return replace(figure, panels=tuple(panels))
+
+
+def _is_curve(mark: Mark) -> bool:
+    """Whether a mark is a curve of one of several filters."""
+    return isinstance(mark, Line) and mark.style.dash is not None and isinstance(mark.style.colour, int)
+
+
+def _line_name(mark: Mark) -> str:
+    return plain_text(mark.label or mark.name) if isinstance(mark, Line) and _is_curve(mark) else ""
+
+
+def _named_lines(headline: str, names: Collection[str]) -> set[str]:
+    """The names of lines that a sentence names, joined ones too; a letter alone may be a quantity."""
+    lines = {part: name for name in names for part in name.split(" = ") if len(part) > 1}
+    found = set()
+    for part in sorted(lines, key=len, reverse=True):  # a longer name may hold a shorter one
+        headline, count = re.subn(rf"(?<![\w+]){re.escape(part)}(?![\w+])", "", headline)
+        if count:
+            found.add(lines[part])
+    return found
 
 
 def first_statement(sentence: str) -> str:

@@ -109,9 +109,11 @@ def share_y_axis(panels: Sequence[Panel]) -> list[Panel]:
         return list(panels)
     limited = [panel.y for panel in filled if None not in panel.y.limits]
     logarithmic = [panel.y for panel in filled if panel.y.scale == "log"]
-    from_zero = [panel.y for panel in filled if panel.y.limits == (0, None)]
-    fitted = fitting_axis(filled[0].y.label, lines) if from_zero else filled[0].y
-    y = (limited or logarithmic or [fitted])[0]
+    fitted = fitting_axis(filled[0].y.label, lines)
+    from_zero = any(panel.y.limits == (0, None) for panel in filled)
+    y = (limited or logarithmic or [fitted if from_zero else filled[0].y])[0]
+    if y.scale == fitted.scale == "log" and y.limits == (None, None):
+        y = replace(y, limits=fitted.limits)
     if not limited:
         y = replace(y, limits=holding(lines, y))
     return [replace(panel, y=y) for panel in panels]
@@ -172,9 +174,12 @@ def keyed_panels(
 
 
 def _panel_of_filter(panel: Panel, nth_filter: int, name: str) -> Panel:
-    """A panel with only the lines of one filter."""
-    marks = tuple(mark for mark in panel.marks if not isinstance(mark, Line) or mark.style.dash == nth_filter)
-    return replace(panel, marks=marks, title=", ".join(filter(None, (panel.title, name))))
+    """A panel with only the lines of one filter, all of one look but for their shades."""
+    marks = (mark for mark in panel.marks if not isinstance(mark, Line) or mark.style.dash == nth_filter)
+    alike = (
+        replace(mark, style=replace(mark.style, dash=0, marker=0)) if isinstance(mark, Line) else mark for mark in marks
+    )
+    return replace(panel, marks=tuple(alike), title=", ".join(filter(None, (panel.title, name))))
 
 
 def key_title(result: CaseResult) -> str:

@@ -131,6 +131,25 @@ def test_lines_of_several_filters_and_values_have_a_panel_for_each_filter(expect
     assert all(len(panel.marks) == 5 and not panel.keys for panel in figures[5].panels)
 
 
+def curve_of(values):
+    return Line(np.arange(float(len(values))), np.array(values, float), "a")
+
+
+def test_the_key_of_names_at_ends_is_told_though_a_legend_has_nothing_else():
+    lines = tuple(Line(np.arange(3.0), np.full(3, n), f"{n}", Style(n / 2, 0)) for n in range(3))
+    (legend,) = drawn(one(*lines, line_title="aspect angle, °")).figure.legends
+    assert legend.get_title().get_text() == "at the lines: aspect angle, °"
+
+
+def test_panels_side_by_side_share_an_axis_that_shows_no_rounding():
+    near, far = (Panel(Axis("x"), panel_layout.fitting_axis("σ", [one_line]), (one_line,)) for one_line in DIPPED)
+    low, _ = panel_layout.share_y_axis([near, far])[0].y.limits
+    assert low > 1e-5
+
+
+DIPPED = curve_of([20, 0.5, 10]), curve_of([20, 1e-8, 0.5])
+
+
 def curves_of(results):
     return tables.group_by(tables.curves(results), "case", "filter", "component")
 
@@ -143,10 +162,6 @@ def test_an_axis_begins_near_its_curves_if_from_zero_they_would_fill_less_than_h
     strokes = [curve for curve in drawn(figure).lines if isinstance(curve.get_marker(), tuple)]
     assert len(strokes) == 1
     assert len(drawn(replace(figure, panels=(replace(figure.panels[0], y=far),))).lines) == 1
-
-
-def curve_of(values):
-    return Line(np.arange(float(len(values))), np.array(values, float), "a")
 
 
 def test_a_legend_has_the_order_of_the_lines_at_their_ends():

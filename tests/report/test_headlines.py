@@ -12,7 +12,7 @@ from radarsim.config.find_files import SHIPPED
 from radarsim.language.current import language_codes, use_language
 from radarsim.report import headlines
 from radarsim.report.case_selection import swept_cases
-from radarsim.report.drawing.model import Axis, Figure, Heat, Line, Panel
+from radarsim.report.drawing.model import Axis, Figure, Heat, Line, Panel, Style
 from radarsim.report.math_text import plain_text
 from radarsim.report.page_links import tables_behind_figure
 from radarsim.studies.registry import study
@@ -24,6 +24,20 @@ MAX_CAPTION_WORDS = 40
 def figure_of(label, *values, scale="linear"):
     lines = tuple(Line(np.arange(2.0), np.array([0.1, value]), str(value)) for value in values)
     return Figure("f", "The title", "A caption.", (Panel(Axis("x"), Axis(label, scale), lines),))
+
+
+def test_lines_that_a_headline_names_are_strong_and_the_others_thin():
+    names = ("order 2", "order 2 range only", "expected error = likelihood")
+    lines = tuple(Line(np.arange(2.0), np.arange(2.0) + n, name, Style(n, n)) for n, name in enumerate(names))
+    figure = Figure("f", "The title", "A caption.", (Panel(Axis("x"), Axis("y"), lines),))
+
+    def widths(headline):
+        return [mark.style.width_pt for mark in headlines.emphasised(figure, headline).panels[0].marks]
+
+    assert widths("With ‘expected error’ σ is 3 % lower than with order 2 range only.") == [0.8, 2.0, 2.0]
+    assert widths("order 2: σ is 3 m.") == [2.0, 0.8, 0.8]
+    plain = [mark.style.width_pt for mark in lines]
+    assert widths("σ is 3 m.") == widths(f"{', '.join(names)}: 3 m.") == plain
 
 
 GAIN, SIGMA, SHARE = (

@@ -36,14 +36,19 @@ def cut_edges(pixels):
 
 
 def faults_of_widths(figures):
-    """Figures that are cut at a width, or cannot be had at it."""
+    """Figures that are cut at a width, or cannot be had at it though they would be no taller than a page."""
     faults = []
     for name, figure in figures.items():
         for width in WIDTHS_MM:
             pixels, width_mm = picture(drawing_canvas.save(figure, ("png",), width)["png"])
-            if (edges := cut_edges(pixels)) or round(width_mm) != width:
+            is_widened = round(width_mm) != width and height_mm(figure, width) <= drawing_canvas.A4_HEIGHT_MM
+            if (edges := cut_edges(pixels)) or is_widened:
                 faults.append(f"{name} at {width:g} mm: {width_mm:.0f} mm, cut: {edges}")
     return faults
+
+
+def height_mm(figure, width):
+    return drawing_canvas.render(drawing_canvas.at_width(figure, width)).get_figheight() / MM
 
 
 def claim_figure():
@@ -79,12 +84,14 @@ def test_notes_along_the_top_that_would_meet_stand_in_rows():
 
 
 @pytest.mark.parametrize("count", [1, 5, 6, 12])
-def test_a_figure_of_a_column_is_lower_than_a_page(count):
+def test_a_figure_of_a_column_is_lower_than_a_page_or_wider(count):
     x = np.arange(3.0)
     panel = Panel(Axis("x"), Axis("y"), tuple(Line(x, x, f"filter {n}") for n in range(9)), direct=False)
     figure = Figure("f", "F", "A flight.", (panel,) * count, 3, PAGE_MM)
-    canvas = drawing_canvas.render(drawing_canvas.at_width(figure, COLUMN_MM))
-    assert canvas.get_figheight() / MM < 297 or count > 6
+    drawing = drawing_canvas.draw(figure, ("png",), COLUMN_MM)
+    assert (drawing.figure.width_mm > COLUMN_MM) == (count > 6)
+    with Image.open(io.BytesIO(drawing.files["png"])) as image:
+        assert image.height / PNG_DPI / MM < 297.5
 
 
 def test_a_width_at_which_words_would_be_cut_is_increased_and_said(tmp_path):
@@ -92,7 +99,10 @@ def test_a_width_at_which_words_would_be_cut_is_increased_and_said(tmp_path):
     written = result.write(tmp_path, figures="png", width_mm=20)
     pixels, width_mm = picture((written.folder / "figures" / "sigma_r.png").read_bytes())
     assert cut_edges(pixels) == []
-    assert f"figure sigma_r: drawn {width_mm:.0f} mm wide, as words would be cut at 20 mm" in result.warnings
+    assert (
+        f"figure sigma_r: drawn {width_mm:.0f} mm wide, as at 20 mm words would be cut or the page exceeded"
+        in result.warnings
+    )
 
 
 def crowded_panels(figure):

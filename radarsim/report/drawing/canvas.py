@@ -44,7 +44,8 @@ from radarsim.report.math_text import plain_text, with_formulas
 from radarsim.report.wording import with_unbroken_units
 
 FILE_STYLE: Any = {name: STYLE[name] for name in ("pdf.fonttype", "ps.fonttype", "svg.fonttype")}
-WIDTH_STEP_MM = 5.0  # by which a width is increased at which something would be cut
+WIDTH_STEP_MM = 5.0  # by which a width is increased at which something would be cut, or the figure taller than a page
+A4_HEIGHT_MM = 297.0
 LEAST_PANEL_MM = 15.0  # width of its axes
 ROUNDING_INCHES = 1e-3
 CACHED_METHODS = ("_update_ticks", "_get_ticklabel_bboxes")  # of Matplotlib's axes; arguments: none; ticks, renderer
@@ -109,8 +110,10 @@ def _render_at(figure: Figure, width_mm: float | None) -> tuple[Figure, Canvas]:
 
 
 def _is_whole(canvas: Canvas, panel_count: int) -> bool:
-    """Whether all that is drawn lies within the figure, and its panels have room."""
+    """Whether all that is drawn lies within the figure, its panels have room, and it is no taller than a page."""
     box, page = canvas.get_tightbbox(), canvas.bbox_inches
+    if page.height > A4_HEIGHT_MM * MM:
+        return False
     is_inside = min(box.x0, box.y0, page.x1 - box.x1, page.y1 - box.y1) > -ROUNDING_INCHES
     return is_inside and all(axes.bbox.width / canvas.dpi > LEAST_PANEL_MM * MM for axes in canvas.axes[:panel_count])
 

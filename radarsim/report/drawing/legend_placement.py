@@ -33,7 +33,7 @@ class Legend:
 
     def columns(self, width_mm: float) -> int:
         """Number of columns of names that fit into a width."""
-        longest = max(len(plain_text(name)) for name in self.keys)
+        longest = max((len(plain_text(name)) for name in self.keys), default=0)
         return max(1, min(len(self.keys), int(width_mm / (LETTER_MM * longest + SAMPLE_MM))))
 
     def height_mm(self, width_mm: float) -> float:
@@ -81,7 +81,7 @@ def plan_legends(figure: Figure) -> LegendPlan:
         return style is None, style == ROUGH_KEY, ranks.get(name, float(len(ranks)))
 
     ordered = dict(sorted(merged.items(), key=place))
-    common = Legend(ordered, next(iter(all_titles), "")) if merged else None
+    common = Legend(ordered, next(iter(all_titles), "")) if merged or all_titles else None
     return LegendPlan(panels, at_ends, (None,) * len(panels), common, stands_beside)
 
 
