@@ -9,7 +9,18 @@ from radarsim.engine.results import CaseResult
 from radarsim.language.translate import tr
 from radarsim.report import caption_remarks
 from radarsim.report.case_selection import MAX_MISSING_NAMES
-from radarsim.report.drawing.model import COLUMN_MM, MAX_PANEL_LINES, PAGE_MM, Axis, Figure, Line, Mark, Panel, Style
+from radarsim.report.drawing.model import (
+    COLUMN_MM,
+    MAX_PANEL_LINES,
+    PAGE_MM,
+    Axis,
+    Figure,
+    Line,
+    Mark,
+    Panel,
+    Reference,
+    Style,
+)
 from radarsim.report.key_labels import (
     degrees_factor_and_unit,
     escape_dollars,
@@ -59,7 +70,7 @@ def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
     """An axis of positive values: from zero, or near them if they would fill less than half of it; logarithmic where
     the least would otherwise lie on zero."""
     values = np.concatenate([np.asarray(mark.y, float) for mark in marks if isinstance(mark, Line)] or [np.ones(1)])
-    values = values[np.isfinite(values) & (values >= 0)]
+    values = values[np.isfinite(values)]
     if values.size and 0 < values.max() < FLAT_RATIO * values.min():
         return Axis(label)
     values = values[values > 0]
@@ -110,13 +121,19 @@ def share_y_axis(panels: Sequence[Panel]) -> list[Panel]:
     limited = [panel.y for panel in filled if None not in panel.y.limits]
     logarithmic = [panel.y for panel in filled if panel.y.scale == "log"]
     fitted = fitting_axis(filled[0].y.label, lines)
-    from_zero = any(panel.y.limits == (0, None) for panel in filled)
-    y = (limited or logarithmic or [fitted if from_zero else filled[0].y])[0]
+    is_fitted = any(panel.y.limits == (0, None) for panel in filled) or all(map(_has_fitting_axis, filled))
+    y = (limited or logarithmic or [fitted if is_fitted else filled[0].y])[0]
     if y.scale == fitted.scale == "log" and y.limits == (None, None):
         y = replace(y, limits=fitted.limits)
     if not limited:
         y = replace(y, limits=holding(lines, y))
     return [replace(panel, y=y) for panel in panels]
+
+
+def _has_fitting_axis(panel: Panel) -> bool:
+    """Whether the axis of y of a panel is that of `fitting_axis`, which shows no values about zero."""
+    is_about_zero = any(isinstance(mark, Reference) and mark.value == 0 for mark in panel.marks)
+    return not is_about_zero and panel.y == fitting_axis(panel.y.label, panel.marks)
 
 
 def holding(lines: Sequence[Line], y: Axis) -> tuple[float, float]:

@@ -147,6 +147,14 @@ def test_panels_side_by_side_share_an_axis_that_shows_no_rounding():
     assert low > 1e-5
 
 
+def test_flat_curves_of_different_sizes_share_an_axis_from_zero():
+    panels = [Panel(Axis("x"), panel_layout.fitting_axis("σ", [curve]), (curve,)) for curve in FLAT]
+    low, high = panel_layout.share_y_axis(panels)[0].y.limits
+    assert low == 0
+    assert high > 15
+
+
+FLAT = curve_of([15, 16]), curve_of([1, 1.1])
 DIPPED = curve_of([20, 0.5, 10]), curve_of([20, 1e-8, 0.5])
 
 
@@ -354,6 +362,7 @@ def test_the_least_cells_of_a_map_of_errors_are_framed_as_far_as_they_are_writte
     errors, shares = (Heat(np.arange(3), np.arange(2), values, "σ, m", is_error=is_error) for is_error in (True, False))
     assert marks.best_cells(errors) == [(0, 0), (0, 1)]
     assert marks.best_cells(shares) == marks.best_cells(replace(errors, values=np.full((2, 3), np.nan))) == []
+    assert marks.best_cells(replace(errors, values=np.full((2, 3), 44.8))) == []  # all alike
     assert [patch.get_xy() for patch in drawn(one(errors)).patches] == [(-0.5, -0.5), (0.5, -0.5)]
 
 

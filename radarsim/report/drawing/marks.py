@@ -197,12 +197,14 @@ def _cell_text(heat: Heat, i: int, j: int) -> str:
 
 
 def best_cells(heat: Heat) -> list[tuple[int, int]]:
-    """The cells of a map of errors whose value, as it is written, is the least one: row and column."""
+    """The cells of a map of errors whose value, as it is written, is the least one: row and column. None if more than
+    half of the cells have it."""
     if not (heat.is_error and np.isfinite(heat.values).any()):
         return []
     written = [(cell, _cell_text(heat, *cell).partition("\n")[0]) for cell in np.ndindex(*heat.values.shape)]
     least = written[int(np.nanargmin(heat.values))][1]
-    return [cell for cell, text in written if text == least]
+    best = [cell for cell, text in written if text == least]
+    return best if 2 * len(best) <= len(written) else []
 
 
 def _draw_note(axes: Axes, note: Note) -> None:
