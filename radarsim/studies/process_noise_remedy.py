@@ -15,7 +15,7 @@ from radarsim.config.experiment import Case
 from radarsim.config.study_keys import is_process_noise, process_noise_key
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import tr
+from radarsim.language.translate import join_names, tr
 from radarsim.report import compared_value, key_labels, tables
 from radarsim.report.quantities import GAIN, SIGMA
 from radarsim.report.sentences import Sentence
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 VARIANCE_FACTORS = (10.0, 100.0, 1e3, 1e4)  # tried, times a variance; times a standard deviation their roots
 TRIAL_REALISATIONS = 400
 MAX_TRIAL_REALISATIONS = 4096
-MIN_LOSS = 1.0  # per cent
+MIN_LOSS, MIN_GAIN = 1.0, 1.0  # per cent: what is a loss; from which gain on settings help
 
 Settings = tuple[tuple[str, Any], ...]  # values by dotted key
 
@@ -109,24 +109,23 @@ def _sentence(study: Study, result: CaseResult[Any], index: int, groups: Sequenc
     for group in groups:
         trials = {settings: _trial(study, result.spec, index, settings, TRIAL_REALISATIONS) for settings in group}
         best = max(trials, key=lambda settings: trials[settings].least)
-        trial = _trial(study, result.spec, index, best, count) if trials[best].least > 0 else trials[best]
-        if trial.least > 0:
+        trial = _trial(study, result.spec, index, best, count) if trials[best].least > MIN_GAIN else trials[best]
+        if trial.least > MIN_GAIN:
             text = tr(
                 "{case}, {filter}: what helps (tried on {count} realisations; add to the command, with --out cured): "
-                "{settings}, {gains}.",
+                "{settings}; {gains}.",
                 settings=" ".join(f"--set {key}={_option_text(value)}" for key, value in best),
                 gains=_gains_text(trial),
                 **fields,
             )
             return Sentence(text)
-    tried = dict.fromkeys(pair for group in groups for settings in group for pair in settings)
+    tried: dict[str, list[str]] = {}
+    for key, value in dict.fromkeys(pair for group in groups for settings in group for pair in settings):
+        name = key_labels.without_markup(key_labels.key_symbol(result, key))
+        tried.setdefault(name, []).append(key_labels.value_with_unit(result, key, value))
     text = tr(
         "{case}, {filter}: nothing helps of what was tried on {count} realisations: {tried}.",
-        tried=", ".join(
-            f"{key_labels.without_markup(key_labels.key_symbol(result, key))} = "
-            f"{key_labels.value_with_unit(result, key, value)}"
-            for key, value in tried
-        ),
+        tried="; ".join(f"{name} = {join_names(values)}" for name, values in tried.items()),
         **fields | {"count": TRIAL_REALISATIONS},
     )
     return Sentence(text)

@@ -96,7 +96,7 @@ def remedy(config):
 
 
 def overrides_of(sentence):
-    return re.findall(r"--set (\S+=[^ ,]+)", sentence)
+    return re.findall(r"--set (\S+=[^ ;]+)", sentence)
 
 
 SHARP = {

@@ -70,7 +70,7 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
             Sentence(
                 tr(
                     "{case}, {filter}: what helps (tried on {count} realisations; add to the command, with --out "
-                    "cured): {settings}, {gains}.",
+                    "cured): {settings}; {gains}.",
                     settings=settings,
                     gains=_trial_text(trial),
                     **fields,
