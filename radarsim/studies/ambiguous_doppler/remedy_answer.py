@@ -28,6 +28,7 @@ TRIAL_REALISATIONS = 400  # a share of a tenth is known to 1.5 points
 MAX_TRIAL_REALISATIONS = 4096  # a second or two for each remedy
 MAX_LOST_SHARE = 0.1  # of realisations, up to which a remedy helps
 MAX_NAMED = 2  # remedies in the answer, the first that help
+NEARLY = 10.0  # per cent of gain: so much less is as good
 SMOOTH_MPS2 = 10.0  # acceleration that the model of order 1 allows for: what keeps the lock through turns of some g
 LARGER = (10.0, 100.0, 1e3, 1e4)  # times the manoeuvre variance
 STAGGER = (1.0, 7 / 6, 4 / 3)  # times the repetition rate, used in turn
@@ -48,7 +49,7 @@ class Trial(NamedTuple):
 
     @property
     def merit(self) -> float:
-        return -self.share if math.isnan(self.gain) else self.gain
+        return -100 * self.share if math.isnan(self.gain) else self.gain
 
 
 def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: TablesByName) -> list[Sentence]:
@@ -135,7 +136,9 @@ def cures(
         promising = [remedy for remedy in allowed if trial(remedy, TRIAL_REALISATIONS).helps]
         if promising:
             trials = [(trial(remedy, max(count, TRIAL_REALISATIONS)), remedy.options) for remedy in promising]
-            best, options = max(trials, key=lambda tried: tried[0].merit)
+            most = max(tried.merit for tried, _ in trials)
+            # Of those that gain nearly as much the largest D_M: losses too rare for the trial are rarest with it.
+            best, options = next(tried for tried in reversed(trials) if tried[0].merit >= most - NEARLY)
             if best.helps:
                 yield options, best
 
