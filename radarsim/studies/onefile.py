@@ -330,10 +330,10 @@ class OneFile(Study):
             answer += [sentence.with_text(prefix + sentence.text) for sentence in self._sentences(result, tables)]
         return [*answer, *remedy_sentence(self, reported, tables, self.alternatives), *map(sentences.Sentence, remark)]
 
-    def alternatives(self, spec: Any, index: int) -> "Sequence[Settings]":
-        """What is tried of a case for a filter, by index, that is worse than the baseline and that a larger process
-        noise alone does not help. Default: nothing."""
-        return ()
+    def alternatives(self, spec: Any, index: int) -> "Sequence[Settings] | None":
+        """What is tried for a filter, by index, that measures more than the baseline and is worse, where a larger
+        process noise alone does not help. None, the default: no filter measures more."""
+        return None
 
     def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
         """σ of the leading component at the last scan, and the gain of each filter."""

@@ -14,6 +14,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.config.study_keys import is_process_noise, process_noise_key
 from radarsim.engine.results import CaseResult
+from radarsim.errors import ConfigError
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, tr
 from radarsim.report import compared_value, key_labels, tables
@@ -44,27 +45,28 @@ class Trial(NamedTuple):
 
     @property
     def least(self) -> float:
-        return float(np.nanmin([self.last, self.worst]))
+        return self.last if math.isnan(self.worst) else min(self.last, self.worst)
 
 
 def remedy_sentence(
     study: Study,
     results: Sequence[CaseResult[Any]],
     tables_by_name: "Mapping[str, pd.DataFrame]",
-    alternatives: Callable[[Any, int], Sequence[Settings]],
+    alternatives: Callable[[Any, int], Sequence[Settings] | None],
 ) -> list[Sentence]:
-    """What helps the first filter that is surely worse than the baseline, where its process noise is not swept.
+    """What helps the first filter that measures more than the baseline and is surely worse, where its process noise is
+    not swept.
 
     alternatives: of a case's keys and a filter's index, what is tried with and without a larger process noise, where
-    that alone does not help."""
+    that alone does not help; None of a filter that measures no more."""
     for result in results:
         if any(is_process_noise(type(result.spec), key.rpartition(".")[2]) for key, _ in result.swept_values):
             continue
         baseline = result.axes.filters[result.axes.baseline]
         for i, member in enumerate(result.spec.members):
-            key = process_noise_key(member)
-            if key and member.name != baseline and _is_worse(study, result, member.name, baseline, tables_by_name):
-                return [_sentence(study, result, i, _candidates(result.spec, i, key, alternatives(result.spec, i)))]
+            key, others = process_noise_key(member), alternatives(result.spec, i)
+            if key and others is not None and _is_worse(study, result, member.name, baseline, tables_by_name):
+                return [_sentence(study, result, i, _candidates(result.spec, i, key, others))]
     return []
 
 
@@ -144,7 +146,7 @@ def _gains_text(trial: Trial) -> str:
 
 @lru_cache(maxsize=64)  # the answer is made for the page, and again where a program asks for it
 def _trial(study: Study, spec: Any, index: int, settings: Settings, count: int) -> Trial:
-    """What a filter gains over the baseline with other values of keys."""
+    """What a filter gains over the baseline with other values of keys; endless losses where they are impossible."""
     other = next(member for member in spec.members if member.name == (spec.baseline or spec.members[0].name))
     own = spec.members[index]
     changes: dict[str, Any] = {}
@@ -155,7 +157,10 @@ def _trial(study: Study, spec: Any, index: int, settings: Settings, count: int) 
         else:
             changes[part] = getattr(spec, part).model_copy(update={key: value})
     changed = spec.model_copy(update={**changes, spec.bare_keys: (other, own), "baseline": other.name})
-    plan = study.prepare(Case("trial", "trial", study.name, changed, (), count, 1))
+    try:
+        plan = study.prepare(Case("trial", "trial", study.name, changed, (), count, 1))
+    except ConfigError:
+        return Trial(-math.inf, math.nan)
     sums = plan.layout.unpack(study.simulate(plan, 0, count))
     result = CaseResult("trial", study.name, changed, (), count, sums, plan.axes)
     rows = tables.select_rows(study.curves([result]), component=plan.axes.components[0][0])
@@ -165,4 +170,5 @@ def _trial(study: Study, spec: Any, index: int, settings: Settings, count: int) 
     if (since := _manoeuvre_scan(study, changed, plan.axes.t_s)) is not None:
         is_late = rows["k"].to_numpy() >= since
         worst = 100 * (1 - float(np.nanmax(sigmas[is_own & is_late]) / np.nanmax(sigmas[is_other & is_late])))
-    return Trial(100 * (1 - float(sigmas[is_own][-1] / sigmas[is_other][-1])), worst)
+    last = 100 * (1 - float(sigmas[is_own][-1] / sigmas[is_other][-1]))
+    return Trial(-math.inf if math.isnan(last) else last, worst)

@@ -139,6 +139,23 @@ def test_no_remedy_is_named_without_a_loss_nor_where_process_noise_is_swept():
     assert not any("helps" in text for text in result.answer)
 
 
+def test_what_is_impossible_does_not_help_nor_end_the_run():
+    """Among false plots a larger process noise widens the gate beyond the false plots that are drawn."""
+    cluttered = PLANE["radar"] | {"repetition_rate_hz": 1200, "false_plots_per_km2": 0.5, "detection_probability": 0.85}
+    filters = [keys | {"association": "nearest"} for keys in PLANE["filters"]]
+    result = radarsim.run(PLANE | {"radar": cluttered, "filters": filters, "realisations": 100})
+    study = registry.study("plane")
+    gains = result.tables["gains"].assign(gain_percent=-50.0, gain_lo=-60.0, gain_hi=-40.0)
+    (sentence,) = remedy_sentence(study, result.cases, result.tables | {"gains": gains}, study.alternatives)
+    assert "helps" in sentence.text
+
+
+def test_a_rival_that_measures_no_more_is_told_nothing():
+    pair = [keys | {"doppler": False} for keys in PLANE["filters"]]
+    pair[1] |= {"sigma_acceleration_mps2": 1e-3}
+    assert remedy(PLANE | {"filters": pair}) == ""
+
+
 def test_where_nothing_helps_that_is_said():
     result = radarsim.run(SHARP)
     study = registry.study("range_doppler")

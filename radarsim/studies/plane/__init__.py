@@ -220,7 +220,9 @@ class Plane(PlanarStudy):
 
     def alternatives(self, spec, index):
         """Higher repetition rates, with which velocities fold less."""
-        rate = spec.radar.repetition_rate_hz
+        rate, baseline = spec.radar.repetition_rate_hz, spec.baseline or spec.filters[0].name
+        if not spec.filters[index].doppler or any(keys.doppler for keys in spec.filters if keys.name == baseline):
+            return None
         return [] if rate is None else [(("radar.repetition_rate_hz", factor * rate),) for factor in (2.0, 4.0)]
 
     def tracker(self, case):

@@ -48,8 +48,12 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
     ]
 
 
-def alternatives(spec: Any, index: int) -> list[tuple[tuple[str, Any], ...]]:
-    """Other forms of the process noise of a filter, by index, that suit a manoeuvre that begins within a scan."""
+def alternatives(spec: Any, index: int) -> list[tuple[tuple[str, Any], ...]] | None:
+    """Other forms of the process noise of a filter, by index, that suit a manoeuvre that begins within a scan; None of
+    one that measures no more than the baseline."""
+    baseline = spec.baseline or spec.filters[0].name
+    if any(len(f.observes) >= len(spec.filters[index].observes) for f in spec.filters if f.name == baseline):
+        return None
     given = getattr(spec.filters[index], "process_noise", None)
     forms = () if given is None else ("white_jerk", "white_acceleration")
     return [((f"filters.{index}.process_noise", form),) for form in forms if form != given]
