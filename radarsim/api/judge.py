@@ -67,7 +67,8 @@ def judge(
 
     against="tuned": the config's filters stand there tuned too, each by `radarsim.tune` with noise of another seed,
     over all cases, for `wanted`, by default σ of the first component at the last scan. The answer is about the
-    component and scan of `wanted`; without it, about those that the answer of the study is about.
+    component and scan of `wanted`; without it, about those that the answer of the study is about. In the long run the
+    cases last until their filters have settled: a file holds the estimates of so many scans.
 
     The other arguments are those of `run`; blocks are not stored, and results are in out/CONFIG_NAME. Raises
     ConfigError for estimates of another shape, order or seed.
@@ -138,11 +139,17 @@ def add_user_filter(
     if against not in (None, "tuned"):
         raise ConfigError(f"{argument('against', '--against')}: must be tuned, got {against!r}")
     if against or wanted:
-        from radarsim.api.design import tune
+        from radarsim.api.design import quantities, tune
+    if wanted and quantities.parse_quantity(wanted, None).over == "long run":
+        from radarsim.api import long_experiment, precision_target
+
+        (experiment,), wanted = precision_target.with_long_run([experiment], wanted)
+        tuning_warnings = long_experiment.long_run_notes([experiment])
     if wanted and not against:
         judged_at = tune.judged_point(experiment, wanted)
     elif against:
-        experiment, tuning_warnings, judged_at = tune.tune_baseline(experiment, wanted, realisations=realisations)
+        experiment, left_out, judged_at = tune.tune_baseline(experiment, wanted, realisations=realisations)
+        tuning_warnings += left_out
     _check_name(name)
     n, cases = arguments.whole_number(realisations), experiment.cases
     member = make_user_filter(estimates, name, components, one_by_one, experiment)

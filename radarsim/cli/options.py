@@ -201,10 +201,7 @@ quantity_option = click.option(
     "quantity of the study, as `radarsim solve --help` lists them (lock, false_tracks).",
 )
 phrase_of_precision_option = click.option(
-    "--for",
-    "phrase",
-    metavar="TEXT",
-    help="What --precision applies to, in place of --of: 'sigma r at 60 s', 'worst sigma r', 'gain of Vr at the end'.",
+    "--for", "phrase", metavar="TEXT", help=f"What --precision applies to, in place of --of. {PHRASE_HELP}"
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON document instead of text.")
 format_option = click.option(

@@ -15,6 +15,7 @@ MEASURE_TEXTS = {
     "mean": term("{component} on average"),
     "last": term("{component} at the last scan"),
     "steady": term("{component} once settled"),
+    "at": term("{component} at {t_s:g} s"),
 }
 
 
@@ -47,10 +48,16 @@ class FilterChoices(NamedTuple):
 
 
 def gain_sentences(
-    subject: str, quantity: str, measure: str, key: NoiseKey, baseline: FilterChoices, others: Collection[FilterChoices]
+    subject: str,
+    quantity: str,
+    measure: str,
+    key: NoiseKey,
+    baseline: FilterChoices,
+    others: Collection[FilterChoices],
+    t_s: float = 0.0,
 ) -> list[Sentence]:
-    """How much each of the others gains over the baseline in σ of a quantity; measure: over scans as."""
-    what = tr(MEASURE_TEXTS[measure], component=tr("σ of the {quantity}", quantity=quantity))
+    """How much each of the others gains over the baseline in σ of a quantity; measure: over scans as, or at t_s, s."""
+    what = tr(MEASURE_TEXTS[measure], component=tr("σ of the {quantity}", quantity=quantity), t_s=t_s)
     return [
         Sentence(
             tr(

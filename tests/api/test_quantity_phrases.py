@@ -289,3 +289,63 @@ def test_noise_is_common_at_the_same_scan_or_the_same_time():
     assert have_common_noise({(15, 140.0), (15, 154.0)})  # a longer period
     assert have_common_noise({(25, 0.3), (21, 0.3)})  # other windows over the same burst
     assert not have_common_noise({(15, 140.0), (17, 160.0)})  # a longer run
+
+
+PHRASES = (
+    *("sigma r at 60 s", "worst sigma r", "mean sigma r from 60 s", "sigma r in the long run"),
+    "gain of Vr at the end",
+)
+REFUSED = {  # what a command cannot answer, and what it says instead
+    ("judge", "mean sigma r from 60 s"): "a judgement is about one scan",
+    ("minimise", "sigma r in the long run"): "in the long run, without a manoeuvre, 0 is best",
+    ("minimise", "gain of Vr at the end"): "must be an error, such as 'sigma Vr at the end'",
+}
+
+
+def ask(verb, phrase):
+    """Ask a command for a phrase in the cheapest way that reads all of it."""
+    from radarsim.api.design.tune import judged_point
+    from radarsim.api.precision_target import asked_table, with_long_run
+
+    if verb == "solve":
+        radarsim.solve(BOAT, SIGMA_V, wanted=phrase, filter="r+Vr", equals=5, between=(0.5, 1.5))
+    elif verb == "tune":
+        radarsim.tune(BOAT, phrase, filter="r+Vr", free={"initial_scans": (2, 3)})
+    elif verb == "sensitivity":
+        radarsim.sensitivity(BOAT, wanted=phrase)
+    elif verb == "judge":
+        (experiment,), of = with_long_run([load(BOAT)], phrase)
+        judged_point(experiment, of)
+    elif verb == "minimise":
+        load(BOAT, [f"manoeuvre_variance={{minimise: {phrase}}}"])
+    else:
+        (experiment,), of = with_long_run([load(BOAT)], phrase)
+        asked_table(experiment.cases[0], of)
+
+
+@pytest.mark.slow_cases("sensitivity-worst sigma r")
+@pytest.mark.parametrize("phrase", PHRASES)
+@pytest.mark.parametrize("verb", ["solve", "tune", "judge", "sensitivity", "run --precision", "minimise"])
+def test_every_command_takes_every_phrase(verb, phrase):
+    if (verb, phrase) in REFUSED:
+        with pytest.raises(ConfigError, match=REFUSED[verb, phrase]):
+            ask(verb, phrase)
+    else:
+        ask(verb, phrase)
+
+
+def test_the_variance_that_minimises_at_a_time_is_the_one_that_tune_finds():
+    (case,) = load(BOAT, ["manoeuvre_variance={minimise: sigma r at 80 s}"]).cases
+    from radarsim.studies.range_doppler.designed_case import design_case
+
+    tuned = radarsim.tune(BOAT, "sigma r at 80 s", filter="r+Vr").keys[0]
+    assert tuned.lo < design_case(case).variances[1] < tuned.hi
+
+
+@pytest.mark.slow
+def test_a_judgement_of_the_long_run_is_about_a_run_until_it_has_settled():
+    result = radarsim.judge(MINE, lambda plots: plots["range_m"], wanted="sigma r in the long run", realisations=200)
+    last_s = result.curves["t_s"].max()
+    assert last_s > 2.5 * MINE["scans"]
+    assert f"in r at {last_s:g} s" in result.answer[0]
+    assert any("without a manoeuvre" in line for line in result.warnings)

@@ -394,7 +394,7 @@ def judged_point(experiment: Experiment, target: str) -> tuple[str, float] | Non
     axes = registry.study(case.study).prepare(case).axes
     if quantity.component is not None:
         quantities.check_name(quantity.component, [name for name, _ in axes.components], "component")
-    if quantity.over in ("mean", "long run"):
+    if quantity.over == "mean":
         option = argument("wanted", "--for")
         raise ConfigError(f"{option}: a judgement is about one scan: give a time, or worst, got {target!r}")
     return _point_of(quantity, axes)

@@ -129,8 +129,8 @@ def objective(criterion: Best, sigma: np.ndarray) -> np.ndarray:
     sigma_of_component = sigma[:, criterion.from_k - 1 :, COMPONENTS[criterion.minimise]]
     if np.isnan(sigma_of_component).all():
         raise ValueError("no filter has an estimate there")
-    if criterion.over == "last":
-        return sigma_of_component[:, -1]
+    if criterion.over in ("last", "at"):
+        return sigma_of_component[:, -1 if criterion.over == "last" else 0]
     return np.asarray(
         np.nanmax(sigma_of_component, axis=1) if criterion.over == "worst" else np.nanmean(sigma_of_component, axis=1)
     )

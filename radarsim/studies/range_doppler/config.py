@@ -11,7 +11,6 @@ from radarsim.config.cross_checks import CheckError, check_error, cross_check
 from radarsim.config.key_types import NonNegative, Number, Positive, key
 from radarsim.config.marks import LaterKeyMark
 from radarsim.config.model import Model
-from radarsim.config.quantity_phrase import OVER_SCANS, PhraseError, QuantityPhrase, parse_phrase
 from radarsim.config.radial_keys import MAX_SCANS
 
 FOLDED_STUDY = "study=ambiguous_doppler"  # takes the same config over
@@ -107,23 +106,15 @@ Target = Annotated[
     Field(discriminator="kind"),
 ]
 Noise = Literal["random_jerk", "white_jerk", "white_acceleration"]
-
-
 MINIMISED = "sigma_r", "sigma_Vr", "sigma_ar"  # the components of an error, with the key `over`
 
 
 def _checked_phrase(text: str) -> str:
     """An error to minimise, or a phrase that says it with the scans. Raises ValueError."""
-    if text in MINIMISED:
-        return text
-    try:
-        phrase = parse_phrase(text)
-    except PhraseError:
-        phrase = QuantityPhrase("")
-    if f"{phrase.name}_{phrase.component}" not in MINIMISED:
-        raise ValueError(f"must be {', '.join(MINIMISED)}, or a phrase such as 'worst sigma r'")
-    if phrase.over == "long run" or (phrase.at_s, phrase.at_k, phrase.from_s) != (None, None, None):
-        raise ValueError("must be over scans, as 'worst sigma r' and 'mean sigma r', or 'at the end'; from_k is a key")
+    if text not in MINIMISED:
+        from radarsim.studies.range_doppler.minimise_keys import check_phrase
+
+        check_phrase(text, MINIMISED)
     return text
 
 
@@ -133,10 +124,10 @@ class Best(Model):
     minimise: Annotated[str, AfterValidator(_checked_phrase)] = key(
         "error to minimise",
         "the error that is minimised: sigma_r, sigma_Vr or sigma_ar with `over`; or a phrase with the scans: worst "
-        "sigma r, mean sigma Vr, sigma r at the end",
+        "sigma r, mean sigma Vr from 60 s, sigma r at 60 s, sigma r at the end",
     )
-    over: Literal["worst", "mean", "last"] | None = key(
-        "taken over scans as", "value over the scans from from_k on: the greatest, their mean, or the last", None
+    over: Literal["worst", "mean", "last", "at"] | None = key(
+        "taken over scans as", "value over scans from from_k on: greatest, mean or last; `at`: that at from_k", None
     )
     from_k: Annotated[int, key_types.WholeNumber(1, MAX_SCANS)] | None = key(
         "first scan that counts",
@@ -146,19 +137,12 @@ class Best(Model):
 
     @cross_check
     def _says_scans_once(self) -> Iterator[CheckError]:
-        if self.minimise in MINIMISED and self.over is None:
-            yield check_error("over", "required key is missing: worst, mean or last")
-        elif self.minimise not in MINIMISED and self.over is not None:
+        if self.minimise not in MINIMISED and self.over is not None:
             yield check_error("over", f"stands in minimise already: {self.minimise!r}")
-
-    @model_validator(mode="after")
-    def _completed(self) -> Self:
-        """A phrase as the keys that it stands for, so that both are one case."""
-        if self.minimise in MINIMISED or self.over is not None:
-            return self
-        phrase = parse_phrase(self.minimise)
-        over = phrase.over if phrase.over in OVER_SCANS else "last"
-        return self.model_copy(update={"minimise": f"{phrase.name}_{phrase.component}", "over": over})
+        elif self.minimise in MINIMISED and self.over is None:
+            yield check_error("over", "required key is missing: worst, mean, last or at")
+        elif self.over == "at" and self.from_k is None:
+            yield check_error("from_k", "required key is missing: the scan at which the error is taken")
 
 
 class FilterKeys(Model):
@@ -215,6 +199,17 @@ class Filter(FilterKeys):
     )
 
 
+def with_completed_variance(filter_keys: Filter, scan_period_s: float) -> Filter:
+    """A filter whose D_M minimises a phrase with the keys that it stands for, so that both are one case."""
+    best = configured_variance(filter_keys)
+    if not isinstance(best, Best) or best.minimise in MINIMISED:
+        return filter_keys
+    from radarsim.studies.range_doppler.minimise_keys import phrase_keys
+
+    best = best.model_copy(update=phrase_keys(best.minimise, best.from_k, scan_period_s))
+    return filter_keys.model_copy(update={"manoeuvre_variance": best})
+
+
 def configured_variance(filter_keys: FilterKeys) -> float | Best:
     """A filter's D_M, (m/s³)²; not-a-number where it has none, as one of a package may."""
     return getattr(filter_keys, "manoeuvre_variance", math.nan)
@@ -238,7 +233,8 @@ class Keys(radial_keys.TimedStudyKeys):
 
     @model_validator(mode="after")
     def _completed(self) -> Self:
-        return self.model_copy(update={"scans": self.plots, "duration_s": None})
+        filters = tuple(with_completed_variance(f, self.radar.scan_period_s) for f in self.filters)
+        return self.model_copy(update={"scans": self.plots, "duration_s": None, "filters": filters})
 
     @cross_check
     def _long_enough(self) -> Iterator[CheckError]:
@@ -261,6 +257,11 @@ class Keys(radial_keys.TimedStudyKeys):
             )
         elif isinstance(best, Best) and (best.from_k or 0) > self.plots:
             yield check_error(f"filters.{i}.manoeuvre_variance.from_k", f"must be <= the number of scans, {self.plots}")
+        elif isinstance(best, Best) and best.minimise not in MINIMISED:
+            from radarsim.studies.range_doppler.minimise_keys import phrase_errors
+
+            run = self.plots, self.radar.scan_period_s
+            yield from phrase_errors(f"filters.{i}.manoeuvre_variance", best.minimise, best.from_k, *run)
 
     @cross_check
     def _of_every_plot(self) -> Iterator[CheckError]:

@@ -37,6 +37,7 @@ CRITERION_TEXTS = {
     "worst": term("{error} is least at its worst from {t_s:g} s on"),
     "mean": term("{error} is least on average from {t_s:g} s on"),
     "last": term("{error} is least at the last scan"),
+    "at": term("{error} is least at {t_s:g} s"),
 }
 
 
@@ -84,15 +85,15 @@ def _steady_choices(rows: "pd.DataFrame") -> list[FilterChoices]:
 
 
 def _gains_over(
-    result: Result, subject: str, component: int, measure: str, choices: Sequence[FilterChoices]
+    result: Result, subject: str, component: int, measure: str, choices: Sequence[FilterChoices], t_s: float = 0.0
 ) -> list[Sentence]:
-    """The gains over a case's baseline in σ of a component, if the baseline has several D_M."""
+    """The gains over a case's baseline in σ of a component, if the baseline has several D_M; t_s: of measure `at`."""
     baseline_name = result.axes.filters[result.axes.baseline]
     baseline = next((choice for choice in choices if choice.name == baseline_name), None)
     if baseline is None:
         return []
     others = [choice for choice in choices if choice.name != baseline_name]
-    return best_gain_answer.gain_sentences(subject, RADIAL[component].words, measure, D_M, baseline, others)
+    return best_gain_answer.gain_sentences(subject, RADIAL[component].words, measure, D_M, baseline, others, t_s)
 
 
 def _best_variance(rows: "pd.DataFrame", filter_name: str) -> str:
@@ -231,7 +232,7 @@ def _optimised_gains(result: Result, case: str) -> list[Sentence]:
         sigmas = {variance: Estimate(*[float(v)] * 3) for variance, v in zip(variances, values, strict=True)}
         choices.append(FilterChoices(axes.filters[f], sigmas, (float(axes.manoeuvre_variance[f]),)))
     component = best_variance.COMPONENTS[criterion.minimise]
-    return _gains_over(result, case, component, str(criterion.over), choices)
+    return _gains_over(result, case, component, str(criterion.over), choices, axes.t_s[(criterion.from_k or 1) - 1])
 
 
 def _optimised_variance(result: Result, filter_name: str, objective: Best, variance: float) -> str:

@@ -304,19 +304,45 @@ BEYOND = [
     ({"target": FLY_BY | {"speed_mps": 2e4}}, "target.speed_mps: must be <= 12000, got 20000"),
     ({"target": {"kind": "recorded", "file": "none.csv"}}, "target.file: no such file: 'none.csv'"),
     ({"filters.0.process_noise": "jerk"}, "must be one of random_jerk, white_jerk, white_acceleration, got 'jerk'"),
-    ({"filters.0.manoeuvre_variance": BEST | {"over": "most"}}, "over: must be one of worst, mean, last, got 'most'"),
-    ({"filters.0.manoeuvre_variance": {"minimise": "sigma_r"}}, "over: required key is missing: worst, mean or last"),
+    (
+        {"filters.0.manoeuvre_variance": BEST | {"over": "most"}},
+        "over: must be one of worst, mean, last, at, got 'most'",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "sigma_r"}},
+        "over: required key is missing: worst, mean, last or at",
+    ),
     (
         {"filters.0.manoeuvre_variance": BEST | {"minimise": "worst sigma r"}},
         "over: stands in minimise already: 'worst sigma r', got 'worst'",
     ),
     (
         {"filters.0.manoeuvre_variance": {"minimise": "worst gain r"}},
-        "minimise: must be sigma_r, sigma_Vr, sigma_ar, or a phrase such as 'worst sigma r', got 'worst gain r'",
+        "minimise: must be an error, such as 'sigma r at the end': the less, the more gain, got 'worst gain r'",
     ),
     (
         {"filters.0.manoeuvre_variance": {"minimise": "sigma r in the long run"}},
-        "minimise: must be over scans, as 'worst sigma r' and 'mean sigma r', or 'at the end'; from_k is a key, got",
+        "minimise: must be worst, mean or at a time: in the long run, without a manoeuvre, 0 is best, got",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "sigma r at 63 s"}},
+        "minimise: must be at the time of a scan, a multiple of 10 s, got",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "worst sigma r from 1e3 s"}},
+        "minimise: must be from 0 to 140 s, the last scan's time, got",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "sigma r at k 16"}},
+        "minimise: must be at a scan up to 15, the last, got",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "sigma r at k 6", "from_k": 3}},
+        "from_k: stands in minimise already: 'sigma r at k 6', got",
+    ),
+    (
+        {"filters.0.manoeuvre_variance": {"minimise": "sigma_r", "over": "at"}},
+        "from_k: required key is missing: the scan at which the error is taken",
     ),
     ({"filters.0.manoeuvre_variance": BEST | {"from_k": 16}}, "from_k: must be <= the number of scans, 15, got 16"),
     ({"duration_s": 140}, "duration_s: stands in place of scans: give one of them, got 140"),
@@ -348,6 +374,23 @@ def test_bad_value_of_a_new_key(good, said, changes, message):
 def test_minimise_takes_the_phrase_of_the_commands_for_the_same_case(good, phrase, keys):
     specs = []
     for best in ({"minimise": phrase, "from_k": 5}, keys | {"from_k": 5}):
+        good["filters"][0]["manoeuvre_variance"] = best
+        specs.append(load(good).cases[0].spec)
+    assert specs[0] == specs[1]
+
+
+@pytest.mark.parametrize(
+    ("phrase", "keys"),
+    [
+        ("sigma r at 60 s", {"over": "at", "from_k": 7}),
+        ("sigma r at k 7", {"over": "at", "from_k": 7}),
+        ("mean sigma r from 60 s", {"over": "mean", "from_k": 7}),
+        ("worst sigma r from 61 s on", {"over": "worst", "from_k": 8}),
+    ],
+)
+def test_minimise_takes_a_time_for_the_scan_that_it_names(good, phrase, keys):
+    specs = []
+    for best in ({"minimise": phrase}, {"minimise": "sigma_r"} | keys):
         good["filters"][0]["manoeuvre_variance"] = best
         specs.append(load(good).cases[0].spec)
     assert specs[0] == specs[1]
