@@ -26,6 +26,7 @@ MAX_PLAUSIBLE_MULTIPLE = 1.5  # or one over it: nearer to 1 no unit is
 UNIT_TOLERANCE = 0.01  # of a multiple, relative: of units, and of a line of sight that is not that of the range
 MIN_FOREIGN_SHARE, MIN_FOREIGN_MPS = 0.5, 3.0  # by which velocities of another column miss the ranges
 FOREIGN_VELOCITY_SIGMAS, FOREIGN_RANGE_SIGMAS = 10.0, 3.0  # of noise that such a miss exceeds, in the median
+MIN_WILD_MISSES, MAX_WILD_SHARE = 10.0, 0.2  # of an interval, in median misses; of the intervals of a track
 FOREIGN_CAUSE = term("they are no radial velocities: a column may be swapped")
 MIN_FOLDABLE, MAX_FOLDABLE = -1.05, 1 / 3  # multiples that folds may leave
 MAX_DRIFT_CHANGE = 0.2  # of such a multiple, relative, where a drift is allowed for
@@ -110,9 +111,9 @@ def detect_foreign_velocities(tracks: Sequence[Mapping[str, np.ndarray]]) -> Dop
         half = t.size // 2
         if t.size < MIN_ROWS or not (np.diff(t) > 0).all():
             continue
-        integral = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])
+        integral, course = _courses_without_jumps(t, r, v)
         spans = t[half:] - t[: t.size - half]
-        expected, actual = ((values[half:] - values[: t.size - half]) / spans for values in (integral, r))
+        expected, actual = ((values[half:] - values[: t.size - half]) / spans for values in (integral, course))
         sigma_v, sigma_r = (float(np.median(np.abs(np.diff(values, n=2)))) / (0.6745 * np.sqrt(6)) for values in (v, r))
         noise = np.maximum(FOREIGN_VELOCITY_SIGMAS * sigma_v, FOREIGN_RANGE_SIGMAS * sigma_r / spans)
         rows.append(np.stack([np.abs(expected - actual), np.maximum(np.abs(expected), np.abs(actual)), noise]))
@@ -122,6 +123,18 @@ def detect_foreign_velocities(tracks: Sequence[Mapping[str, np.ndarray]]) -> Dop
     miss, size, noise_mps = np.median(joined, axis=1).tolist()
     is_foreign = miss > max(MIN_FOREIGN_SHARE * size, noise_mps, MIN_FOREIGN_MPS)
     return DopplerScale(size / miss, False, (FOREIGN_CAUSE,)) if is_foreign else None
+
+
+def _courses_without_jumps(t: np.ndarray, r: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The integral (n,) of the velocities of a track and the course of its ranges, without the few intervals in which
+    the two differ far more than usual: single wild numbers would stay in either for all later rows."""
+    ways, steps = 0.5 * (v[1:] + v[:-1]) * np.diff(t), np.diff(r)
+    misses = np.abs(steps - ways)
+    is_wild = misses > MIN_WILD_MISSES * np.median(misses)
+    if is_wild.mean() <= MAX_WILD_SHARE:
+        ways, steps = np.where(is_wild, 0.0, ways), np.where(is_wild, 0.0, steps)
+    integral, course = (np.concatenate([[0.0], np.cumsum(values)]) for values in (ways, steps))
+    return integral, course
 
 
 def _wandering_m(stretch: np.ndarray) -> float:

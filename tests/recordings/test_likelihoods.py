@@ -559,3 +559,13 @@ def test_an_angle_fitted_takes_the_place_of_the_one_in_degrees(tmp_path, monkeyp
     spec = configs.load(write_new_config("mine", "sonar_smoothing", values=values)).cases[0].spec
     assert (spec.sensor.sigma_bearing_rad, spec.sensor.sigma_range_m) == (0.05, 30)
     assert [one.manoeuvre_variance for one in spec.filters[3:6]] == [None, 0.25, 0.0025]
+
+
+def test_errors_far_below_both_sigmas_are_not_told_as_errors_that_last():
+    """Of one explanation alone these explain smooth plots best; both σ together explain them better."""
+    case = loaded("rls2", "scans=60")
+    track = recording("rls2", "scans=60", "radar.sigma_range_m=30", "radar.sigma_velocity_mps=1")
+    findings = {finding.name: finding.value for finding in advice.find_errors(likelihood(case, None, track))}
+    assert "correlation" not in findings
+    assert 20 < findings["radar.sigma_range_m"] < 40
+    assert 0.7 < findings["radar.sigma_velocity_mps"] < 1.4

@@ -152,6 +152,9 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
         values, top = trials[best_name]
         if top - value_so_far < needed:
             break
+        if best_name == CORRELATION and _explain_better(counted, chosen_names, start, top):
+            names = [name for name in names if name != CORRELATION]
+            continue
         rival = rival_of_outliers(counted, values) if best_name == OUTLIERS else None
         if rival is not None and rival.is_clear:
             if rival.gain > 0:
@@ -171,7 +174,21 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
             rows=_rows_of_outliers(likelihood, start) if finding.name == OUTLIERS else (),
         )
         for finding in results
+        if not is_least_share(finding.name, start[finding.name])  # what was found after it explains the plots too
     ]
+
+
+def _explain_better(
+    likelihood: CountedLikelihood, chosen_names: Sequence[str], start: dict[str, float], top: float
+) -> bool:
+    """Whether the keys together explain the plots better than errors that last do, whose log-likelihood is `top`: where
+    several σ are far too large, each alone explains less."""
+    names, values, value = list(chosen_names), start, -np.inf
+    for key in likelihood.likelihood.keys:
+        if key not in names:
+            names.append(key)
+            values, value = maximise(likelihood, names, values)
+    return value > top
 
 
 def _rows_of_outliers(likelihood: Likelihood, fitted_values: Mapping[str, float]) -> tuple[OutlierRow, ...]:

@@ -45,6 +45,8 @@ MAX_DAY_STEP = 1.2e-3  # of day numbers from row to row: 100 s; of seconds it wo
 def second_of_day(match: re.Match[str]) -> float:
     """A time matched by CLOCK_PATTERN, s after midnight; raises ValueError for an impossible one."""
     hours, minutes, seconds, fraction = match.groups(default="0")
+    if int(hours) == 24 and not any(map(int, (minutes, seconds, fraction))):  # midnight at the end of a day (ISO 8601)
+        return DAY_S
     if int(hours) > 23 or int(minutes) > 59 or int(seconds) > 59:
         raise ValueError(match[0])
     return 3600 * int(hours) + 60 * int(minutes) + float(f"{int(seconds)}.{fraction}")

@@ -22,6 +22,7 @@ from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
 from radarsim.recordings.formats.asterix import Asterix
 from radarsim.recordings.formats.doppler_check import DopplerCheck
+from radarsim.recordings.formats.fill_values import FILL_NOTE, remove_fill_velocities
 from radarsim.recordings.formats.import_options import Format, Options
 from radarsim.recordings.formats.open_recording import open_recording
 from radarsim.recordings.formats.records import BATCH_ROWS, BIASES, DAY_S, PLOTS, POSITIONS, Batch, Reader, skip_counts
@@ -149,6 +150,7 @@ class _Import:
         self.has_bearings: bool | None = None  # all of the first batch
         self.site_distance = None if options.only_site is None else SiteDistance(options.only_site)
         self.impossible_speed: float | None = None  # of most targets, m/s
+        self.jump_notes: list[str] = []
         self.disordered_count = 0  # rows that were earlier, unless the newest came first
         self.radars = Counter[str]()
         self.note_counts = Counter[str]()  # by what a note says of these rows
@@ -213,6 +215,7 @@ class _Import:
         self.impossible_speed = target_speed.impossible_speed(tracks)
         if (speed := target_speed.unlikely_speed(tracks)) is not None:
             self.result.notes.append(target_speed.speed_message(speed, is_possible=True))
+        self.jump_notes = target_speed.jump_notes(batch.track, batch.columns["t_s"], positions, is_reachable)
         if not is_reachable.all():
             self.skipped[UNREACHABLE_REASON] += int((~is_reachable).sum())
             batch = batch.rows(np.flatnonzero(is_reachable).tolist())
@@ -246,6 +249,7 @@ class _Import:
             columns["bearing_rad"] = (columns["bearing_rad"] - bearing_bias) % (2 * math.pi)
         columns["velocity_mps"] *= -1 if self.options.towards else 1
         columns["span_mps"][columns["span_mps"] <= 0] = np.nan
+        self.note_counts[FILL_NOTE] += remove_fill_velocities(batch)
         if (is_invalid := columns["range_m"] <= 0).any():
             self.skipped[term("plots whose range is not above 0")] += int(is_invalid.sum())
             return batch.rows(np.flatnonzero(~is_invalid).tolist())
@@ -438,5 +442,6 @@ class _Import:
             result.notes += row_order.rollover_notes(self.reader.path, last_s)
         if self.truth is not None:
             result.notes += self.truth.notes()
-        result.notes += self.doppler.notes(self.options.towards)
+        # Where a unit changes within the recording, what the velocities miss follows from that.
+        result.notes += self.jump_notes or self.doppler.notes(self.options.towards)
         return result

@@ -16,8 +16,8 @@ from radarsim.studies.error_law import BIAS, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.recording_interface import usual_interval_s
 
-# Of those kept where velocities may be outliers: all live on then for some rows. With 300 the σ that fit and their
-# intervals are the same to a thousandth, at six times the work.
+# Of those kept where velocities may be outliers: all live on then for some rows. A choice for speed: what a longer list
+# would find is not bounded.
 MAX_OUTLIER_HYPOTHESES = 50
 MIN_SIGMA_RATIO, MIN_VARIANCE_RATIO = 1e-4, 1e-6  # to the configured values: smaller ones count as zero
 

@@ -1,0 +1,74 @@
+"""Single cells and rows of a table that stand for no value, or in which a unit changes."""
+
+import numpy as np
+import pytest
+
+from tests.recordings.formats.example_files import imported, refused
+
+N = 60
+T = 5.0 * np.arange(N)
+FILLED = "velocities that stand for none, as 0 or -999 among others: {} of 60; they are left out"
+JUMPS = "positions jump as no target does (rows: 1), first in track 7 from"
+UNITS = {"velocity_mps": 1.0, "velocity_kn": 1852 / 3600, "velocity_kmh": 1 / 3.6}
+
+
+def courses(acceleration=0.0):
+    """Ranges (n,) of a target that leaves at 95 m/s, with errors of 30 m, and its velocities (n,), of 1 m/s."""
+    rng = np.random.default_rng(4)
+    r, v = 30_000 + 95 * T + 0.5 * acceleration * T**2, 95 + acceleration * T
+    return r + rng.normal(0, 30, N), v + rng.normal(0, 1, N)
+
+
+def table(r, velocities, header="velocity_mps"):
+    rows = (f"{t},7,{a:.1f},{b}" for t, a, b in zip(T, r, velocities, strict=True))
+    return "\n".join([f"time,track,range_m,{header}", *rows, ""]).encode()
+
+
+@pytest.mark.parametrize("header", UNITS)
+@pytest.mark.parametrize("fills", [{10: 0, 20: -999, 30: 9999}, dict.fromkeys(range(0, N, 3), 0), {0: -999, 59: 999.9}])
+def test_velocities_that_stand_for_none_are_left_out(tmp_path, header, fills):
+    r, v = courses()
+    texts = [str(fills.get(i, f"{x / UNITS[header]:.2f}")) for i, x in enumerate(v)]
+    done, columns, _ = imported(tmp_path, table(r, texts, header))
+    assert done.notes == [FILLED.format(len(fills))]
+    assert np.flatnonzero(np.isnan(columns["velocity_mps"])).tolist() == sorted(fills)
+    assert len(columns["range_m"]) == N
+
+
+@pytest.mark.parametrize("kind", ["stops", "passes", "rounded"])
+def test_a_velocity_of_zero_is_one_where_the_ranges_say_so(tmp_path, kind):
+    """A car that stops, a target that turns back, and one whose slow velocity is rounded."""
+    r, v = courses()
+    if kind == "stops":
+        v = np.where((T > 100) & (T < 150), 0.0, 20.0)
+        r = 5000 + np.concatenate([[0.0], np.cumsum(5.0 * v[1:])])
+    elif kind == "passes":
+        v = np.round(-60 + 0.4 * T)
+        r = 30_000 - 60 * T + 0.2 * T**2
+    else:
+        v = np.where(np.arange(N) % 4 == 0, 0.0, 2.0)
+        r = 5000 + 1.5 * T
+    done, columns, _ = imported(tmp_path, table(r, v))
+    assert done.notes == []
+    np.testing.assert_array_equal(columns["velocity_mps"], v)
+
+
+@pytest.mark.parametrize("change", ["kilometres", "wrap"])
+def test_ranges_that_change_their_unit_are_no_swapped_velocities(tmp_path, change):
+    r, v = courses()
+    r = np.where(T >= 150, r / 1000, r) if change == "kilometres" else (r + 20_000) % 65_536
+    done, columns, _ = imported(tmp_path, table(r, v))
+    (note,) = done.notes
+    assert note.startswith(JUMPS)
+    assert len(columns["range_m"]) == N
+
+
+def test_the_end_of_a_day_may_be_called_24_00(tmp_path):
+    clocks = [f"{int(t // 3600):02}:{int(t % 3600 // 60):02}:{int(t % 60):02}" for t in 86_400 - 150 + T]
+    clocks = [clock if clock <= "24:00:00" else "00" + clock[2:] for clock in clocks]
+    text = "\n".join(["time,track,range_m", *(f"{c},7,{30_000 + 95 * t}" for c, t in zip(clocks, T, strict=True))])
+    _, columns, _ = imported(tmp_path, text.encode())
+    np.testing.assert_array_equal(columns["t_s"], T)
+    (tmp_path / "plots.csv").unlink()
+    (line,) = refused(tmp_path, text.replace("24:00:00", "24:00:01").encode())
+    assert "must be a time in s, a time of day" in line
