@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from radarsim.studies.stepwise import Steps, StepStudy
 
 NO_COVARIANCE = -1e100  # stands for the variances and the NEES of a matrix that is not positive
+TRACED: dict[Any, Any] = {}  # scenes and programs by what they depend on
+MAX_TRACED = 100
 MOVE_PARAMETERS = 4  # of `move` without the time: x, dt, c, w
 
 
@@ -46,12 +48,46 @@ class CompiledFilter:
     tested: bool
 
 
+def remembered(key: Any, trace: Callable[[], Any]) -> Any:
+    """What tracing gives, of functions and records that have not been traced before; those of a hundred are kept.
+
+    Tracing does not read the numbers of a record, but may refuse their signs (`radarsim.kernels.tracing.case_value`);
+    whatever else a record has, texts, truth values and whole numbers, decides branches."""
+    try:
+        known = TRACED.get(key)
+    except TypeError:  # a record with what cannot be compared
+        return trace()
+    if known is None:
+        if len(TRACED) >= MAX_TRACED:
+            TRACED.clear()
+        known = TRACED[key] = trace()
+    return known
+
+
+def branches(record_of_numbers: Any) -> Any:
+    """A record with the signs of its numbers in their place: what a trace of it depends on."""
+    return tracing.map_numbers(lambda number: (number > 0) - (number < 0), record_of_numbers)
+
+
+def functions_of(owner: Any, *names: str) -> tuple[Any, ...]:
+    """The functions of a class with these names, if it has them."""
+    return tuple(getattr(owner, name, None) for name in names)
+
+
 def trace_scene(study: "StepStudy", spec: Any, world: Any) -> Scene:
     """The programs of truth and plots."""
+    names = "begin", "move", "plot", "truth", "expected_false_plots", "false_plot", "normals", "known_columns"
+    places = study.false_places(spec)
+    key = functions_of(type(study), *names), study.false_quantities, places, branches(world)
+    scene: Scene = remembered(key, lambda: _trace_scene(study, world, places))
+    return scene
+
+
+def _trace_scene(study: "StepStudy", world: Any, places: int) -> Scene:
     from radarsim.kernels import steps
 
     first, move, plot = study.normals
-    places, measured, components = study.false_places(spec), len(study.measured), len(study.components)
+    measured, components = len(study.measured), len(study.components)
     programs = []
     state: Any = None
     for count in (first, move):
@@ -105,7 +141,10 @@ def compile_filter(study: "StepStudy", spec: Any, filter_keys: Any, scene: Scene
 
     steps = study.kinds[filter_keys.kind]
     numbers = record(steps.design, spec, filter_keys)
-    first, following, rows = trace_filter(study, spec, steps, numbers, scene, missed)
+    names = "start", "predict", "update", "estimate", "covariance", "counts"
+    of_study = functions_of(type(study), "difference", "kept", "known_columns", "counted", "components", "measured")
+    key = functions_of(steps, *names), of_study, study.false_quantities, scene.false, missed, branches(numbers)
+    first, following, rows = remembered(key, lambda: trace_filter(study, steps, numbers, scene, missed))
     tested = steps.covariance is not None
     events = 1 + len(study.counted) if scene.false else 0
     kernel = cached_kernel(
@@ -115,7 +154,7 @@ def compile_filter(study: "StepStudy", spec: Any, filter_keys: Any, scene: Scene
 
 
 def trace_filter(
-    study: "StepStudy", spec: Any, steps: "type[Steps]", numbers: Any, scene: Scene, missed: bool
+    study: "StepStudy", steps: "type[Steps]", numbers: Any, scene: Scene, missed: bool
 ) -> tuple[tracing.Program, tracing.Program, int]:
     """The programs of a filter's first scan and of later ones, and the rows of its state."""
     from radarsim.kernels import steps as kernels_steps

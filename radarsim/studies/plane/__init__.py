@@ -91,7 +91,9 @@ class Filter(Member):
 
 
 Design = namedtuple(
-    "Design", "sigma rho span density in_clutter m keys model kind noise quiet stay first start gate missed clear"
+    "Design",
+    "sigma rho span density in_clutter m kind model association unbiased linear confirming noise quiet stay first "
+    "start gate missed clear",
 )
 
 
@@ -108,7 +110,8 @@ def design(spec, keys):
     density = 1e-6 * radar.false_plots_per_km2
     return Design(
         radar.sigma, radar.range_velocity_correlation, radar.span_mps, density, density > 0,
-        m, keys, keys.model, keys.kind,
+        m, keys.kind, keys.model, keys.association, keys.unbiased, keys.doppler_update == "linear",
+        (keys.confirming_plots, keys.confirming_scans),
         (noise, keys.sigma_turn_rate_radps or 0.0), keys.quiet_sigma_acceleration_mps2 or 0.0, stay,
         keys.doppler and is_fold_known(keys.sigma_start_velocity_mps**2, radar.span_mps),
         (keys.sigma_start_velocity_mps, start.get(keys.model, ())),
@@ -128,7 +131,7 @@ def take_plots(state, z, density, c):
     if c.in_clutter:
         false_to_missed = c.missed * density * mean[0] / (c.span if c.m == 3 else 1.0)  # per m, rad and m/s
         association = gaussian_filters.associate(
-            z, lambda plot: plot_difference(plot, mean, c.span), S, c.keys.association, c.gate, false_to_missed
+            z, lambda plot: plot_difference(plot, mean, c.span), S, c.association, c.gate, false_to_missed
         )
     else:
         association = gaussian_filters.take_plot(plot_difference(z, mean, c.span), S)
@@ -136,7 +139,7 @@ def take_plots(state, z, density, c):
         return gaussian_filters.take(state, law, association), association
     if c.in_clutter:
         z = tuple(a + b for a, b in zip(mean, association.e, strict=True))
-    after = take_converted_plot(state, z, c, c.m, c.keys.unbiased, c.keys.doppler_update == "linear")
+    after = take_converted_plot(state, z, c, c.m, c.unbiased, c.linear)
     return where(association.has_plot > 0.5, after, state), association
 
 
@@ -149,7 +152,7 @@ class Tracking(Steps):
 
     def start(z, u, c):
         velocity, sigma, rho = (z[2], c.sigma, c.rho) if c.first else (0.0, (*c.sigma[:2], c.start[0]), 0.0)
-        state, seen = state_of_plot(z, velocity, sigma, rho, *c.start), (1.0, *(0.0,) * (c.keys.confirming_scans - 2))
+        state, seen = state_of_plot(z, velocity, sigma, rho, *c.start), (1.0, *(0.0,) * (c.confirming[1] - 2))
         history = (0.0, 0.0, seen, 1.0) if c.in_clutter else ()
         return ((state, state, 0.5) if c.kind == "imm" else state), history
 
@@ -172,7 +175,7 @@ class Tracking(Steps):
         if c.in_clutter:
             was_confirmed, _, seen, scan = history
             plots, has_plot = association.has_plot + sum(seen), association.has_plot
-            confirmed = maximum(was_confirmed, where(plots > c.keys.confirming_plots - 0.5, 1.0, 0.0))
+            confirmed = maximum(was_confirmed, where(plots > c.confirming[0] - 0.5, 1.0, 0.0))
             history = confirmed, association.is_wrong, (has_plot, *seen[:-1]), scan + 1.0
         return states, history
 
