@@ -199,12 +199,14 @@ class _Reader:
             for i in np.flatnonzero(~rises & np.isfinite(times[:-1]) & np.isfinite(times[1:])):
                 must = f"must {'not be earlier' if self.equal_times or name else 'be later'} than the row before"
                 got = f"{times[i + 1]:g} after {times[i]:g}{f' in track {name}' if name else ''}"
-                self.faults.add(lines[rows[i]], self._column_label(0), must, got, self._order_cure(name))
+                cure = self._order_cure(name, bool(times[i + 1] == times[i]))
+                self.faults.add(lines[rows[i]], self._column_label(0), must, got, cure)
             self.last_times[name] = times[-1]
 
-    def _order_cure(self, track: str) -> str:
-        """What helps where the times of a track, '' where there is one alone, do not rise."""
-        cures = [] if track else [f"if there are several tracks, name their column {TRACK_COLUMN}"]
+    def _order_cure(self, track: str, is_equal: bool) -> str:
+        """What helps where the times of a track, '' where there is one alone, do not rise, or are equal."""
+        cures = ["of several plots of a scan keep that of the target"] if is_equal else []
+        cures += [] if track else [f"if there are several tracks, name their column {TRACK_COLUMN}"]
         if "range_m" in self.names:
             cures.append(f"rows are sorted by {import_command(self.path)}")
         return "; ".join(cures)

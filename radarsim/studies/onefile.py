@@ -368,6 +368,15 @@ class OneFile(Study):
                 case_selection.after_swept_values(result, text), sentences.intervals("gains", "gain", gains)
             )
 
+    def span_mps(self, spec: Any) -> float | None:
+        """The unambiguous interval into which measured velocities are folded, which the filters allow for. Default:
+        None."""
+        return None
+
+    def unfolding(self, spec: Any, span_mps: float) -> Sequence[str]:
+        """As `RecordingInterface.unfolding`. Default: there is no such key."""
+        return ()
+
     def columns(self, spec: Any, filter_keys: Any) -> tuple[str, ...]:
         """The columns of recorded plots that a filter takes, in the order of `measured`. Default: theirs."""
         return tuple(number.column for number in self.measured)

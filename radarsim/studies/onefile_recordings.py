@@ -47,6 +47,16 @@ class OneFileRecordings(RecordingInterface):
     def scan_period_s(self, spec: Any) -> float:
         return self.study.scan_period_s(spec)
 
+    def unfolds(self, spec: Any, filter_keys: Any = None) -> bool:
+        # Of one filter: no, as none is said to lose a fold.
+        return filter_keys is None and self.study.span_mps(spec) is not None
+
+    def span_mps(self, spec: Any) -> float | None:
+        return self.study.span_mps(spec)
+
+    def unfolding(self, spec: Any, span_mps: float) -> Sequence[str]:
+        return self.study.unfolding(spec, span_mps)
+
     def drawing(self, case: "Case") -> DrawPlots:
         return self._drawing(case)
 

@@ -65,6 +65,12 @@ class PlanarStudy(ClutteredStudy):
         plots = radar.sigma, radar.range_velocity_correlation, radar.span_mps, density
         return World(*plots, *flight, target.turn[0] != 0, *target.turn)
 
+    def span_mps(self, spec: Any) -> float | None:
+        return None if spec.radar.repetition_rate_hz is None else float(spec.radar.span_mps)
+
+    def unfolding(self, spec: Any, span_mps: float) -> "Sequence[str]":
+        return (f"radar.repetition_rate_hz={2 * span_mps / spec.radar.wavelength_m:.6g}",)
+
     def detection(self, spec: Any) -> float:
         return float(spec.radar.detection_probability)
 

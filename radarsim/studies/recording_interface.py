@@ -210,8 +210,8 @@ class RecordingInterface(ABC):
         """The settings `KEY=VALUE` by which a config allows for velocities folded by this span; none by default."""
         return ()
 
-    def unfolds(self, filter_keys: Any = None) -> bool:
-        """Whether a filter, by default any filter of the study, unfolds velocities. Default: no."""
+    def unfolds(self, spec: Any, filter_keys: Any = None) -> bool:
+        """Whether a filter of a config, by default any, unfolds velocities. Default: no."""
         return False
 
     def in_a_turn(self, case: "Case", filter_name: str, values: Mapping[str, float]) -> "TurnError | None":

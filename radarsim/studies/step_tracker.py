@@ -22,7 +22,9 @@ class Tracker:
 
     Over missed scans they predict scan by scan, as they do over empty rows; where rows hold known quantities, which a
     missed one lacks, in one step. Among false plots rows of one time are the plots of a scan: a filter begins with the
-    first, and takes a scan without plots too."""
+    first, and takes a scan without plots too.
+
+    Where plots have one origin and a filter gives its `innovation`, each number of a plot has its NIS."""
 
     most_rows: int | None = None
 
@@ -53,12 +55,14 @@ class Tracker:
         first_rows = np.flatnonzero(np.diff(t, prepend=math.nan) != 0) if self.several else np.arange(t.size)
         scans = np.split(np.arange(t.size), first_rows[1:])
         values = np.full((len(self.filters), len(scans), 2, len(study.components)), np.nan)
+        nis = np.full((len(self.filters), len(scans), len(study.measured)), np.nan)
         for n, rows in enumerate(scans):
             row, time = int(rows[0]), float(t[rows[0]])
             u = tuple(map(float, known_quantities[row]))
             for f, (steps, c, used) in enumerate(self.filters):
                 scan_plots = [tuple(map(float, plots[i])) for i in rows if np.isfinite(plots[i, used]).all()]
-                s = self.states[f] = self._next_scan(row, time, steps, self.states[f], scan_plots, u, c)
+                s, squares = self._next_scan(row, time, steps, self.states[f], scan_plots, u, c)
+                self.states[f], nis[f, n, : len(squares)] = s, squares
                 if s is not None:
                     m = len(study.components)
                     values[f, n, 0] = self._numbers(row, steps.estimate, m, "components", s, u, c)
@@ -70,14 +74,16 @@ class Tracker:
                         values[f, n, 1] = np.sqrt(variance)
             self.last = time
         components = tuple((component.name, component.unit) for component in study.components)
-        return Track(self.names, components, t[first_rows], values[:, :, 0], values[:, :, 1])
+        tested = tuple((number.column, 1) for number in study.measured)
+        return Track(self.names, components, t[first_rows], values[:, :, 0], values[:, :, 1], tested=tested, nis=nis)
 
     def _next_scan(
         self, row: int, t: float, steps: "type[Steps]", s: Any, scan_plots: list[tuple[float, ...]], u: Any, c: Any
-    ) -> Any:
-        """The state of a filter after a scan at time t whose plots begin at a row, None before its first plot."""
+    ) -> tuple[Any, list[float]]:
+        """The state of a filter after a scan at time t whose plots begin at a row, None before its first plot; and the
+        NIS of the numbers of its plot."""
         if s is None:
-            return self._next(row, steps.start, None, scan_plots[0], u, c) if scan_plots else None
+            return self._next(row, steps.start, None, scan_plots[0], u, c) if scan_plots else None, []
         missed = () if u else missed_scan_times(self.last, t, self.scan_period_s)
         time, previous = self.last, s
         for scan_time in (*missed, t):
@@ -86,7 +92,14 @@ class Tracker:
             if self.several:
                 places = tuple((1.0, z) for z in scan_plots) if scan_time == t else ()
                 s = self._next(row, steps.update, previous, s, places, u, c)
-        return s if self.several or not scan_plots else self._next(row, steps.update, previous, s, scan_plots[0], u, c)
+        if self.several or not scan_plots:
+            return s, []
+        nis = []
+        if steps.innovation is not None:
+            with np.errstate(all="ignore"):
+                e, S = step_numbers(steps.innovation, s, scan_plots[0], u, c)
+            nis = [a * a / variance for a, variance in zip(e, variances(S, len(e)), strict=True)]
+        return self._next(row, steps.update, previous, s, scan_plots[0], u, c), nis
 
     def _next(self, row: int, step: Callable[..., Any], previous: Any, *step_arguments: Any) -> Any:
         """The state after a step at a row, of the shape of the one before, if any."""

@@ -20,6 +20,7 @@
         def estimate(s, u, c): …                    # its estimates of the components
         def covariance(s, u, c): …                  # their packed covariance, or None
         def log_densities(s, z, u, c): …            # of a plot's first number, of the first two, … by the state before
+        def innovation(s, z, u, c): …               # of a plot, with its packed covariance, or None
 
 These are plain functions of numbers, tuples and named records; what calculates with numbers of a realisation is in
 `radarsim.kernels.tracing` (`sqrt`, `where`, …) and `radarsim.kernels.formula_functions` (`sin`, `atan2`, …). A state, a
@@ -88,6 +89,7 @@ class Steps:
     estimate: Callable[[Any, Any, Any], tuple[Any, ...]]
     covariance: Callable[[Any, Any, Any], tuple[Any, ...]] | None = None
     log_densities: Callable[[Any, Any, Any, Any], Sequence[Any]] | None = None
+    innovation: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
     counts: Callable[[Any, Any, Any], tuple[Any, ...]]
     gate: Callable[[Any, Any, Any], tuple[float, ...]]
 

@@ -126,11 +126,12 @@ def test_empty_rows_change_no_estimate_of_a_step_study():
         update=lambda s, z, u, c: (s[0] + s[1] / (s[1] + 25) * (z[0] - s[0]), s[1] * 25 / (s[1] + 25)),
         estimate=lambda s, u, c: (s[0],),
         covariance=lambda s, u, c: (s[1],),
+        innovation=None,
     )
     study = SimpleNamespace(
         name="steps", kinds={"kalman": steps}, measured=(authoring.MeasuredColumn("x_m", "m", ()),), known_columns=(),
         components=(authoring.Component("x", "m", "$x$", "x"),), scan_period_s=lambda spec: 4.0,
-        false_normals=lambda spec: 0, columns=lambda spec, keys: ("x_m",),
+        false_places=lambda spec: 0, columns=lambda spec, keys: ("x_m",),
     )  # fmt: skip
     spec = SimpleNamespace(filters=[SimpleNamespace(name="kalman", kind="kalman")])
     columns = {"t_s": 4.0 * np.arange(40), "x_m": np.random.default_rng(2).normal(0, 5, 40)}

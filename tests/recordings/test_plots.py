@@ -101,6 +101,8 @@ def test_times_that_do_not_rise_may_be_of_several_tracks(tmp_path):
         "plots.csv:4:1: t_s: must be later than the row before, got 0 after 4 (and 998 more, in lines 6, 8, 10, …); "
         "if there are several tracks, name their column track"
     ]
+    (line,) = faults(tmp_path, "t_s,x_m,y_m\n" + "0,1,1\n4,1,1\n4,2,2\n4,3,3\n")
+    assert "got 4 after 4 (and 1 more, in line 5); of several plots of a scan keep that of the target" in line
     (line,) = faults(tmp_path, "t_s,track,range_m,bearing_rad\n" + "".join(f"{t},a,5,1\n" for t in (8, 4, 0)))
     assert line.endswith(f"got 4 after 8 in track a (and 1 more, in line 4); rows are sorted by {IMPORT}")
 

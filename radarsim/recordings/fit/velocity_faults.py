@@ -52,6 +52,6 @@ def _explained_fault(
 def detect_case_velocity_fault(case: Case, tracks: Sequence[Mapping[str, np.ndarray]]) -> VelocityFault:
     """The same for tracks that a case's study takes as measured, unless it unfolds the velocities."""
     interface = recording_interface(case)
-    if not tracks or not set(COLUMNS) <= set(tracks[0]) or interface.unfolds():
+    if not tracks or not set(COLUMNS) <= set(tracks[0]) or interface.unfolds(case.spec):
         return VelocityFault()
     return detect_velocity_fault(tracks, interface.span_mps(case.spec))

@@ -52,7 +52,7 @@ def _verdict_with_folds(case: Case, test: InnovationTest, all_tests: Sequence[In
     """The verdict of a test; a filter that unfolds velocities by itself may have chosen a wrong fold, which shows where
     another filter fits the same plots."""
     interface = recording_interface(case)
-    unfolding_filters = {member.name for member in case.spec.members if interface.unfolds(member)}
+    unfolding_filters = {member.name for member in case.spec.members if interface.unfolds(case.spec, member)}
     if test.verdict != TOO_SMALL or test.filter not in unfolding_filters:
         return test.verdict
     fits_elsewhere = any(

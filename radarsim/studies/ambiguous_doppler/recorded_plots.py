@@ -27,7 +27,7 @@ class FoldedRecordedPlots(RecordingInterface):
     def scan_period_s(self, spec: Any) -> float:
         return spec.radar.scan_period_s
 
-    def unfolds(self, filter_keys: Any = None) -> bool:
+    def unfolds(self, spec: Any, filter_keys: Any = None) -> bool:
         return filter_keys is None or filter_keys.doppler == "folded"
 
     def likelihood(

@@ -194,6 +194,11 @@ class Tracking(Steps):
         by_model = [gaussian_filters.log_densities(plot_difference(z, mean, c.span), S) for mean, S, _ in laws]
         return [log(maximum(dot(weights, [exp(a) for a in logs]), 1e-300)) for logs in zip(*by_model, strict=True)]
 
+    def innovation(s, z, u, c):
+        mean, S, _ = expected_plot(moments(s, c), c)
+        e = plot_difference(z, mean, c.span)
+        return (*e[:2], e[2] if is_fold_known(S[5], c.span) else math.nan) if c.m == 3 else e, S
+
     def gate(s, u, c):
         S = expected_plot(moments(s, c), c)[1]
         return math.sqrt(c.gate * S[0]), math.sqrt(c.gate * S[3 if c.m == 3 else 2])
