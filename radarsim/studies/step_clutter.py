@@ -140,7 +140,7 @@ class ClutteredStudy(StepStudy):
             panel = Panel(panel_layout.time_axis(), Axis(tr("share of tracks kept")), marks, title)
             panels += panel_layout.keyed_panels(panel, members, filters)
         caption = tr(
-            "Share of tracks that are still the target's, of {realisations}. Bands: 95 % intervals.",
+            "Share of tracks that are still the target's, of {realisations}.",
             realisations=case_selection.realisations_text(visible),
         )
         figure = Figure("tracks", tr("Tracks kept among false plots"), caption + remark, tuple(panels))

@@ -2,7 +2,7 @@
 
 With the errors of plots in units of their own, Gaussian in m numbers, and false plots of Poisson's law, even in these,
 the Fisher information of the plots of a scan on what they measure is that of the target's plot times one factor q: the
-information reduction factor of Niu, Willett & Bar-Shalom (IEEE Trans. AES 37, 2001, 1366; Hernandez, Farina & Ristic,
+information reduction factor of Niu, Willett & Bar-Shalom (IEEE Trans. SP 49, 2001, 1325; Hernandez, Farina & Ristic,
 IEEE Trans. AES 42, 2006). It is the mean square of the score: a sum over plots z of w z, w the probability that z is
 the target's. A bound with it is one on estimators that are given the plots but not their origin."""
 
