@@ -23,7 +23,19 @@ from radarsim.papers.verdict_classes import add_classes, rows_in_words
 FILE = Path(__file__).with_name("claims.csv")
 RESULTS = Path(__file__).parents[2] / "results"
 MEASURED = ("measured", "lo", "hi", "judged_lo", "judged_hi", "exact", "expected_lo", "expected_hi", "margin", "needed")
-COLUMNS = ("claim", "config", "case", "what", "unit", *MEASURED, "expected", "number", "verdict", "as_shipped", "why")
+COLUMNS = (
+    "claim",
+    "config",
+    "case",
+    "quantity",
+    "unit",
+    *MEASURED,
+    "expected",
+    "variants_of",
+    "verdict",
+    "as_shipped",
+    "why",
+)
 FIGURE = "claims.svg"
 PICTURE = f"""<details>
 <summary>How far each claim lies from its words: a figure</summary>
@@ -79,7 +91,9 @@ def main(results: str) -> None:
     table_rows = []
     for parts in group_by_claim(rows_of_claims):
         row = dict(worst_part(parts) or parts[0])
-        row |= {name: parts[0][name] for name in ("needed", "as_shipped", "why")} | {"what": part_name(row, parts)}
+        row |= {name: parts[0][name] for name in ("needed", "as_shipped", "reason")} | {
+            "quantity": part_name(row, parts)
+        }
         numbers = {name: cell_number(row[name]) for name in MEASURED}
         row |= {name: "" if value is None else f"{value:.9g}" for name, value in numbers.items()}
         table_rows.append({name: row[name] for name in COLUMNS})

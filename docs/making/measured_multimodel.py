@@ -53,9 +53,9 @@ def largest(stem: str, claim: str, begins: str, sign: int = 0) -> Callable[[Resu
 
     def text(results: Results) -> str:
         table = results.table(stem, "claims")
-        parts = table[(table["claim"] == claim) & table["what"].str.startswith(begins)]
+        parts = table[(table["claim"] == claim) & table["quantity"].str.startswith(begins)]
         row = parts.loc[(sign * parts["measured"] if sign else parts["measured"].abs()).idxmax()]
-        words, stage = row["what"].split(", ")[-2:]
+        words, stage = row["quantity"].split(", ")[-2:]
         return f"{with_bounds(row['measured'], row['lo'], row['hi'])} % ({words}, {stage.removeprefix('stage ')})"
 
     return text

@@ -10,7 +10,7 @@ from radarsim.config.experiment import COMMON_FIGURES, Case, Experiment, matches
 from radarsim.engine.results import CaseResult
 from radarsim.extensions import extension_figures, extensions
 from radarsim.language.current import ENGLISH, current_language
-from radarsim.language.translate import tr, translate_names
+from radarsim.language.translate import quote_name, tr, translate_names
 from radarsim.report import (
     answer_warnings,
     caption_remarks,
@@ -114,13 +114,13 @@ MAX_BASELINE_SENTENCES = 6  # on baselines after the first
 class Answer(NamedTuple):
     """The answer of an experiment: its sentences, and warnings on the intervals that they rest on.
 
-    main_count: how many of the sentences, which come first, `radarsim judge` prints; tables: those on which each
-    sentence rests."""
+    main_count: how many of the sentences, which come first, `radarsim judge` prints; sources: what each rests
+    on, as `Sentence.sources`."""
 
     texts: tuple[str, ...]
     warnings: tuple[str, ...]
     main_count: int
-    tables: tuple[frozenset[str], ...]
+    sources: tuple[tuple[str, ...], ...]
 
 
 def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
@@ -144,14 +144,14 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
     ]
     answer = [*main, *details, *_short_sentences(of_study, names)]
     texts = [sentence.text for sentence in answer]
-    tables = [frozenset(interval.table for interval in sentence.intervals) for sentence in answer]
+    sources = [sentence.sources for sentence in answer]
     if further_baselines:
         texts.append(tr("Further gains are in gains.csv."))
-        tables.append(frozenset(["gains"]))
+        sources.append(("gains",))
     warnings = [
         translate_names(line, names) for line in answer_warnings.answer_warnings(results, tables_by_name, answer)
     ]
-    return Answer(tuple(texts), tuple(warnings), len(main), tuple(tables))
+    return Answer(tuple(texts), tuple(warnings), len(main), tuple(sources))
 
 
 def _short_sentences(long_sentences: Iterable[Sentence], names: frozenset[str]) -> list[Sentence]:
@@ -204,11 +204,11 @@ def _gains_against(result: CaseResult, tables_by_name: Mapping[str, "pd.DataFram
     if not len(last):
         return []
     gains_by_filter = [(row["filter"], compared_value.row_value(row, GAIN)) for _, row in last.iterrows()]
-    texts = [f"{name} {gain_sentences.percent_text(gain, result.count)}" for name, gain in gains_by_filter]
+    texts = [f"{quote_name(name)} {gain_sentences.percent_text(gain, result.count)}" for name, gain in gains_by_filter]
     text = tr(
         "{case}, gain in {component} against {base} at {t} s: {filters}.",
         case=result.name,
-        base=result.baseline,
+        base=quote_name(result.baseline),
         component=last["component"].iloc[0],
         t=f"{last['t_s'].max():g}",
         filters="; ".join(texts),

@@ -24,10 +24,10 @@ from radarsim.engine.results import CaseResult
 from radarsim.errors import AUTHOR_ERRORS, RadarsimError
 from radarsim.language.translate import tr
 from radarsim.report import atomic_files, csv_text, exact_check, provenance
-from radarsim.report.case_selection import swept_cases
+from radarsim.report.case_selection import swept_cases, swept_keys
 from radarsim.report.drawing.model import Figure
 from radarsim.report.drawing.page_figure import DrawnFigure
-from radarsim.report.page_links import tables_behind_figure
+from radarsim.report.page_links import sources_behind_figure
 from radarsim.report.row_notes import with_note_texts
 from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.studies.registry import study
@@ -90,10 +90,10 @@ def write_files(
         figures_by_name = _selected_figures(experiment, results, tables_by_name) if draw else {}
         answer = make_answer(results, tables_by_name)
         sources = {
-            name: tables_behind_figure(name, case_study.drawn_from(), tables_by_name) for name in figures_by_name
+            name: sources_behind_figure(name, case_study.drawn_from(), tables_by_name) for name in figures_by_name
         }
         figures_by_name = headlines.with_headlines(
-            figures_by_name, answer.texts, answer.tables, sources, swept_cases(results)
+            figures_by_name, answer.texts, answer.sources, sources, swept_cases(results), swept_keys(results)
         )
         question = question_text(experiment)
     except RadarsimError:

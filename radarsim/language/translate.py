@@ -16,7 +16,7 @@ Tables are the same in every language, and so are messages on faults of a config
 
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from gettext import NullTranslations
 from numbers import Real
@@ -30,6 +30,7 @@ from radarsim.language.numerals import numeral
 
 LABEL = "label"  # context of names in shipped configs
 NUMBER_PLACEHOLDER = "#"  # stands in a catalogue for a number, where messages differ in their numbers alone
+WORDS = re.compile(r", |\b[a-z]{3,}\b")  # in a name: what a sentence would take for its own words
 NUMBERS = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")  # in a message, none that belongs to a name
 
 
@@ -156,16 +157,37 @@ def join_names(names: Sequence[str]) -> str:
     return tr("{first} and {last}", first=", ".join(names[:-1]), last=names[-1])
 
 
+def quote_name(name: str) -> str:
+    """A filter's name in a sentence: in quotes if it contains ordinary words or a comma.
+
+    >>> quote_name("cured, gated"), quote_name("r+Vr"), quote_name("Kalman-2")
+    ('“cured, gated”', 'r+Vr', 'Kalman-2')
+    """
+    return _in_quotes(name) if WORDS.search(name) else name
+
+
+def _in_quotes(name: str) -> str:
+    return tr("“{name}”", name=name)
+
+
 def shorten_names(names: Sequence[str], limit: int = 4) -> str:
     """Names in a sentence; of too many the first ones and the number of the others.
 
     In a list, names that contain a comma are quoted.
     """
-    names = [tr("“{name}”", name=name) if ", " in name and len(names) > 1 else name for name in names]
+    opening = _in_quotes("")[0]
+    names = [
+        _in_quotes(name) if ", " in name and len(names) > 1 and not name.startswith(opening) else name for name in names
+    ]
     if len(names) <= limit + 1:
         return join_names(names)
     first = ", ".join(names[:limit])
     return plural("{first} and {count} more", "{first} and {count} more", len(names) - limit, first=first)
+
+
+def list_filters(names: Iterable[str], limit: int = 4) -> str:
+    """Names of filters in a sentence, each as `quote_name` writes it; of too many the first ones."""
+    return shorten_names([*map(quote_name, names)], limit)
 
 
 class _MessageFormatter(Formatter):

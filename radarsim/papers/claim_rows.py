@@ -112,8 +112,8 @@ def verdict_sentence(parts: Sequence[Mapping]) -> str:
             if holds == interpretations
             else tr("true under {holds:.0f} of {of:.0f} interpretations", holds=holds, of=interpretations)
         )
-    if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["why"]:
-        notes.append(translate_reason(first["why"]))
+    if first["class"] in (UNJUDGEABLE, NOT_JUDGED) and first["reason"]:
+        notes.append(translate_reason(first["reason"]))
     if is_extension(parts):
         notes.append(tr(NOT_COUNTED))
     return f"{text} ({'; '.join(notes)})" if notes else text
@@ -134,7 +134,7 @@ def worst_part(parts: Sequence[Mapping]) -> Mapping | None:
         ours = is_extension([row]) and not counted
         if cell_number(row["measured"]) is None or row["verdict"] == VOID or ours:
             continue
-        key = str(row["number"]) or f"#{i}"
+        key = str(row["variants_of"]) or f"#{i}"
         if key not in best or row_distance(_decisive_value(row), row) < row_distance(
             _decisive_value(best[key]), best[key]
         ):
@@ -157,8 +157,8 @@ def _decisive_value(row: Mapping) -> float:
 
 def part_name(row: Mapping, parts: Sequence[Mapping]) -> str:
     """Description of a part, with its case where another part has the same words."""
-    alike = sum(part["what"] == row["what"] for part in parts)
-    return row["what"] if alike == 1 else f"`{row['case']}`: {row['what']}"
+    alike = sum(part["quantity"] == row["quantity"] for part in parts)
+    return row["quantity"] if alike == 1 else f"`{row['case']}`: {row['quantity']}"
 
 
 def decisive_value_words(row: Mapping) -> str:

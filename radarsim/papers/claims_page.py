@@ -104,7 +104,7 @@ def _part_lines(parts: Sequence[Mapping]) -> list[str]:
         if row["verdict"] == VOID:
             verdict = f"void: an efficient estimator reaches {cell_number(row['ceiling']):.3f}"
         if row["verdict"] == NOT_JUDGED:
-            verdict = f"{NOT_JUDGED}: {row['why']}"
+            verdict = f"{NOT_JUDGED}: {row['reason']}"
         if str(row["extension"]).lower() == "true":
             verdict += " (extension)"
         exact, miss = cell_number(row["exact"]), cell_number(row["miss"])

@@ -48,9 +48,9 @@ def old_verdict(measured: Estimate, strict: tuple[float, float]) -> str:
 
 COLUMNS = (
     *("claim", "paper", "statement", "case", "measured", "lo", "hi", "expected", "verdict"),
-    *("expected_lo", "expected_hi", "what", "unit", "place", "interpretation", "overall"),
+    *("expected_lo", "expected_hi", "quantity", "unit", "place", "interpretation", "overall"),
     *("exact", "margin", "miss", "class", "holds", "of", "depends_on", "old_verdict", "original"),
-    *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "number", "why", "as_shipped"),
+    *("margin_kind", "ceiling", "n", "worst_miss", "needed", "extension", "variants_of", "reason", "as_shipped"),
     *("judged_lo", "judged_hi", "declared"),
 )
 CLASS_COLUMNS = ("verdict", "overall", "class", "as_shipped")  # of these columns
@@ -285,13 +285,13 @@ DISAGREEMENT = f"exact value and simulation differ by more than {ERROR_OF_PROGRA
 
 def disagreements(rows: "pd.DataFrame") -> list[str]:
     """A line for each part whose own exact value and simulation disagree: errors of the program."""
-    disagreeing = rows[rows["why"].astype(str).str.startswith(DISAGREEMENT)]
-    return [f"{row['claim']}: {row['what']} ({row['case']}): {row['why']}" for _, row in disagreeing.iterrows()]
+    disagreeing = rows[rows["reason"].astype(str).str.startswith(DISAGREEMENT)]
+    return [f"{row['claim']}: {row['quantity']} ({row['case']}): {row['reason']}" for _, row in disagreeing.iterrows()]
 
 
 def failed_measures(rows: "pd.DataFrame") -> list[str]:
     """A line for each measure that failed, with its place: errors of the claims' author."""
-    reasons = dict.fromkeys(rows["why"].astype(str))
+    reasons = dict.fromkeys(rows["reason"].astype(str))
     return [why.removeprefix(f"{MEASURE_FAILED}: ") for why in reasons if why.startswith(MEASURE_FAILED)]
 
 
@@ -301,16 +301,21 @@ def _part_row(
     part, judged = measured_part.part, measured_part.judged
     row = empty_row(claim, paper) | {
         "case": measured_part.cases,
-        **{"what": part.what, "unit": part.unit, "margin_kind": part.expected.kind, "expected": part.expected.words},
+        **{
+            "quantity": part.what,
+            "unit": part.unit,
+            "margin_kind": part.expected.kind,
+            "expected": part.expected.words,
+        },
         **{"expected_lo": _table_number(part.expected.lo), "expected_hi": _table_number(part.expected.hi)},
-        "number": f"{part.statement}{part.number}" if part.number else "",
+        "variants_of": f"{part.statement}{part.number}" if part.number else "",
         "extension": not (claim.counted and part.asserted),
         "overall": outcome.words if outcome else NOT_JUDGED,
         **dict.fromkeys(("class", "as_shipped"), outcome.kind if outcome else NOT_JUDGED),
         "worst_miss": _table_number(outcome.miss) if outcome else math.nan,
         "needed": outcome.needed if outcome and outcome.needed else math.nan,
         "verdict": NOT_JUDGED,
-        "why": measured_part.why or claim.unstated,
+        "reason": measured_part.why or claim.unstated,
         TABLES_READ: measured_part.tables_read,
     }
     if judged is None:
@@ -330,7 +335,7 @@ def empty_row(claim: Claim, paper: str) -> dict[str, Any]:
     return empty | {
         **{"claim": claim.id, "paper": paper, "extension": not claim.counted},
         **{name: getattr(claim, name) for name in ("statement", "place", "interpretation", "original")},
-        "why": claim.unstated,
+        "reason": claim.unstated,
     }
 
 
@@ -374,7 +379,7 @@ def rows_without_results(
             state, why = NOT_JUDGED, ANOTHER_EXPERIMENT.format(changed=changed + more)
         elif not paper_claims.holds(claim, stem):
             continue
-        row = empty_row(claim, paper_claims.paper) | dict.fromkeys(NUMBER_COLUMNS, "") | {"why": why}
+        row = empty_row(claim, paper_claims.paper) | dict.fromkeys(NUMBER_COLUMNS, "") | {"reason": why}
         rows.append(row | dict.fromkeys(CLASS_COLUMNS, state))
     return rows
 

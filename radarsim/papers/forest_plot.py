@@ -59,7 +59,10 @@ def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
         caption=plural(
             "Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged_claims), counted=counted
         )
-        + tr("Each claim's part furthest from the paper's words: below 0 it agrees, up to 1 it is within the margin."),
+        + tr(
+            "Of each claim the part that is furthest from the paper: up to 0 it agrees, up to 1 it is within the "
+            "tolerance."
+        ),
         panels=tuple(panels),
         width_mm=PAGE_MM,
     )

@@ -29,7 +29,7 @@ DEFAULT = "as shipped"
 LEADING_COLUMNS = ("claim", "part", "interpretation", "kind")
 TRAILING_COLUMNS = (
     *("measured", "lo", "hi", "exact", "expected_lo", "expected_hi", "margin", "verdict"),
-    *("unit", "what", "outcome", "miss", "n", "needed", "reason", "over"),
+    *("unit", "quantity", "outcome", "miss", "n", "needed", "reason", "over"),
 )
 
 

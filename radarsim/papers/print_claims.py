@@ -120,7 +120,7 @@ def print_claims(
 
 def _is_of_another_experiment(row: Row) -> bool:
     """Whether a claim cannot be judged because the experiment is not the paper's."""
-    return bool(row["class"] == NOT_JUDGED and not row["what"])
+    return bool(row["class"] == NOT_JUDGED and not row["quantity"])
 
 
 def _claims_of_other_experiments(rows: Sequence[Row]) -> dict[tuple[str, str], list[str]]:
@@ -128,7 +128,7 @@ def _claims_of_other_experiments(rows: Sequence[Row]) -> dict[tuple[str, str], l
     claims: dict[tuple[str, str], list[str]] = {}
     for row in rows:
         if _is_of_another_experiment(row):
-            claims.setdefault((row["config"], row["why"]), []).append(row["claim"])
+            claims.setdefault((row["config"], row["reason"]), []).append(row["claim"])
     return claims
 
 
@@ -177,14 +177,14 @@ def _print_claim(parts: Sequence[Row]) -> None:
 def _part_words(row: Row, parts: Sequence[Row]) -> list[str]:
     """What a line says of a part: case and quantity, the value that decides, what was measured where that is exact,
     and why there is no verdict."""
-    words = [": ".join(filter(None, (str(row["case"]), tr(str(row["what"])))))]
+    words = [": ".join(filter(None, (str(row["case"]), tr(str(row["quantity"])))))]
     if cell_number(row["measured"]) is not None:
         words.append(decisive_value_words(row) + tr("; expected {words}", words=expected_words(row["expected"])))
         measured = measured_words(row)
         if cell_number(row["exact"]) is not None and "[" in measured:  # with a sampling error
             words.append(tr("measured {value}", value=measured))
     if row["verdict"] == NOT_JUDGED:
-        words.append(translate_reason(row["why"]))
+        words.append(translate_reason(row["reason"]))
     if is_extension([row]) and not is_extension(parts):
         words.append(tr(NOT_COUNTED))
     return words

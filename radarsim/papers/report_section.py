@@ -138,7 +138,7 @@ def _with_edited_claims_not_run(folder: Path, rows: list[dict[str, Any]]) -> lis
 
 def _measured_value(part: Mapping[str, Any]) -> str:
     """The measured value of a part of a claim; an infinite settling time as text."""
-    if math.isinf(part["measured"]) and "settling" in part["what"]:
+    if math.isinf(part["measured"]) and "settling" in part["quantity"]:
         return tr(page_tables.NOT_SETTLED)
     return typeset.cell_text(part["measured"])
 

@@ -85,7 +85,7 @@ def unjudged_claims(result: "Result") -> dict[str, list[str]]:
     by_reason: dict[str, list[str]] = {}
     for row in _records(result):
         if row["verdict"] == NOT_JUDGED:
-            names = by_reason.setdefault(row["why"], [])
+            names = by_reason.setdefault(row["reason"], [])
             if row["claim"] not in names:
                 names.append(row["claim"])
     return by_reason

@@ -251,7 +251,12 @@ def verdict_rows(
                 for name in ("measured", "lo", "hi", "exact")
             },
             **{name: _table_value(getattr(judged, name)) for name in ("expected_lo", "expected_hi", "margin")},
-            **{"part": number, "what": part.what, "unit": part.unit, "verdict": part_verdict(judged, sampled_parts)},
+            **{
+                "part": number,
+                "quantity": part.what,
+                "unit": part.unit,
+                "verdict": part_verdict(judged, sampled_parts),
+            },
             **{"outcome": verdict.outcome.kind, "miss": _table_value(miss_in_margins(judged)), "n": judged.n or ""},
             "needed": verdict.outcome.needed or "",
         }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import plural, shorten_names
+from radarsim.language.translate import list_filters, plural, shorten_names
 from radarsim.report import provenance, rare_events
 from radarsim.report.interval_notes import BELIEVED_VARIES, HEAVY_TAILS, MIN_EFFECTIVE, estimate_counts
 from radarsim.report.row_notes import concerns, note_kinds
@@ -55,7 +55,8 @@ def narrow_interval_warning(
     if not rows_by_table:
         return []
     count = sum(map(len, rows_by_table))
-    filters = shorten_names(list(dict.fromkeys(name for rows in rows_by_table for name in rows["filter"])), MAX_NAMES)
+    names = dict.fromkeys(name for rows in rows_by_table for name in rows["filter"])
+    filters = list_filters(names, MAX_NAMES)
     enough = np.max(np.concatenate([needed_realisations(rows, tables_by_name, results) for rows in rows_by_table]))
     if np.isfinite(enough):  # it is NaN if the number is unknown for one of the rows
         line = plural(

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from radarsim.language.translate import join_names, shorten_names, tr
+from radarsim.language.translate import join_names, quote_name, shorten_names, term, tr
 from radarsim.report.drawing.line_points import rough_points
 from radarsim.report.drawing.model import Figure, Line, Panel
 from radarsim.report.math_text import plain_text
@@ -17,7 +17,8 @@ MAX_NAMES = 3  # in a remark
 
 def with_figure_number(figure: Figure, number: str) -> Figure:
     """The figure with its number in the paper in the caption."""
-    return replace(figure, caption=f"{figure.caption} {tr('Figure {number} of the paper.', number=number)}")
+    message = term("Figures {number} of the paper.") if "–" in number else term("Figure {number} of the paper.")
+    return replace(figure, caption=f"{figure.caption} {tr(message, number=number)}")
 
 
 def with_meaning_of_crosses(figure: Figure) -> Figure:
@@ -52,12 +53,19 @@ def lines_below(figure: Figure, limit: float) -> str:
     """The names of the lines that go below a value anywhere, with their panels' titles where there are several."""
     panels = [panel for panel in figure.panels if _named_lines(panel)]
     names = [
-        ", ".join(dict.fromkeys(filter(None, ((len(panels) > 1) * _title(panel), plain_text(line.name or line.label)))))
+        _line_name(panel if len(panels) > 1 else None, line)
         for panel in panels
         for line in _named_lines(panel)
         if np.nanmin(np.asarray(line.y, float)) < limit
     ]
     return join_few_names(names, 1 if len(panels) > 1 else MAX_NAMES)
+
+
+def _line_name(panel: Panel | None, line: Line) -> str:
+    """The name of a line, after that of its panel."""
+    name = plain_text(line.name or line.label)
+    title = "" if panel is None else _title(panel)
+    return ", ".join(dict.fromkeys(filter(None, (title, name)))) if title else quote_name(name)
 
 
 def _named_lines(panel: Panel) -> list[Line]:

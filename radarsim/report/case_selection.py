@@ -51,6 +51,12 @@ def swept_cases(results: Sequence[CaseResult]) -> list[str]:
     return [without_markup(swept_description(result)) for result in results if result.swept_values]
 
 
+def swept_keys(results: Sequence[CaseResult]) -> list[str]:
+    """How sentences and figures name the keys in which cases differ."""
+    keys = (key_symbol(result, key) for result in results for key, _ in result.swept_values)
+    return list(dict.fromkeys(map(without_markup, keys)))
+
+
 def group_by_config(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
     """Cases by config, in order: one panel each."""
     groups: dict[str, list[CaseResult]] = {}

@@ -26,22 +26,27 @@ STRONG_PT, THIN_PT = 2.0, 0.8  # widths of lines that the headline names, and of
 def with_headlines(
     figures_by_name: Mapping[str, Figure],
     answer: Sequence[str],
-    tables_of_answer: Sequence[Collection[str]],
-    tables_by_figure: Mapping[str, Collection[str]],
+    sources_of_answer: Sequence[Collection[str]],
+    sources_by_figure: Mapping[str, Collection[str]],
     single_cases: Collection[str] = (),
+    swept_keys: Collection[str] = (),
 ) -> dict[str, Figure]:
     """The figures with a headline each.
 
-    tables_of_answer: the tables that each sentence of the answer rests on; tables_by_figure: those that are drawn;
-    single_cases: how sentences on one of several cases begin, which none of these figures is about."""
+    sources_of_answer: tables that each sentence of the answer rests on, or a table's column, "folds.right";
+    sources_by_figure: those that are drawn; single_cases: how sentences on one of several cases begin, which none of
+    these figures is about; swept_keys: as figures name them, for no figure is about one that it lacks."""
 
     def headline(name: str, figure: Figure) -> str:
         values = drawn_values(figure)
-        for sentence, sentence_tables in zip(answer, tables_of_answer, strict=True):
+        words = _words_of(figure)
+        foreign_keys = [f"{key} = " for key in swept_keys if key not in words]
+        for sentence, sources in zip(answer, sources_of_answer, strict=True):
             text = first_statement(sentence)
             is_on_one_case = any(case in text.partition(":")[0] for case in single_cases)
-            is_of_tables = set(sentence_tables) <= set(tables_by_figure[name])
-            if is_of_tables and not is_on_one_case and len(text) <= MAX_LETTERS and is_drawn(text, values):
+            is_elsewhere = is_on_one_case or any(key in text for key in foreign_keys)
+            is_of_sources = all(_is_source(source, sources_by_figure[name]) for source in sources)
+            if is_of_sources and not is_elsewhere and len(text) <= MAX_LETTERS and is_drawn(text, values):
                 return text
         return plain_text(figure.title)
 
@@ -86,6 +91,26 @@ def _named_lines(headline: str, names: Collection[str]) -> set[str]:
         if count:
             found.add(lines[part])
     return found
+
+
+def _words_of(figure: Figure) -> str:
+    """The titles of a figure, its axes and the names of its lines: they name the keys that differ within it."""
+    texts = [
+        text
+        for panel in figure.panels
+        for text in (
+            *(panel.title, panel.x.label, panel.y.label, panel.key_title),
+            *(name for name, _ in panel.keys),
+            *(text for mark in panel.marks for text in (getattr(mark, "label", ""), getattr(mark, "name", ""))),
+        )
+    ]
+    return plain_text("\n".join([figure.title, *texts]))
+
+
+def _is_source(source: str, drawn: Collection[str]) -> bool:
+    """Whether a figure draws a table, or a column of it, unless it is known to draw another one."""
+    table = source.partition(".")[0]
+    return bool({source, table} & {*drawn}) or (source == table and any(d.startswith(f"{table}.") for d in drawn))
 
 
 def first_statement(sentence: str) -> str:

@@ -80,6 +80,7 @@ RENAMED: Mapping[str, Mapping[str, Mapping[str, str]]] = {
         "locks": {"taken": "used_share", "wrong_fold": "wrong_fold_share"},
     },
 }
+COMMON_TABLES = {"claims": {"what": "quantity", "why": "reason", "number": "variants_of"}}
 ONE_FILE_STUDIES = {"last": {"last_sigma|last": "last_sigma"}}
 
 
@@ -87,7 +88,7 @@ def with_current_columns(study: str, table: str, content: bytes) -> bytes:
     """The CSV of a study's table with the present names of its columns."""
     header, line_end, rows = content.partition(b"\n")
     names = header.decode("utf-8", "replace").split(",")
-    renamed = RENAMED.get(study, ONE_FILE_STUDIES).get(table, {})
+    renamed = COMMON_TABLES.get(table) or RENAMED.get(study, ONE_FILE_STUDIES).get(table, {})
     current = {old: new for name, new in renamed.items() for old, new in _with_ends(name, new, names)}
     if not current.keys() & {*names}:
         return content

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import tr
+from radarsim.language.translate import quote_name, tr
 from radarsim.report import caption_remarks
 from radarsim.report.case_selection import MAX_MISSING_NAMES
 from radarsim.report.drawing.model import (
@@ -101,7 +101,7 @@ def loss_lines(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
     """The complements of shares that have a loss, and words on zeros, which a logarithmic axis lacks, for a caption."""
     losses = tuple(map(complement_line, lines))
     visible = tuple(line for line in losses if (line.y > 0).any())
-    names = [without_markup(line.name or line.label) for line in losses if not (line.y > 0).any()]
+    names = [quote_name(without_markup(line.name or line.label)) for line in losses if not (line.y > 0).any()]
     remark = (
         " " + tr("Zero throughout: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
         if names

@@ -154,13 +154,10 @@ def extent(record: Mapping) -> str:
     short = any(case["done"] < case["asked"] for case in cases)
     if len(cases) > 1 and short:
         count_text = plural(
-            "{done} realisation a case of {asked} requested",
-            "{done} realisations a case of {asked} requested",
-            max_done,
-            **counts,
+            "{done} of {asked} realisation per case", "{done} of {asked} realisations per case", max_done, **counts
         )
     elif len(cases) > 1:
-        count_text = plural("{done} realisation a case", "{done} realisations a case", max_done, **counts)
+        count_text = plural("{done} realisation per case", "{done} realisations per case", max_done, **counts)
     elif short:
         count_text = plural(
             "{done} realisation of {asked} requested", "{done} realisations of {asked} requested", max_done, **counts

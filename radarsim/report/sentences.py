@@ -35,6 +35,11 @@ class Sentence:
     def __str__(self) -> str:
         return self.text
 
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """The tables of its intervals; of the first, which its first statement is about, the column too."""
+        return tuple(f"{i.table}.{i.name}" if n == 0 else i.table for n, i in enumerate(self.intervals))
+
     def with_text(self, text: str) -> "Sentence":
         """Another text on the same intervals."""
         return Sentence(text, self.intervals)

@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import term, tr
+from radarsim.language.translate import quote_name, term, tr
 from radarsim.report import caption_remarks
 from radarsim.report import tables as common
 from radarsim.report.case_selection import (
@@ -66,7 +66,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
         for panel in _sigma_panels(title, members, curves, component, filters)
     ]
     caption = tr(
-        "Root-mean-square error of the {quantity} about the truth against time, of {realisations}.",
+        "Root-mean-square error of the {quantity} against time, from {realisations}.",
         quantity=component.words,
         realisations=realisations_text(results),
     )
@@ -108,10 +108,9 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     One panel where no config is swept; else one for each of `group_by_panel`. gains is tables.group_by(table, "case",
     "filter", "component")."""
     caption = tr(
-        "Relative gain in σ of the {quantity} against filter {base}, paired on common noise, of {realisations}. "
-        "Below zero: a loss.",
+        "Gain in σ of the {quantity} over filter {base}, from {realisations} with common noise. Below zero: a loss.",
         quantity=component.words,
-        base=results[0].axes.filters[results[0].axes.baseline],
+        base=quote_name(results[0].axes.filters[results[0].axes.baseline]),
         realisations=realisations_text(results),
     )
     y = Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=component.symbol))
@@ -156,7 +155,7 @@ def _with_remark_on_losses(figure: Figure) -> Figure:
     if not any(panel.y.limits[0] == -CUT_LOSS_PERCENT for panel in figure.panels):
         return figure
     names = caption_remarks.lines_below(figure, -CUT_LOSS_PERCENT)
-    remark = tr("Losses of over {loss:g} % lie below the axis: {names}.", loss=CUT_LOSS_PERCENT, names=names)
+    remark = tr("Losses over {loss:g} % are below the axis: {names}.", loss=CUT_LOSS_PERCENT, names=names)
     return replace(figure, caption=f"{figure.caption} {remark}")
 
 
@@ -210,8 +209,8 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
     if not pairs:
         return None
     caption = tr(
-        "Errors of the {quantity} in cases with a mean error above the standard deviation at some time: mean error "
-        "(bias) and standard deviation of {realisations}; σ² is the sum of their squares.",
+        "Mean (bias) and standard deviation of the error in the {quantity}, from {realisations}; σ² is the sum of "
+        "their squares. Only cases whose bias exceeds the standard deviation at some time.",
         quantity=component.words,
         realisations=realisations_text(results),
     )

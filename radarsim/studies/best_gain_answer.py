@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import term, tr
+from radarsim.language.translate import quote_name, term, tr
 from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import Estimate
 
@@ -64,8 +64,8 @@ def gain_sentences(
                 "{subject}, gain in {what}, {filter} over {baseline}{remark}: {clauses}.",
                 subject=subject,
                 what=what,
-                filter=other.name,
-                baseline=baseline.name,
+                filter=quote_name(other.name),
+                baseline=quote_name(baseline.name),
                 remark=f" ({tr('95 % intervals')})" if baseline.is_measured or other.is_measured else "",
                 clauses="; ".join(_clauses(key, baseline, other)),
             )

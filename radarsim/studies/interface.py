@@ -225,7 +225,7 @@ class Study(ABC):
         return ()
 
     def drawn_from(self) -> Mapping[str, Sequence[str]]:
-        """The tables behind figures, by the prefix of the figure's name. Default: none.
+        """The tables behind figures, or a column, 'folds.right', by the prefix of the figure's name. Default: none.
 
         Not needed for a figure with the name of its table, nor for names that begin with sigma, gain or sweep."""
         return {}

@@ -44,7 +44,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from radarsim.config.model import Model
 from radarsim.config.study_keys import Member, make_study_keys, part_models
 from radarsim.errors import ConfigError
-from radarsim.language.translate import Term, join_names, shorten_names, term, tr
+from radarsim.language.translate import Term, join_names, list_filters, quote_name, term, tr
 from radarsim.report.quantities import COMMON, Component, Quantity
 from radarsim.studies.interface import Paper, Study
 from radarsim.studies.onefile_recordings import OneFileRecordings
@@ -309,7 +309,7 @@ class OneFile(Study):
 
     def question(self, experiment: "Experiment") -> str:
         names = dict.fromkeys(filter_keys.name for case in experiment.cases for filter_keys in case.spec.filters)
-        return f"{tr(self._term(self.asks))} {tr('Filters: {names}.', names=shorten_names(list(names)))}"
+        return f"{tr(self._term(self.asks))} {tr('Filters: {names}.', names=list_filters(names))}"
 
     def _term(self, words: str) -> Term:
         """A text of the study, which the catalogue of its package translates."""
@@ -344,7 +344,7 @@ class OneFile(Study):
         last = [row for _, row in curves[curves["k"] == curves["k"].max()].iterrows()]
         sigmas = [compared_value.sigma_value(row, tables_by_name) for row in last]
         texts = [
-            f"{row['filter']} {sigma.text(key_labels.unit_label(row['unit']))}"
+            f"{quote_name(row['filter'])} {sigma.text(key_labels.unit_label(row['unit']))}"
             for row, sigma in zip(last, sigmas, strict=True)
         ]
         text = tr(
@@ -361,9 +361,9 @@ class OneFile(Study):
             values = (
                 (row["filter"], compared_value.row_value(row, compared_value.GAIN)) for _, row in gains.iterrows()
             )
-            texts = [f"{name} {gain_sentences.percent_text(gain, result.count)}" for name, gain in values]
+            texts = [f"{quote_name(name)} {gain_sentences.percent_text(gain, result.count)}" for name, gain in values]
             base = result.axes.filters[result.axes.baseline]
-            text = tr("Gain against {base} there: {filters}.", base=base, filters=join_names(texts))
+            text = tr("Gain over {base} there: {filters}.", base=quote_name(base), filters=join_names(texts))
             yield sentences.Sentence(
                 case_selection.after_swept_values(result, text), sentences.intervals("gains", "gain", gains)
             )

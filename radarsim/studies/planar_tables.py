@@ -8,6 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.kernels.polar_plots import polar
+from radarsim.language.translate import term
 from radarsim.report import case_selection, statistics, tables, time_figures
 from radarsim.report.drawing.model import Figure
 from radarsim.report.quantities import Component
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from radarsim.config.experiment import Experiment
     from radarsim.studies.planar import PlanarStudy
 
-ACROSS = Component("across", "m", "$\\perp$", "position across the line of sight")
+ACROSS = Component("across", "m", "$\\perp$", term("position across the line of sight"))
 
 
 def position_columns(study: "PlanarStudy", result: CaseResult) -> Mapping[str, Any]:

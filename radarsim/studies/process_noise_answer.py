@@ -11,7 +11,7 @@ import numpy as np
 
 from radarsim.config.study_keys import is_process_noise
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import join_names, tr
+from radarsim.language.translate import join_names, quote_name, tr
 from radarsim.report import compared_value, key_labels, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import RADIAL, SIGMA
@@ -146,7 +146,7 @@ def best_values_sentence(
         symbol=key.symbol,
         quantity=quantity,
         since=wording.since(*scans),
-        filters="; ".join(f"{name} {_best_values(key, unit, errors)}" for name, errors in worst.items()),
+        filters="; ".join(f"{quote_name(name)} {_best_values(key, unit, errors)}" for name, errors in worst.items()),
     )
     return Sentence(text)
 

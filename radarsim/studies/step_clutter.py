@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.errors import ConfigError
-from radarsim.language.translate import join_names, tr
+from radarsim.language.translate import join_names, quote_name, tr
 from radarsim.studies.step_checks import record
 from radarsim.studies.stepwise import StepStudy
 
@@ -140,7 +140,7 @@ class ClutteredStudy(StepStudy):
             panel = Panel(panel_layout.time_axis(), Axis(tr("share of tracks kept")), marks, title)
             panels += panel_layout.keyed_panels(panel, members, filters)
         caption = tr(
-            "Share of tracks that are still the target's, of {realisations}.",
+            "Share of tracks that are still the target's, from {realisations}.",
             realisations=case_selection.realisations_text(visible),
         )
         figure = Figure("tracks", tr("Tracks kept among false plots"), caption + remark, tuple(panels))
@@ -155,12 +155,12 @@ class ClutteredStudy(StepStudy):
             rows = rows[rows["k"] == rows["k"].max()] if len(rows) else rows
             ends = ("kept_share", "kept_share_lo", "kept_share_hi")
             texts = [
-                f"{row['filter']} {wording.share(*(100 * float(row[end]) for end in ends))}"
+                f"{quote_name(row['filter'])} {wording.share(*(100 * float(row[end]) for end in ends))}"
                 for _, row in rows.iterrows()
             ]
             if texts:
                 text = tr(
-                    "Tracks kept for {t:g} s: {filters}; σ is of these.",
+                    "Tracks kept for {t:g} s: {filters}; σ refers to these.",
                     t=float(result.axes.t_s[-1]),
                     filters=join_names(texts),
                 )

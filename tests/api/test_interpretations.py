@@ -307,7 +307,7 @@ def test_a_interpretation_as_shipped_measures_what_a_run_of_the_config_does(ran,
     import radarsim
 
     result = radarsim.run("range_doppler", realisations=2000, out=tmp_path, figures=False)
-    stored = result.tables["claims"].set_index(["claim", "what", "case"])[["measured", "exact"]]
+    stored = result.tables["claims"].set_index(["claim", "quantity", "case"])[["measured", "exact"]]
     done = judge_requests([ran], out=tmp_path, figures=False)
     for part, judged in done.papers[0].claims[0].verdicts[0].parts:
         assert (judged.measured, judged.exact) == tuple(stored.loc["P1.8", part.what, f"rls{part.cases[0]}"])

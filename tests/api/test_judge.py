@@ -115,7 +115,7 @@ def test_a_twin_gains_nothing_and_its_intervals_hold_it(judged):
     assert (gains["gain_lo"] < 0).all()
     assert (gains["gain_hi"] > 0).all()
     assert (gains["gain_percent"].abs() < 100 * TWIN).all()
-    assert "mine is equal to r+Vr" in judged.answer[0]
+    assert "“mine” is equal to r+Vr" in judged.answer[0]
 
 
 def test_gains_are_against_every_filter_and_paired(judged, plain):
@@ -290,7 +290,7 @@ def test_filters_of_the_config_that_are_equal_are_all_named(tmp_path):
     filters = ", ".join(f"{{name: {name}, observes: [range], manoeuvre_variance: 1e-3}}" for name in ("one", "two"))
     (tmp_path / "twins.yaml").write_text(f"include: [rls2]\nfilters: [{filters}]\n")
     result = radarsim.judge(tmp_path / "twins.yaml", lambda plots: plots["range_m"], realisations=200)
-    assert result.answer[0].startswith("mine is worse than one (equal to two), the config's best in r at 140 s")
+    assert result.answer[0].startswith("“mine” is worse than “one” (equal to “two”), the config's best in r at 140 s")
     assert not any("against two" in sentence for sentence in result.answer)
 
 
@@ -413,10 +413,10 @@ def test_failures_are_counted_and_sigma_is_of_the_others(estimates):
     result = radarsim.judge("rls2", x)
     counted = dict(result.tables["failures"][["reason", "failed"]].itertuples(index=False))
     assert counted == {"any": 10, "not_a_number": 5, "no_estimate": 1, "diverged": 4}
-    assert result.answer[0].startswith("mine fails in 3.33 % [")
+    assert result.answer[0].startswith("“mine” fails in 3.33 % [")
     how = result.answer[0].split("), and in the others ")[1]
     assert how.startswith(
-        "mine is equal to r+Vr, the config's best in r at 140 s, identical in all 290 realisations: a difference in "
+        "“mine” is equal to r+Vr, the config's best in r at 140 s, identical in all 290 realisations: a difference in "
     )
     mine = of(result.curves, filter="mine")
     assert set(mine["n"]) == {290}
@@ -431,7 +431,7 @@ def test_of_equal_filters_the_first_is_the_best_and_one_realisation_tells_nothin
     keys = [{"name": name, "observes": ["range"], "manoeuvre_variance": 1e-3} for name in "cab"]
     said = radarsim.judge("rls2", held, realisations=1, overrides={"filters": keys}).answer[0]
     assert re.match(
-        r"mine cannot be distinguished from c \(equal to a and b\), the config's best in r at 140 s: "
+        r"“mine” cannot be distinguished from c \(equal to a and b\), the config's best in r at 140 s: "
         r"gain \S+ % \[−∞, 100\]",
         said,
     )
@@ -447,7 +447,7 @@ def test_a_filter_that_starts_late_does_not_fail(estimates):
 
 def test_a_filter_that_always_fails_is_not_compared(estimates):
     result = radarsim.judge("rls2", np.where(np.arange(15)[:, None] > 7, np.nan, estimates))
-    assert result.answer[0].startswith("mine fails in 100 % [")
+    assert result.answer[0].startswith("“mine” fails in 100 % [")
     assert not len(of(result.curves, filter="mine"))
 
 
@@ -470,10 +470,10 @@ def test_below_the_floor_it_is_said_why(estimates):
     truth = radarsim.plots("rls2", n=300).truth
     answer = radarsim.judge("rls2", (estimates + 3 * truth) / 4).answer
     found = next(line for line in answer if line.startswith("There the "))
-    assert re.search(r"mine is 7\d\.?\d* % \[[^]]*\] below it;", found)
+    assert re.search(r"“mine” is 7\d\.?\d* % \[[^]]*\] below it;", found)
     perfect = radarsim.judge("rls2", truth).answer[0]
     assert perfect.startswith(
-        "mine is better than r+Vr, the config's best in r at 140 s: gain 100 % [100, 100]; its σ is 0 "
+        "“mine” is better than r+Vr, the config's best in r at 140 s: gain 100 % [100, 100]; its σ is 0 "
     )
     assert found.endswith("Only a biased estimator, or one with extra information, can lie below it.")
 
@@ -524,7 +524,7 @@ def test_a_filter_stands_beside_that_of_the_config(tmp_path, monkeypatch):
     result = radarsim.judge("rls2", held, realisations=300, overrides={"filters": keys})
     assert set(of(result.gains, filter="mine")["baseline"]) == {"r", "raw"}
     assert (of(result.gains, filter="mine", baseline="raw")["gain_percent"] == 0).all()
-    assert result.question == "Are raw and mine better than the filters of the config?"
+    assert result.question == "Are “raw” and “mine” better than the filters of the config?"
 
 
 def test_an_iterator_that_gives_less_or_something_else_is_refused(estimates):
@@ -657,11 +657,11 @@ def test_the_command_judges_a_file(estimates, tmp_path, monkeypatch):
     np.savez("mine.npz", estimates=estimates)
     done = CliRunner().invoke(main, ["judge", "rls2", "mine.npz", "--name", "mine", "--no-figures"])
     assert done.exit_code == 0, done.output
-    assert done.output.startswith("mine is equal to r+Vr")
+    assert done.output.startswith("“mine” is equal to r+Vr")
     record = json.loads((tmp_path / "results/rls2_mine/run.json").read_text())
     assert record["command"] == "radarsim judge rls2 mine.npz --name mine"
     assert len(record["judged"]["mine"]) == 64
-    assert "mine is equal to" in (tmp_path / "results/rls2_mine/report.html").read_text()
+    assert "“mine” is equal to" in (tmp_path / "results/rls2_mine/report.html").read_text()
     again = CliRunner().invoke(main, ["judge", "rls2", "mine.npz", "-n", "301"])
     assert again.exit_code == 2
     assert not (tmp_path / "results/.blocks").exists()
@@ -750,7 +750,7 @@ def test_a_planted_loss_is_known_as_well_as_theory_says():
     theirs = 1.96 * 100 * (1 + LOSS) * SPREAD / np.sqrt(n)
     mine = (gains["gain_hi"] - gains["gain_lo"]) / 2
     np.testing.assert_allclose(mine, theirs, rtol=sigma_error(n, kurtosis=9, z=4))
-    assert "mine is worse than r+Vr" in result.answer[0]
+    assert "“mine” is worse than r+Vr" in result.answer[0]
 
 
 @pytest.mark.slow_cases("500")
@@ -937,4 +937,4 @@ def test_a_filter_without_any_estimate_fails_without_words_of_numpy():
     result = radarsim.judge(
         "rls2", lambda plots: np.full((plots.n, 15, 1), np.nan), realisations=256, figures=False, threads=1
     )
-    assert "mine fails in 100 %" in result.answer[0]
+    assert "“mine” fails in 100 %" in result.answer[0]

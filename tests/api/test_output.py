@@ -180,9 +180,9 @@ def of_cases(*cases):
 def test_extent_in_words():
     assert provenance.extent(of_cases((10_000, 10_000, 7))) == "10,000 realisations, seed 7"
     differing = of_cases((100_000, 100_000, 2017), (200_000, 200_000, 1))
-    assert provenance.extent(differing) == "100,000 to 200,000 realisations a case, seeds 1, 2017"
+    assert provenance.extent(differing) == "100,000 to 200,000 realisations per case, seeds 1, 2017"
     short = of_cases((200_000, 100_000, 1), (200_000, 200_000, 1))
-    assert provenance.extent(short) == "100,000 to 200,000 realisations a case of 200,000 requested, seed 1"
+    assert provenance.extent(short) == "100,000 to 200,000 of 200,000 realisations per case, seed 1"
 
 
 def test_many_long_tables_share_the_room_of_a_page():

@@ -98,7 +98,7 @@ def test_an_experiment_that_is_not_the_papers_names_the_claims_that_it_cannot_ju
         assert {(row["class"], row["verdict"], row["config"]) for row in rows} == {
             ("not judged here",) * 2 + ("foreign",)
         }
-        reasons = {row["why"] for row in rows}
+        reasons = {row["reason"] for row in rows}
         assert all(f"{key} is {said}, the paper's none" in why for why in reasons)
         assert all(
             "target.kind is fly_by, the paper's polynomial" in why and "distance_m" not in why for why in reasons

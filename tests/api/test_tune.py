@@ -309,7 +309,7 @@ def test_a_filter_is_judged_against_the_tuned_one_too():
         "rls2", rival(20 * found.keys[0].tuned), against="tuned", overrides=["target=turn"], realisations=3000
     )
     first = result.answer[0]
-    assert first.startswith("mine is better than r+Vr, the config's best in r at 140 s: gain ")
+    assert first.startswith("“mine” is better than r+Vr, the config's best in r at 140 s: gain ")
     assert ", and worse than r+Vr, tuned: gain −" in first
     assert f"whose σ is {found.all.tuned:.4g} m; its σ is " in first
     last = result.curves.query("component == 'r' and k == 15").set_index("filter")

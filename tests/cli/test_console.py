@@ -55,7 +55,7 @@ def test_claims_without_results_say_where_to_find_them(tmp_path):
 def parts(*extensions):
     """Parts of a refuted claim, of which these are not counted."""
     common = {"claim": "P9.1", "paper": "P", "place": "there"} | dict.fromkeys(CLASS_COLUMNS, "confirmed")
-    common |= {"statement": "It is so", "original": "", "config": "c", "what": "size", "case": "", "unit": "m"}
+    common |= {"statement": "It is so", "original": "", "config": "c", "quantity": "size", "case": "", "unit": "m"}
     common |= {"measured": 9.0, "lo": 9.0, "hi": 9.0, "exact": 9.0, "expected": "≤ 5", "miss": 8.0, "depends_on": ""}
     common |= dict.fromkeys(("needed", "of", "holds", "worst_miss"), math.nan)
     return [{**common, "verdict": "refuted", "extension": one} for one in extensions]

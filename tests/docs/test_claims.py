@@ -48,7 +48,7 @@ def test_what_is_kept_is_a_part_of_its_claim():
         kept = {row["claim"]: row for row in csv.DictReader(file)}
     assert list(kept) == list(DECLARED)
     for claim, row in kept.items():
-        what = row["what"].rpartition("`: ")[2]
+        what = row["quantity"].rpartition("`: ")[2]
         parts = [part for part in DECLARED[claim].parts if part.what == what and part.unit == row["unit"]]
         assert parts or not row["measured"], claim
         ends = {part.expected.words for part in parts}
@@ -57,7 +57,7 @@ def test_what_is_kept_is_a_part_of_its_claim():
 
 def test_a_full_reproduction_is_shown_with_every_part(tmp_path, text, monkeypatch):
     rows = claims.stored_rows()
-    found = claims.list_claims.Claims([*rows, rows[0] | {"what": "another part"}])
+    found = claims.list_claims.Claims([*rows, rows[0] | {"quantity": "another part"}])
     monkeypatch.setattr(claims.list_claims, "claims", lambda out: found)
     full = claims.markdown(tmp_path)
     assert "| P1.1 | another part |" in full

@@ -116,7 +116,7 @@ def test_among_false_plots_no_track_is_marked_and_no_filter_called_untried_for_w
     said = command(
         *("track", "sonar_clutter", source, "--set", config, "-o", tmp_path / "t.csv", "--report", tmp_path / "out")
     ).stdout
-    assert "untested  nearest, PDA and “nearest, 4 of 6”: no innovation" in said
+    assert "untested  “nearest”, PDA and “nearest, 4 of 6”: no innovation" in said
     text = (tmp_path / "out/report.html").read_text(encoding="utf-8")
     assert "The plots do not tell which filter is best: the filters give no innovation with a covariance." in text
     assert "Triangle: the radar. Where a file has no heights" in text

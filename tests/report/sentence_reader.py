@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from radarsim.api import result_content
-from radarsim.language.translate import tr, translate_names
+from radarsim.language.translate import quote_name, tr, translate_names
 from radarsim.report import case_selection, key_labels
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.multimodel.tables import stage_gain, stage_names
@@ -30,9 +30,15 @@ TIME = re.compile(rf"(?<!= )(?<![\d.,])({NUMBER})[ \u00a0][sс](?![\w/]| \[)")
 SCAN = re.compile(r"(?:scan|обзор\w*) (\d+)")
 LAST = re.compile(r"the last scan|последн\w+ обзор")
 OF_THE_LAST = re.compile(r"^(?: \w+)?(?: \w+)? \([^)]*\)")  # in brackets behind a number: what that is of
+
+
+def _in_percent(x):
+    return 100 * x
+
+
 CHANGES = (  # how sentences write a column: itself, in per cent, of a gain the loss and the factor
     lambda x: x,
-    lambda x: 100 * x,
+    _in_percent,
     lambda x: -x,
     lambda x: 1 - x / 100,
 )
@@ -132,7 +138,9 @@ def names_of(results: Sequence, language: str = "en") -> dict[str, dict[str, str
     has_stages = all(result.study == "multimodel" for result in results)
     by_column = {
         "case": {text: case for text, case in cases.items() if case} if len(results) > 1 else {},
-        "filter": {translate_names(name, of_configs): name for result in results for name in _filters(result)},
+        "filter": {
+            translate_names(quote_name(name), of_configs): name for result in results for name in _filters(result)
+        },
         "stage": {tr(name): name for result in results for name in stage_names(result)} if has_stages else {},
         "component": {words: name for name, words in WORDS.items()} if language == "en" else {},
     }
@@ -269,6 +277,8 @@ def _rows(column: Table, match: re.Match, may_be_wider: bool, chosen: np.ndarray
     for change in CHANGES:
         value, ends = change(column.value), np.sort([change(column.low), change(column.high)], axis=0)
         has_value = near(value, match["value"])
+        if change is _in_percent and match["value"] in ("0", "100"):  # all or none, not nearly
+            has_value &= value == float(match["value"])
         is_same = near(ends[0], match["low"]) & near(ends[1], match["high"])
         if may_be_wider:
             is_same |= (number(match["low"])[0] <= ends[0] + 1e-9) & (ends[1] - 1e-9 <= number(match["high"])[0])

@@ -116,7 +116,7 @@ def test_a_ratio_to_what_is_exactly_known_has_no_ends():
 def test_all_claims_judged(table):
     assert list(dict.fromkeys(table["claim"])) == [f"P1.{n}" for n in range(1, 37)]
     assert ",".join(table.columns[:9]) == "claim,paper,statement,case,measured,lo,hi,expected,verdict"
-    assert not table[["statement", "what", "place", "expected"]].eq("").any(axis=None)
+    assert not table[["statement", "quantity", "place", "expected"]].eq("").any(axis=None)
     assert tuple(table.columns[9:11]) == ("expected_lo", "expected_hi")
     above = table[table["expected"] == "> 50"].iloc[0]
     assert above["expected_lo"] == 50
@@ -197,14 +197,14 @@ FOUND = [
 @pytest.mark.parametrize(("claim", "case", "what", "value", "slack"), FOUND)
 def test_measures_what_it_says(table, claim, case, what, value, slack):
     rows = table[(table["claim"] == claim) & (table["case"] == case)]
-    rows = rows[rows["what"].str.contains(what)]
+    rows = rows[rows["quantity"].str.contains(what)]
     assert len(rows) == 1
     assert rows["measured"].iloc[0] == pytest.approx(value, abs=slack)
 
 
 def test_about_ten_per_cent_at_two_steps_only(table):
     """A margin of a tenth, and the second step above the fourth: each refutes P1.17, which stands at its largest."""
-    own = table[table["claim"] == "P1.17"].set_index("what")
+    own = table[table["claim"] == "P1.17"].set_index("quantity")
     assert own["class"].eq(REFUTED).all()
     assert own.loc["largest range gain", ["margin", "miss"]].tolist() == pytest.approx([1, 4.05], abs=0.005)
     assert own["verdict"].tolist() == [REFUTED, CONFIRMED, REFUTED]
@@ -271,7 +271,7 @@ def test_what_does_not_hang_on_the_end_is_judged_of_a_shorter_run():
     for lost in ("P1.4", "P1.8", "P1.11", "P1.12", "P1.19"):
         own = table[(table["claim"] == lost) & (table["verdict"] == NOT_JUDGED)]
         assert len(own), lost
-        assert own["why"].str.contains("ends at 70 s, the paper's run at 140 s").all()
+        assert own["reason"].str.contains("ends at 70 s, the paper's run at 140 s").all()
     assert set(unjudged_claims(result)) >= {"rls3 ends at 70 s, the paper's run at 140 s"}
     assert {"P1.4", "P1.8"} <= set(claims_by_class(result)[NOT_JUDGED])  # no class that is shipped stands for a run
 

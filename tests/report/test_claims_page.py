@@ -18,8 +18,8 @@ def row(claim="P9.1", kind=REFUTED, **more):
         "place": "p",
         "original": "",
         "interpretation": "",
-        "number": "",
-        "why": "",
+        "variants_of": "",
+        "reason": "",
     }
     classes = {"class": kind, "overall": kind, "as_shipped": kind, "verdict": kind, "extension": False, "needed": ""}
     beside = {
@@ -28,7 +28,7 @@ def row(claim="P9.1", kind=REFUTED, **more):
         "of": "",
         "holds": "",
         "depends_on": "",
-        "what": "x",
+        "quantity": "x",
         "expected": "5",
         "unit": "m",
         "old_verdict": "",
@@ -106,7 +106,7 @@ def test_words_that_markdown_would_read_are_escaped():
 
 
 def test_of_variants_of_a_number_the_nearest_is_drawn():
-    far = row(number="T", measured=-50.0, lo=-51.0, hi=-49.0)
-    near = row(number="T", measured=4.9, lo=4.8, hi=5.0)
+    far = row(variants_of="T", measured=-50.0, lo=-51.0, hi=-49.0)
+    near = row(variants_of="T", measured=4.9, lo=4.8, hi=5.0)
     assert worst_part([far, near]) is near
     assert worst_part([row(extension=True), near]) is near

@@ -11,10 +11,10 @@ from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.language.current import language_codes, use_language
 from radarsim.report import headlines
-from radarsim.report.case_selection import swept_cases
+from radarsim.report.case_selection import swept_cases, swept_keys
 from radarsim.report.drawing.model import Axis, Figure, Heat, Line, Panel, Style
 from radarsim.report.math_text import plain_text
-from radarsim.report.page_links import tables_behind_figure
+from radarsim.report.page_links import sources_behind_figure
 from radarsim.studies.registry import study
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
@@ -76,6 +76,12 @@ def test_a_headline_is_of_the_tables_and_of_all_cases_of_its_figure():
     assert (
         headlines.with_headlines({"f": SIGMA}, [sentence], [("folds",)], {"f": ("curves",)})["f"].headline != sentence
     )
+    drawn = {"f": ("folds.right",)}
+    for column, is_drawn in (("folds.right", True), ("folds.lost", False), ("folds", True)):
+        named = headlines.with_headlines({"f": SIGMA}, [sentence], [(column,)], drawn)
+        assert (named["f"].headline == sentence) == is_drawn
+    other_key = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, swept_keys=["a"])
+    assert other_key["f"].headline == "The title"
     one_of_two = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, ["a = 1 m/s²"])
     assert one_of_two["f"].headline == "The title"
 
@@ -99,8 +105,9 @@ def check_words_of_figures(result):
             figures = result_content.case_figures(result.cases, tables, result.experiment)
             answer = result_content.make_answer(result.cases, tables)
             declared = study(result.experiment.study).drawn_from()
-            sources = {name: tables_behind_figure(name, declared, tables) for name in figures}
-            named = headlines.with_headlines(figures, answer.texts, answer.tables, sources, swept_cases(result.cases))
+            sources = {name: sources_behind_figure(name, declared, tables) for name in figures}
+            keys = swept_cases(result.cases), swept_keys(result.cases)
+            named = headlines.with_headlines(figures, answer.texts, answer.sources, sources, *keys)
             long = {name: len(plain_text(figure.caption).split()) for name, figure in figures.items()}
             assert {name: count for name, count in long.items() if count > MAX_CAPTION_WORDS} == {}
             sentences = [headlines.first_statement(text) for text in answer.texts]

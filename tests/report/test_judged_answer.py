@@ -29,9 +29,9 @@ def floor_sentence(answer):
 def test_an_equal_filter_has_the_exact_number_and_no_other():
     answer = judged(twin).answer
     first, floor = answer[0], floor_sentence(answer)
-    assert re.search(r"mine is equal to r\+Vr, .*, identical in all 1,000 realisations: .* fewer than 0\.3 % ", first)
+    assert re.search(r"“mine” is equal to r\+Vr, .*, identical in all 1,000 realisations: .* fewer than 0\.3 % ", first)
     assert first.endswith("; the σ of both is 154.7 m (exact).")
-    assert floor.endswith(": above it is r+Vr 5.18 % (exact), and mine as far.")
+    assert floor.endswith(": above it is r+Vr 5.18 % (exact), and “mine” as far.")
 
 
 def test_sigma_and_gain_of_one_sentence_agree():
@@ -55,7 +55,7 @@ def test_sigma_and_gain_of_one_sentence_agree():
     )
     assert found
     assert found[1] == found[2]
-    assert "m; above it is r+Vr 5.18 % (exact). mine, which has an estimate in other" in floor_sentence(result.answer)
+    assert "m; above it is r+Vr 5.18 % (exact). “mine”, which has an estimate in other" in floor_sentence(result.answer)
 
 
 def test_a_loss_in_another_component_is_in_the_first_sentence():
@@ -78,7 +78,7 @@ def test_below_a_posterior_bound_is_nothing_that_sees_only_the_plots():
     assert "the posterior Cramér–Rao bound" in floor
     assert any("Below it no estimator can be, biased or not" in text for text in result.answer)
     assert "biased, or knows" not in floor
-    assert re.search(r": mine is \d\d\.\d % \[\d\d\.?\d*, \d\d\.?\d*\] below it; above it is r\+Vr \d", floor)
+    assert re.search(r": “mine” is \d\d\.\d % \[\d\d\.?\d*, \d\d\.?\d*\] below it; above it is r\+Vr \d", floor)
 
 
 def test_of_gains_over_all_scans_those_are_left_out_that_compare_nothing():
@@ -141,13 +141,13 @@ def main_sentences(target, **options):
 def test_a_recognised_fault_comes_first_then_the_verdict_and_the_next_step():
     fault, verdict, next_step = main_sentences(late)
     assert "stand too late" in fault or "stand a scan too late" in fault
-    assert verdict.startswith("mine is worse than r+Vr")
+    assert verdict.startswith("“mine” is worse than r+Vr")
     assert next_step.startswith("Next: mend this")
 
 
 def test_the_judgement_is_verdict_consistency_and_next_step():
     verdict, consistency, next_step = main_sentences(twin)
-    assert verdict.startswith("mine is equal to r+Vr")
+    assert verdict.startswith("“mine” is equal to r+Vr")
     assert "gives no covariances" in consistency
     assert "--against tuned" in next_step
     _, consistency, _ = main_sentences(bold)

@@ -116,8 +116,8 @@ def test_statistics_of_rows_that_are_runs():
 def test_a_mistake_is_a_reason_with_its_line(of, measure, said):
     (row,) = judged(TABLE, (of, measure, "{above: 0}"))
     assert row["verdict"] == "not judged here"
-    assert row["why"].startswith("its measure fails: claims:4:")
-    assert said in row["why"]
+    assert row["reason"].startswith("its measure fails: claims:4:")
+    assert said in row["reason"]
 
 
 @pytest.mark.parametrize(
@@ -131,13 +131,13 @@ def test_a_mistake_is_a_reason_with_its_line(of, measure, said):
 def test_an_interval_that_is_none_is_not_judged(column, said):
     (row,) = judged(BAD_TABLE, ("[{}]", f"{{value: {{column: {column}}}}}", "{above: 0}"))
     assert row["verdict"] == "not judged here"
-    assert said in row["why"]
+    assert said in row["reason"]
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
 def test_a_measure_without_a_number_is_not_judged(number):
     (row,) = judged({"a": [number]}, ("[{}]", "{value: {column: a}}", "{above: 0}"))
-    assert (row["class"], row["why"]) == ("not judged here", "its measure gives no number")
+    assert (row["class"], row["reason"]) == ("not judged here", "its measure gives no number")
 
 
 def test_measures_of_the_users_own_lie_beside_the_file(tmp_path, monkeypatch):
@@ -286,7 +286,7 @@ def test_a_table_that_is_none_is_refused(tmp_path, table, words):
 def test_cells_that_are_no_numbers_are_said(cell):
     (row,) = judged({"filter": ["ekf"], "mean": [cell]}, WELL)
     assert row["verdict"] == "not judged here"
-    assert "column 'mean' has cells that are no numbers" in row["why"]
+    assert "column 'mean' has cells that are no numbers" in row["reason"]
 
 
 def test_more_cases_than_a_measure_takes_are_said():
@@ -299,7 +299,7 @@ def test_more_cases_than_a_measure_takes_are_said():
 def test_a_count_that_is_none_is_said(count):
     (row,) = judged({"filter": ["ekf"], "mean": [0.374], "n": [count]}, WELL)
     assert row["verdict"] == "not judged here"
-    assert f"column 'n' holds the realisations of a number, whole and > 0, got {count}" in row["why"]
+    assert f"column 'n' holds the realisations of a number, whole and > 0, got {count}" in row["reason"]
 
 
 @pytest.mark.parametrize(
@@ -321,7 +321,7 @@ def test_what_a_measure_may_not_give_is_said(tmp_path, body, why):
     (tmp_path / "mine.py").write_text(f"{head}def odd(evidence, rows):\n    {body}\n")
     (row,) = radarsim.claims.judge(tmp_path / "mine.yaml", TABLE).table.to_dict("records")
     assert row["verdict"] == "not judged here"
-    assert why in row["why"]
+    assert why in row["reason"]
 
 
 def test_a_unit_of_one_is_not_written():

@@ -108,7 +108,7 @@ def test_a_changed_experiment_judges_nothing(config, override):
     table = radarsim.run(config, overrides=[override], realisations=50).tables["claims"]
     assert len(table)
     assert table["class"].eq(NOT_JUDGED).all()
-    assert table["why"].str.contains("not the paper's experiment: ").all()
+    assert table["reason"].str.contains("not the paper's experiment: ").all()
     assert table[["measured", "miss", "old_verdict"]].replace("", float("nan")).isna().all(axis=None)
 
 
@@ -137,7 +137,7 @@ def test_a_file_of_the_users_is_no_measure_of_the_paper(tmp_path, monkeypatch):
     found = radarsim.claims("rls1.yaml").table
     assert found["class"].eq(NOT_JUDGED).all()
     why = "not the paper's experiment: rls1: radar.sigma_range_m is 30, the paper's 25"
-    assert found["why"].str.startswith(why).all()
+    assert found["reason"].str.startswith(why).all()
     unchanged = radarsim.run(SHIPPED / "configs" / "rls1.yaml", realisations=50).cases
     assert not result_content.case_tables(unchanged)["claims"].empty
 
@@ -172,5 +172,5 @@ def test_claims_of_another_config_are_not_lost_in_silence(config, override):
     assert set(table["claim"]) == set(HELD_TOO[config])
     lost = table["verdict"].eq(NOT_JUDGED)
     assert lost.any()
-    assert table.loc[lost, "why"].ne("").all()
+    assert table.loc[lost, "reason"].ne("").all()
     assert {claim for names in unjudged_claims(found).values() for claim in names} == set(table.loc[lost, "claim"])

@@ -60,6 +60,15 @@ def test_the_reader_notices_what_contradicts_a_table():
     assert read_sentence("33.8 % [29.0, 38.0] (interval for all 14 compared)", measured).read
 
 
+def test_the_reader_tells_all_from_nearly_all():
+    for share, is_read in ((1.0, True), (0.99999, False)):
+        tables = {
+            "locks": pd.DataFrame({"lock_rate": [share], "lock_lo": [0.9985], "lock_hi": [1.0]}),
+            "curves": pd.DataFrame({"sigma": [], "sigma_lo": [], "sigma_hi": [], "believed_sigma": []}),
+        }
+        assert bool(read_sentence("locked in 100 % [99.85, 100]", tables).read) == is_read
+
+
 def test_the_reader_notices_the_number_of_another_row():
     """Of another case, filter, component or time than those next to the number."""
     rows = [

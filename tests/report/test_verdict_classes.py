@@ -38,7 +38,7 @@ def as_runs_would_store(out, own):
     stored = {}
     for of, claim in PAPERS.values():
         row = empty_row(claim, of.paper) | dict.fromkeys(CLASS_COLUMNS, own)
-        row |= {"measured": 3.0, "lo": 2.0, "hi": 4.0, "expected_lo": 5.0, "margin": 1.0, "miss": 2.0, "what": "x"}
+        row |= {"measured": 3.0, "lo": 2.0, "hi": 4.0, "expected_lo": 5.0, "margin": 1.0, "miss": 2.0, "quantity": "x"}
         row |= {"judged_lo": 2.0, "judged_hi": 4.0}
         stored.setdefault(claim.config, []).append(row)
     known = known_classes(OPEN, None)

@@ -265,7 +265,7 @@ def test_a_filter_that_has_learned_the_judged_realisations_is_said_in_the_first_
     assert 'purpose="training"' in result.warnings[0]
     sound = judged(Learned(purpose="training"), realisations=300, overrides={"target": "turn"})
     assert sound.warnings == []
-    assert sound.answer[0].startswith("mine is ")
+    assert sound.answer[0].startswith("“mine” is ")
 
 
 MEMO = """

@@ -6,7 +6,7 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from radarsim.language.numerals import power_of_ten
-from radarsim.language.translate import join_names, plural, shorten_names, term, tr
+from radarsim.language.translate import join_names, list_filters, plural, quote_name, term, tr
 from radarsim.recordings.doppler_scale import doppler_scale_message
 from radarsim.recordings.fit import folded_doppler
 from radarsim.recordings.fit.advice import Advice, FilterComparison, Finding, UsedRows
@@ -66,10 +66,10 @@ def plot_statements(followed: TrackingResult) -> list[Statement]:
     """The numbers of rows and tracks, the time covered, missing values, and gaps."""
     statements = [*_row_statements(followed), *_missing_statements(followed)]
     if names := followed.filters_without_estimate:
-        text = tr("{names}: no estimate from these plots", names=shorten_names(names, len(names)))
+        text = tr("{names}: no estimate from these plots", names=list_filters(names, len(names)))
         statements.append(Statement("no rows", text))
     if names := followed.filters_without_test:
-        text = tr("{names}: no innovation with a covariance, so no test", names=shorten_names(names, len(names)))
+        text = tr("{names}: no innovation with a covariance, so no test", names=list_filters(names, len(names)))
         statements.append(Statement("untested", text))
     if followed.gaps:
         text = tr(
@@ -113,7 +113,7 @@ def _missing_statements(followed: TrackingResult) -> list[Statement]:
     counts = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
     statements = [Statement("missing", ", ".join(counts))] if counts else []
     for name, columns in followed.filters_without_plots.items():
-        fields = {"name": name, "columns": join_names(columns)}
+        fields = {"name": quote_name(name), "columns": join_names(columns)}
         text = tr("{name} used no plot, because it needs {columns}: predictions only", **fields)
         statements.append(Statement("missing", text))
     return statements
@@ -146,7 +146,7 @@ def consistent_filters(tests: Sequence[InnovationTest]) -> list[Statement]:
     for test in tests:
         verdicts.setdefault(test.filter, set()).add(test.verdict)
     names = [name for name, own_verdicts in verdicts.items() if own_verdicts == {FITS}]
-    text = tr("{names}: consistent in all tests", names=shorten_names(names, len(names)))
+    text = tr("{names}: consistent in all tests", names=list_filters(names, len(names)))
     return [Statement("", text)] if 0 < len(names) < len(verdicts) else []
 
 
@@ -166,7 +166,7 @@ def advice_statements(followed: TrackingResult, advice: Advice) -> list[Statemen
             "the stated values of {filter} agree with {count} row",
             "the stated values of {filter} agree with {count} rows",
             advice.used_rows.rows,
-            filter=comparison.most_columns,
+            filter=quote_name(comparison.most_columns),
         )
         statements.append(Statement("advice", text))
     if advice.start_errors:
@@ -183,15 +183,15 @@ def _best_filter_text(comparison: FilterComparison) -> str:
     best = [name for name, gap in gaps.items() if gap < EQUAL_FILTERS_GAIN or name == comparison.best]
     less_likely = sorted(((name, gap) for name, gap in gaps.items() if name not in best), key=itemgetter(1))
     if not less_likely:
-        return shorten_names(best, len(best))
+        return list_filters(best, len(best))
     names_by_ratio: dict[str, list[str]] = {}
     for name, gap in less_likely:
         names_by_ratio.setdefault(likelihood_ratio_text(gap), []).append(name)
     ratios = ", ".join(
-        tr("{times} times under {name}", times=ratio, name=shorten_names(names, len(names)))
+        tr("{times} times under {name}", times=ratio, name=list_filters(names, len(names)))
         for ratio, names in names_by_ratio.items()
     )
-    best_names = shorten_names(best, len(best))
+    best_names = list_filters(best, len(best))
     if less_likely[0][1] <= CLEAR_GAIN:
         best_names = tr("{name} (not clearly)", name=best_names)
     return tr("{best}; the plots are less likely under the others: {others}", best=best_names, others=ratios)
@@ -244,7 +244,7 @@ def _turn_cost(turn: TurnError, filter_name: str) -> str:
         "in a turn of {load:g} g without missed plots the largest error of {filter} in {component} would be {changed}, "
         "not {stated} {unit}",
         load=turn.acceleration_g,
-        filter=filter_name,
+        filter=quote_name(filter_name),
         component=turn.component,
         changed=number(turn.changed, 3),
         stated=number(turn.stated, 3),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from radarsim.errors import ConfigError, argument
-from radarsim.language.translate import join_names, term, tr
+from radarsim.language.translate import join_names, quote_name, term, tr
 from radarsim.report.comparison.sentences import change_texts, final_rows, value_text
 from radarsim.report.comparison.table import SAME
 from radarsim.report.quantities import Quantity
@@ -111,7 +111,7 @@ def _sentence(quantity: Quantity, records: Sequence[dict[Any, Any]]) -> str:
     if all(row["pairing"] == SAME for row in records):
         return tr("{label} and {other} have the same numbers.", label=join_names(labels), other=fields["other"])
     if len(labels) == 1 and len(records) <= MAX_NAMED_CHANGES:
-        changes = join_names([f"{row['filter']} {_change(row)}" for row in records])
+        changes = join_names([f"{quote_name(row['filter'])} {_change(row)}" for row in records])
         return tr("{label} against {other}, {what}: {changes}.", label=labels[0], changes=changes, **fields)
     signs = [_sign(row) for row in records]
     counts = [tr(words, count=signs.count(sign)) for sign, words in COUNTED_SIGNS.items() if sign in signs]

@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, shorten_names, term, tr
+from radarsim.language.translate import join_names, list_filters, quote_name, term, tr
 from radarsim.report import compared_value, consistency_tables, gain_sentences, sentences, wording
 from radarsim.report import tables as common
 from radarsim.report.compared_value import ComparedValue
@@ -46,8 +46,8 @@ def question(experiment: Experiment) -> str:
     """What an experiment with user filters asks; empty where it has none."""
     filters = list(dict.fromkeys(member.name for case in experiment.cases for member in case.user_filters))
     if len(filters) > 1:
-        return tr("Are {names} better than the filters of the config?", names=shorten_names(filters))
-    return tr("Is {name} better than the filters of the config?", name=filters[0]) if filters else ""
+        return tr("Are {names} better than the filters of the config?", names=list_filters(filters))
+    return tr("Is {name} better than the filters of the config?", name=quote_name(filters[0])) if filters else ""
 
 
 class Judgement(NamedTuple):
@@ -76,7 +76,7 @@ def _judge_filter(result: CaseResult, name: str, prefix: str, tables_by_name: Ta
     gains = common.select_rows(tables_by_name["gains"], case=result.name, filter=name)
     failing = _failing_clause(common.select_rows(tables_by_name["failures"], case=result.name, filter=name), name)
     if not len(gains):
-        no_estimate = tr("{name} has no estimate that could be compared", name=name)
+        no_estimate = tr("{name} has no estimate that could be compared", name=quote_name(name))
         verdicts = [clause.with_text(f"{prefix}{clause.text}.") for clause in failing or [Sentence(no_estimate)]]
         return Judgement([*faults, *verdicts], [])
 
@@ -150,7 +150,10 @@ def _failing_clause(failures: "pd.DataFrame", name: str) -> list[Sentence]:
         if row["failed"] and row["reason"] in REASONS
     ]
     text = tr(
-        "{name} fails in {share} of the realisations ({reasons})", name=name, share=share, reasons=join_names(reasons)
+        "{name} fails in {share} of the realisations ({reasons})",
+        name=quote_name(name),
+        share=share,
+        reasons=join_names(reasons),
     )
     return [Sentence(text, sentences.intervals("failures", "share", total))]
 
@@ -184,7 +187,7 @@ def _training_clause(result: CaseResult, name: str, verdict: Sentence) -> Senten
     text = tr(
         "{name} seems to have been trained on these realisations: on other noise its σ is {ratio} times as large; "
         "here ",
-        name=name,
+        name=quote_name(name),
         ratio=numeral(f"{ratio:.3g}").replace("inf", "∞"),
     )
     return verdict.with_text(text + verdict.text)
@@ -214,7 +217,7 @@ def _verdict_sentence(comparison: RivalComparison, losses: Sequence[RivalCompari
 def _against_best(comparison: RivalComparison, best: str) -> Sentence:
     row, gain = comparison.row_against(best), comparison.gain_against(best)
     fields = {
-        "name": comparison.name,
+        "name": quote_name(comparison.name),
         "best": comparison.best_name,
         "component": row["component"],
         "t": numeral(f"{row['t_s']:g}"),
@@ -243,14 +246,15 @@ def _against_best(comparison: RivalComparison, best: str) -> Sentence:
 
 def _loss_clause(comparison: RivalComparison) -> Sentence:
     row = comparison.row_against(comparison.best)
+    best, gain = quote_name(comparison.best), comparison.gain_text(comparison.best)
     text = tr(", but worse than {best} in {component} there: gain {gain}",
-              best=comparison.best, component=row["component"], gain=comparison.gain_text(comparison.best))  # fmt: skip
+              best=best, component=row["component"], gain=gain)  # fmt: skip
     return Sentence(text, sentences.intervals("gains", "gain", row))
 
 
 def _against_tuned(comparison: RivalComparison, rival: str) -> Sentence:
     gain, rival_sigma = comparison.gain_against(rival), compared_value.row_value(comparison.rivals[rival])
-    fields = {"best": rival, "gain": comparison.gain_text(rival)}
+    fields = {"best": quote_name(rival), "gain": comparison.gain_text(rival)}
     if np.isnan(gain.estimate.lo):
         text = tr(", nor against {best}: gain {gain}", **fields)
     elif gain.estimate.lo > 0:
@@ -270,7 +274,7 @@ def _sigma_clause(comparison: RivalComparison) -> Sentence:
     own, best, unit = comparison.own_sigma, comparison.best_sigma, comparison.unit
     if comparison.is_equal and comparison.has_same_realisations:
         return Sentence(tr("the σ of both is {sigma}.", sigma=best.text(unit)), best.intervals)
-    fields = {"best": comparison.best, "sigma": own.text(unit)}
+    fields = {"best": quote_name(comparison.best), "sigma": own.text(unit)}
     if comparison.has_same_realisations:
         text = tr("its σ is {sigma}, that of {best} {rival}.", rival=best.text(unit), **fields)
         return Sentence(text, (*own.intervals, *best.intervals))
@@ -290,14 +294,14 @@ def _floor_sentence(comparison: RivalComparison) -> list[Sentence]:
     own = comparison.own_sigma.mapped(lambda sigma: round(100 * (sigma / lowest - 1), 9))  # without the rounding of σ
     rivals = {name: compared_value.row_value(row) for name, row in comparison.rivals.items()}
     above = [
-        f"{name} {sigma.mapped(lambda sigma: round(100 * (sigma / lowest - 1), 2)).text('%', '.3g')}"
+        f"{quote_name(name)} {sigma.mapped(lambda sigma: round(100 * (sigma / lowest - 1), 2)).text('%', '.3g')}"
         for name, sigma in rivals.items()
     ]
     is_of_unbiased = comparison.sigma["floor_kind"].startswith("CRB")
     fields = {
         "kind": tr(UNBIASED if is_of_unbiased else ANY),
         "floor": f"{wording.number(lowest)} {comparison.unit}".rstrip(),
-        "name": comparison.name,
+        "name": quote_name(comparison.name),
         "others": join_names(above),
     }
     if not comparison.has_same_realisations:
@@ -321,7 +325,7 @@ def _floor_sentence(comparison: RivalComparison) -> list[Sentence]:
         text += " " + tr(
             "Below it no estimator can be, biased or not, as it holds on the mean over all truths drawn: {name} "
             "knows more than these plots; was it trained on their truth?",
-            name=comparison.name,
+            name=quote_name(comparison.name),
         )
     return [Sentence(text, comparison.own_sigma.intervals)]
 
@@ -331,8 +335,10 @@ def _further_gains(comparison: RivalComparison) -> list[Sentence]:
     rows = comparison.gains[~comparison.gains["baseline"].isin([comparison.best, *comparison.equal])]
     if not len(rows):
         return []
-    against = [f"{baseline} {comparison.gain_text(baseline)}" for baseline in rows["baseline"]]
-    text = tr("Further gains of {name} there: against {gains}.", name=comparison.name, gains=join_names(against))
+    against = [f"{quote_name(baseline)} {comparison.gain_text(baseline)}" for baseline in rows["baseline"]]
+    text = tr(
+        "Further gains of {name} there: against {gains}.", name=quote_name(comparison.name), gains=join_names(against)
+    )
     return [Sentence(text, sentences.intervals("gains", "gain", rows))]
 
 
@@ -343,7 +349,7 @@ def _extreme_gains(gains: "pd.DataFrame", comparison: RivalComparison) -> list[S
         return []
     values = [compared_value.row_value(row, GAIN) for _, row in rows.iterrows()]
     if all(map(gain_sentences.is_equal, values)):
-        text = tr("It is equal to {best} in all components and at all scans.", best=comparison.best)
+        text = tr("It is equal to {best} in all components and at all scans.", best=quote_name(comparison.best))
         return [Sentence(text)]
     extremes = [compared_value.extreme(rows, GAIN, largest) for largest in (False, True)]
     smallest, largest = (
@@ -357,7 +363,7 @@ def _extreme_gains(gains: "pd.DataFrame", comparison: RivalComparison) -> list[S
     )
     text = tr(
         "Over all components and scans its gain against {best} is from {least} to {most}{chosen}.",
-        best=comparison.best,
+        best=quote_name(comparison.best),
         least=smallest,
         most=largest,
         chosen=extremes[0][1].choice_remark(),
@@ -371,11 +377,11 @@ def _consistency_sentence(result: CaseResult, name: str, tables_by_name: TablesB
         common.select_rows(tables_by_name["nees"], case=result.name, filter=name) if "nees" in tables_by_name else None
     )
     if rows is None or not len(rows):
-        return Sentence(tr("Its consistency is not judged, as {name} gives no covariances.", name=name))
+        return Sentence(tr("Its consistency is not judged, as {name} gives no covariances.", name=quote_name(name)))
     row = rows.iloc[-1]
     text = tr(
         "NEES of {name} at {t} s: {nees} (1 is right): {meaning}.",
-        name=name,
+        name=quote_name(name),
         t=numeral(f"{row['t_s']:g}"),
         nees=wording.estimate((row[key] for key in ("nees", "nees_lo", "nees_hi")), "", ".3g"),
         meaning=tr(CONSISTENCY[row["nees_verdict"]]),
@@ -393,6 +399,6 @@ def _improper_sentence(result: CaseResult, name: str, tables_by_name: TablesByNa
         "part of NEES.",
         count=count,
         n=int(improper["n"].iloc[0]),
-        name=name,
+        name=quote_name(name),
     )
     return [Sentence(text)]

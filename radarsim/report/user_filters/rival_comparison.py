@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import join_names, tr
+from radarsim.language.translate import list_filters, quote_name, tr
 from radarsim.report import compared_value, gain_sentences, key_labels
 from radarsim.report import tables as common
 from radarsim.report.compared_value import ComparedValue
@@ -43,9 +43,8 @@ class RivalComparison:
     @property
     def best_name(self) -> str:
         """The config's best filter in a sentence, with those that are equal to it."""
-        return (
-            tr("{name} (equal to {others})", name=self.best, others=join_names(self.equal)) if self.equal else self.best
-        )
+        name = quote_name(self.best)
+        return tr("{name} (equal to {others})", name=name, others=list_filters(self.equal)) if self.equal else name
 
     @property
     def best_sigma(self) -> ComparedValue:

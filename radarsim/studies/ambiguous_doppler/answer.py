@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, plural, tr
+from radarsim.language.translate import join_names, plural, quote_name, tr
 from radarsim.report import case_selection, compared_value, key_labels, rare_events, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue, is_equal
 from radarsim.report.sentences import Sentence
@@ -98,7 +98,7 @@ def _case_sentences(result: Result, tables_by_name: TablesByName, scans: Mapping
     case_sentences = []
     spans = wording.list_numbers(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _reported_filters(result):
-        subject = f"{key_labels.plain_case_label(result)}, D = {spans} {tr('m/s')}, {name}"
+        subject = f"{key_labels.plain_case_label(result)}, D = {spans} {tr('m/s')}, {quote_name(name)}"
         clauses = [
             *_as_good_clause(result, name, tables_by_name),
             *(_wrong_folds_sought(result, name, tables_by_name) or _right_folds(result, name, tables_by_name)),
@@ -170,15 +170,16 @@ def _least_error_of_all(
     equal = [name for name in same_kind if is_equal(_largest_sigma(worst_rows[name][0]), best_value)]
     since_texts = {wording.since(*scans[result.name]) for result in combining}
     text = plural(
-        "Least σ of the range at worst, {since}: {best}, {least}; {kind}, {other}, comes to {most} ({where}){scans}.",
-        "Least σ of the range at worst, {since}, in {count} cases: {best}, {least}; {kind}, {other}, comes to {most} "
+        "Smallest worst-case σ of the range {since}: {best}, {least}; {kind}, {other}, reaches {most} "
         "({where}){scans}.",
+        "Smallest worst-case σ of the range {since}, over {count} cases: {best}, {least}; {kind}, {other}, reaches "
+        "{most} ({where}){scans}.",
         len(combining),
         since=since_texts.pop() if len(since_texts) == 1 else tr("after the start of the track"),
-        best=join_names(equal),
+        best=join_names([*map(quote_name, equal)]),
         least=_sigma_m(best_row),
         kind=tr("the best combination") if other_kind[0] in combinations else tr("the best single model order"),
-        other=other_kind[0],
+        other=quote_name(other_kind[0]),
         most=_sigma_m(other_row),
         where=key_labels.plain_case_label(other_case),
         scans=_scans_remark((best_row, other_row)),
@@ -194,7 +195,7 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
     if not len(worst):
         return []
     errors = [
-        tr("{filter}, {sigma} at scan {k}", filter=row["filter"], sigma=_sigma_m(row), k=row["k"])
+        tr("{filter}, {sigma} at scan {k}", filter=quote_name(row["filter"]), sigma=_sigma_m(row), k=row["k"])
         for _, row in worst.iterrows()
     ]
     remark = _scans_remark(row for _, row in worst.iterrows())
@@ -249,9 +250,9 @@ def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -
     worst = {name: max(cases, key=lambda case: case[:3]) for name, cases in comparisons.items()}
     best_name = min(comparisons, key=lambda name: (-good[name], worst[name][:3]))
     text = tr(
-        "{filter}: as good as unfolded velocity, within {percent:g} %, in {good} of {count} cases by the last "
-        "scan; {worst}.",
-        filter=best_name,
+        "{filter}: σ of the velocity is within {percent:g} % of that with unfolded velocity in {good} of {count} "
+        "cases at the last scan; worst case, {worst}.",
+        filter=quote_name(best_name),
         percent=AS_GOOD_PERCENT,
         good=good[best_name],
         count=len(comparisons[best_name]),
@@ -292,7 +293,9 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, loo
         return []
     if since := _first_good_scan(gains):
         text = tr(
-            "as good as unfolded velocity, within {percent:g} %, from scan {k} on", percent=AS_GOOD_PERCENT, k=since
+            "σ of the velocity is within {percent:g} % of that with unfolded velocity from scan {k} on",
+            percent=AS_GOOD_PERCENT,
+            k=since,
         )
         return [Sentence(text, _near_the_limit(gains[gains["k"] >= since]))]
     final = gains.iloc[-1]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-DRAWN_FROM = {"right": ("folds",), "lost": ("folds",)}
+DRAWN_FROM = {"right": ("folds.right",), "lost": (f"folds.{BEYOND_SHARE}",)}
 
 
 def figures(
@@ -44,8 +44,8 @@ SHARES = {  # figure: column of folds.csv, title of the axis, caption
         "right",
         term("P(all folds right)"),
         term(
-            "Share of realisations in which all folds so far are right, for the best hypothesis; exact for the "
-            "nearest fold where truth and filter agree, and for the Chinese remainder of two scans."
+            "Share of realisations in which the best hypothesis has all folds right so far. Exact: the nearest fold, "
+            "if the filter's model is true, and the Chinese remainder of two scans."
         ),
     ),
     "lost": (
@@ -110,8 +110,8 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
     if not rare_panels:
         return {}
     caption = tr(
-        "Share of realisations in which a fold is wrong by the last scan, for the best hypothesis, of "
-        "{realisations} each.",
+        "Share of realisations in which the best hypothesis has a wrong fold by the last scan, from {realisations} "
+        "each.",
         realisations=case_selection.realisations_text(results),
     ) + "".join(dict.fromkeys(notes))
     figure = panel_layout.arrange_columns(Figure("right", tr("P(a fold is wrong)"), caption, tuple(rare_panels)))

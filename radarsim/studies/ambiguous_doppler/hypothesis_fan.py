@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.kernels.hypotheses import COLUMNS
 from radarsim.kernels.lanes import WIDTH
-from radarsim.language.translate import tr
+from radarsim.language.translate import quote_name, tr
 from radarsim.report import case_selection, key_labels, panel_layout
 from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.ambiguous_doppler.kernels import layout, realisations
@@ -71,13 +71,13 @@ def hypotheses_figure(cases: Sequence[Case]) -> dict[str, Figure]:
     fan_panels = [replace(panel, title=title) for title, panel in panels_by_title.items()]
     counts = [len(velocities) for velocities, _, _ in next(iter(fans.values())).lists]
     caption = tr(
-        "Fold sequences kept in realisation 7, {name}: {first} at first, {last} after {scans} scans. A line for each, "
-        "with its velocity and acceleration; broader: more probable. Dots: the true velocity.",
+        "Hypotheses on the folds in realisation 7, {name}: {first} after the first scan, {last} after {scans}. Each "
+        "line has a hypothesis's velocity and acceleration, the more probable the thicker. Dots: the true velocity.",
         **{
             "first": counts[0],
             "last": counts[-1],
             "scans": len(counts),
-            "name": key_labels.without_markup(fan_panels[0].title),
+            "name": quote_name(key_labels.without_markup(fan_panels[0].title)),
         },
     ) + case_selection.left_out_remark(stems, list(fans))
     columns = min(2, len(fan_panels))

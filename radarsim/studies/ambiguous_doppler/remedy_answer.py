@@ -10,7 +10,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import tr
+from radarsim.language.translate import quote_name, tr
 from radarsim.report import key_labels, tables
 from radarsim.report.sentences import Sentence
 from radarsim.studies.ambiguous_doppler.config import MAX_HYPOTHESES, Prior, states_speed
@@ -59,11 +59,11 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
             continue
         count = min(max(result.count, TRIAL_REALISATIONS), MAX_TRIAL_REALISATIONS)
         tried = list(islice(cures(result.spec, name, dict(result.swept_values), count), MAX_NAMED))
-        fields = {"case": key_labels.plain_case_label(result), "filter": name, "count": count}
+        fields = {"case": key_labels.plain_case_label(result), "filter": quote_name(name), "count": count}
         if not tried:
             text = tr(
-                "{case}, {filter}: nothing helps of what was tried on {count} realisations: a larger D_M, rates in "
-                "turn, two orders, more hypotheses, another prior.",
+                "{case}, {filter}: none of these helps (tried on {count} realisations): a larger D_M, alternating "
+                "repetition rates, two model orders, more hypotheses, another prior.",
                 **fields,
             )
             return [Sentence(text)]

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import plural, shorten_names, term, tr
+from radarsim.language.translate import list_filters, plural, quote_name, term, tr
 from radarsim.report import (
     case_selection,
     compared_value,
@@ -36,7 +36,7 @@ def question(experiment: Experiment) -> str:
     names = list(dict.fromkeys(e.name for case in experiment.cases for e in case.spec.estimators))
     return tr(
         "How often does the Doppler estimate of a burst lock, and how accurate is it then ({estimators})?",
-        estimators=shorten_names(names),
+        estimators=list_filters(names),
     )
 
 
@@ -49,7 +49,7 @@ def answer(results: Sequence[CaseResult], tables_by_name: TablesByName) -> list[
     reported = reported or list(results)
     answer = _worst_against_design(results, tables_by_name)
     for result in reported:
-        prefix = f"{key_labels.plain_case_label(result)}, " if len(reported) > 1 else ""
+        prefix = f"{key_labels.plain_case_label(result)}: " if len(reported) > 1 else ""
         for sentence in _case_sentences(result, tables_by_name):
             answer.append(sentence.with_text(prefix + sentence.text))
     return answer
@@ -72,9 +72,9 @@ def _worst_against_design(results: Sequence[CaseResult], tables_by_name: TablesB
     times, designed, row = max(losses, key=lambda loss: loss[0])
     rate = compared_value.row_value(row, LOSS).chosen_among(len(losses))
     text = tr(
-        "{estimator} loses lock in {rate} of the bursts where it was designed for {designed:.3g}, {times:.3g} times as "
-        "often, the most of {count} cases (interval for all of them).",
-        estimator=row["filter"],
+        "{estimator} loses lock in {rate} of the bursts, {times:.3g} times the {designed:.3g} of its design: the "
+        "largest ratio of {count} cases (interval for all of them).",
+        estimator=quote_name(row["filter"]),
         rate=rate.text(form=".3g"),
         designed=designed,
         times=times,
@@ -91,8 +91,8 @@ def _case_sentences(result: CaseResult, tables_by_name: TablesByName) -> list[Se
         case_sentences.append(_rate_of_losses(tables.group_by(tables_by_name["rare"], "case")[(result.name,)]))
     if other_names:
         rows = [last_locks(tables_by_name, result, name) for name in other_names]
-        locks = "; ".join(f"{name}, {_lock_rate(row)}" for name, row in zip(other_names, rows, strict=True))
-        case_sentences.append(Sentence(tr("locks of the others: {locks}.", locks=locks), _lock_intervals(*rows)))
+        locks = "; ".join(f"{quote_name(name)}, {_lock_rate(row)}" for name, row in zip(other_names, rows, strict=True))
+        case_sentences.append(Sentence(tr("Lock rates of the others: {locks}.", locks=locks), _lock_intervals(*rows)))
     return case_sentences
 
 
@@ -101,11 +101,11 @@ def _first_estimator(result: CaseResult, row: "pd.Series[Any]", name: str) -> Se
 
     Where losses of lock are sought, a part of the bursts is shifted: the rate of losses has a sentence of its own."""
     k = int(row["k"])
-    fields: dict[str, Any] = {"estimator": name, "lock": _lock_rate(row), "bursts": result.count}
+    fields: dict[str, Any] = {"estimator": quote_name(name), "lock": _lock_rate(row), "bursts": result.count}
     if not row["lock_rate"]:
         text = plural(
-            "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts.",
-            "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts.",
+            "{estimator} ({count} window): locked in {lock} of {bursts:,} bursts.",
+            "{estimator} ({count} windows): locked in {lock} of {bursts:,} bursts.",
             k,
             **fields,
         )
@@ -119,20 +119,20 @@ def _first_estimator(result: CaseResult, row: "pd.Series[Any]", name: str) -> Se
     fields |= {name: wording.estimate((end[i] / bound[i] for end in sigma), form=".3f") for name, i in ratios.items()}
     if result.spec.rare is not None:
         text = plural(
-            "{estimator}: {count} window; σ of the locked over the bound (forecast included) {least} to {most}, "
-            "of {plain:,} bursts without importance sampling.",
-            "{estimator}: {count} windows; σ of the locked over the bound (forecast included) {least} to {most}, "
-            "of {plain:,} bursts without importance sampling.",
+            "{estimator} ({count} window): σ of the locked bursts over the bound (forecast included) is {least} to "
+            "{most}, from {plain:,} bursts without importance sampling.",
+            "{estimator} ({count} windows): σ of the locked bursts over the bound (forecast included) is {least} to "
+            "{most}, from {plain:,} bursts without importance sampling.",
             k,
             plain=int(plain_bursts),
             **fields,
         )
         return Sentence(text)
     text = plural(
-        "{estimator}: {count} window, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
-        "(forecast included) {least} to {most}.",
-        "{estimator}: {count} windows, locked in {lock} of {bursts:,} bursts; σ of the locked over the bound "
-        "(forecast included) {least} to {most}.",
+        "{estimator} ({count} window): locked in {lock} of {bursts:,} bursts; σ of the locked ones over the bound "
+        "(forecast included) is {least} to {most}.",
+        "{estimator} ({count} windows): locked in {lock} of {bursts:,} bursts; σ of the locked ones over the bound "
+        "(forecast included) is {least} to {most}.",
         k,
         **fields,
     )
@@ -152,9 +152,9 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
     )
     text = plural(
         "{estimator}: locked in {least} to {most}; {count} case of {realisations}.",
-        "{estimator}: locked in {least} to {most}; {count} cases of {realisations} (intervals for all of them).",
+        "{estimator}: locked in {least} to {most}; {count} cases of {realisations} each (intervals for all of them).",
         len(cases),
-        estimator=name,
+        estimator=quote_name(name),
         least=lowest,
         most=highest,
         realisations=case_selection.realisations_text(cases),
@@ -177,14 +177,14 @@ def _rate_of_losses(rates: "pd.DataFrame") -> Sentence:
     if not rare_events.is_estimated(row):
         text = tr(
             "{estimator}: probability of a lost lock: no estimate (effective sample size {n_eff:,.0f}).",
-            estimator=row["filter"],
+            estimator=quote_name(row["filter"]),
             n_eff=row["n_eff"],
         )
         return Sentence(text, sentences.intervals("rare", "event_rate", row))
     text = tr(
         "{estimator}: lock is lost in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts (importance sampling; "
         "{events:,} events, effective sample size {n_eff:,.0f}).",
-        estimator=row["filter"],
+        estimator=quote_name(row["filter"]),
         **rare_events.rate_fields(row),
     )
     return Sentence(text, sentences.intervals("rare", "event_rate", row))

@@ -8,7 +8,7 @@ import numpy as np
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import term, tr
+from radarsim.language.translate import quote_name, term, tr
 from radarsim.report import case_selection, figure_lines, key_labels, panel_layout, tables
 from radarsim.report.drawing.model import GREY, PAGE_MM, Axis, Figure, Heat, Line, Panel, Reference, Style
 from radarsim.studies.discriminator.one_burst import one_burst
@@ -110,9 +110,9 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
         title = f"{letter}  {tr(QUANTITIES[component])}"
         panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), y, marks, title, direct=False))
     caption = tr(
-        "Windows of {name!r} and absolute error of each component: median and band from 5 to 95 % of {count:,} "
+        "Windows of {name} and absolute error of each component: median and band from 5 to 95 % of {count:,} "
         "bursts, locked or not. Dashed: three times the Cramér–Rao bound, prior included. Dotted: the first burst.",
-        name=name,
+        name=quote_name(name),
         count=result.count,
     )
     title = tr("Errors against the window (figure 2)")
@@ -128,7 +128,7 @@ def locks(result: CaseResult, tables_by_name: Mapping) -> Figure:
         filter_rows = rows[(result.name, name)]
         marks.append(figure_lines.line_from_rows(filter_rows, ("t_s", "lock_rate", "lock_lo", "lock_hi"), name, n))
     caption = tr(
-        "Locked: every component within five times the Cramér–Rao bound of the window; of {count:,} bursts.",
+        "Locked: every component within five times the Cramér–Rao bound of the window. From {count:,} bursts.",
         count=result.count,
     )
     panel, remark = _shares(Axis(tr(WINDOW_LABEL), "log"), marks, 0)
@@ -167,8 +167,8 @@ def accuracy(result: CaseResult, tables_by_name: Mapping) -> Figure:
             axis = Axis(tr("$\\sigma$ / bound"), limits=(0.9, 1.3))
             panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), axis, tuple(marks), name, direct=False))
     caption = tr(
-        "Root-mean-square error of the locked bursts over the Cramér–Rao bound of the window, prior "
-        "included, of {count:,} bursts.",
+        "Root-mean-square error of the locked bursts divided by the Cramér–Rao bound of the window (prior included), "
+        "from {count:,} bursts.",
         count=result.count,
     )
     columns = min(3, max(1, len(panels)))
@@ -193,7 +193,7 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], tables_by_n
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     key_name = key_labels.key_label(members[0], key).text
     caption = tr(
-        "Lock in the last window against the {called}, of {count:,} bursts each.",
+        "Share of bursts locked in the last window against the {called}, from {count:,} each.",
         called=key_name,
         count=members[0].count,
     )
@@ -228,8 +228,8 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ta
     panels.append(lock_border_panel(keys, members, tables_by_name, x, y))
     second = key_labels.key_label(members[0], keys[1]).text
     caption = tr(
-        "Share of bursts locked at the end, of {count:,} a cell. Last: the largest {second} up to which its whole "
-        "95 % interval lies above {sure:g}, which estimators without a line reach nowhere.",
+        "Share of bursts locked at the end, from {count:,} per cell. Last panel: the largest {second} up to which "
+        "the lower end of its interval is above {sure:g}; estimators without a line never reach it.",
         second=second,
         count=members[0].count,
         sure=CERTAIN_LOCK_RATE,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import plural, shorten_names, term, tr
+from radarsim.language.translate import list_filters, plural, quote_name, term, tr
 from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
@@ -21,14 +21,14 @@ def question(experiment: Experiment) -> str:
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
     cases = len(experiment.cases)
     if len(filters) == 1:
-        return tr("How accurately does {filter} track the target?", filter=filters[0])
+        return tr("How accurately does {filter} track the target?", filter=quote_name(filters[0]))
     if cases == 1:
-        return tr("Which filter tracks the target best: {filters}?", filters=shorten_names(filters))
+        return tr("Which filter tracks the target best: {filters}?", filters=list_filters(filters))
     return plural(
         "Which filter tracks the target best in {count} case: {filters}?",
         "Which filter tracks the target best in {count} cases: {filters}?",
         cases,
-        filters=shorten_names(filters),
+        filters=list_filters(filters),
     )
 
 
@@ -89,26 +89,27 @@ def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") 
         for row in (closest, second)
     ]
     fields = {
-        "filter": closest["filter"],
-        "second": second["filter"],
+        "filter": quote_name(closest["filter"]),
+        "second": quote_name(second["filter"]),
         "more": above[1],
         "where": _stage_label(results, second),
         "count": len(rows),
     }
     if not closest["above"]:
         text = tr(
-            "Least σ of the height in every stage: {filter}; next {second}, at most {more} above it ({where}; interval "
-            "for all {count} compared).",
+            "Least σ of the height in every stage: {filter}; next is {second}, at most {more} above it ({where}; "
+            "interval for all {count} compared).",
             **fields,
         )
         return [Sentence(text, sentences.intervals("stages", "sigma", second))]
     text = tr(
-        "Closest to the best filter of {every}: {filter}, σ of the height at most {percent} above the least "
-        "({closest_where}: {best}); next {second}, {more} ({where}); intervals for all {count} compared.",
+        "Never far from the best filter of {every}: {filter}, with σ of the height at most {percent} above the least "
+        "({closest_where}, by {best}); next is {second}, at most {more} above it ({where}); intervals for all "
+        "{count} compared.",
         every=tr("each stage of every case") if len(results) > 1 else tr("each stage"),
         percent=above[0],
         closest_where=_stage_label(results, closest),
-        best=best_by_stage.loc[(closest["case"], closest["stage"])],
+        best=quote_name(best_by_stage.loc[(closest["case"], closest["stage"])]),
         **fields,
     )
     return [Sentence(text, sentences.intervals("stages", "sigma", closest, second))]

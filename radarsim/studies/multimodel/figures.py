@@ -172,9 +172,7 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
         "The true flight, its ground track at one scale north and east with the radar at the origin. Dotted: ends of "
         "the stages."
     )
-    return _with_paper_number(
-        _figure_of_panels("trajectory", tr("Flight"), caption, flight_panels, 56), results, "1 … 4"
-    )
+    return _with_paper_number(_figure_of_panels("trajectory", tr("Flight"), caption, flight_panels, 56), results, "1–4")
 
 
 def _landmarks(tracks: Sequence[Line]) -> list[Line | Note]:
@@ -228,7 +226,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
     elif len(sigma_panels) > 1:
         sigma_panels = panel_layout.share_y_axis(sigma_panels)
     caption = tr(
-        "Root-mean-square error of {quantity} about the truth, of {count:,} realisations. Dotted: ends of the stages.",
+        "Root-mean-square error of {quantity}, from {count:,} realisations. Dotted: ends of the stages.",
         quantity=quantity,
         count=results[0].count if results else 0,
     )

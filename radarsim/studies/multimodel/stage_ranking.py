@@ -5,7 +5,7 @@ The least is chosen by the values themselves: a gain decides by an interval that
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import shorten_names, tr
+from radarsim.language.translate import list_filters, quote_name, tr
 from radarsim.report import gain_sentences, statistics
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.statistics import Estimate
@@ -32,10 +32,10 @@ def least_filters(result: CaseResult, rows: "pd.DataFrame", best: "pd.Series[Any
     }
     equal = [name for name, gain in gains.items() if gain.hi - gain.lo < gain_sentences.SINGLE and not gain.lo > 0]
     close = [name for name, gain in gains.items() if not gain.lo > 0 and name not in equal]
-    equal_names = " = ".join([best["filter"], *equal])
+    equal_names = " = ".join(map(quote_name, [best["filter"], *equal]))
     if not close:
         return equal_names
-    others = shorten_names(close, MAX_CLOSE_NAMES)
+    others = list_filters(close, MAX_CLOSE_NAMES)
     return tr("{filter} (not distinguished from it: {others})", filter=equal_names, others=others)
 
 

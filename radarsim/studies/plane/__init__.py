@@ -22,6 +22,7 @@ from radarsim.kernels.polar_filters import is_fold_known, law_of_plot, plot_diff
 from radarsim.kernels.polar_plots import polar, polar_rows, speed_and_course_rows, state_of_plot
 from radarsim.kernels.small_matrices import congruence, dot
 from radarsim.kernels.tracing import maximum, sqrt, where
+from radarsim.language.translate import term
 from radarsim.studies.planar import PlanarStudy
 from radarsim.studies.stepwise import Steps
 
@@ -216,7 +217,7 @@ class Plane(PlanarStudy):
     """Filters of a target in the plane."""
 
     name, about = "plane", "Range, bearing and radial velocity in the plane, among false plots."
-    asks = "What is Doppler worth in the plane?"
+    asks = term("How much does Doppler help a tracker in the plane?")
     filters = MappingProxyType(
         {"kind": "extended, unscented, converted or imm", "model": "velocity, acceleration or turn"}
     )

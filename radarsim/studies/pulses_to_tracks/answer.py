@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, term, tr
+from radarsim.language.translate import join_names, quote_name, term, tr
 from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
 from radarsim.report.quantities import LOCK, Quantity
 from radarsim.report.sentences import Sentence
@@ -76,11 +76,11 @@ def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName)
     if not len(worst):
         return []
     ratios = [
-        f"{row['filter']} {_ratio(row, looks=len(results))} ({case_names[row['case']]})"
+        f"{quote_name(row['filter'])} {_ratio(row, looks=len(results))} ({case_names[row['case']]})"
         for row in worst.to_dict("records")
     ]
     text = tr(
-        "σ of the range at the last scan over its idealisation's, at worst of {count} cases: {found} (intervals for "
+        "Largest σ of the range at the last scan over that of ideal bursts, in {count} cases: {found} (intervals for "
         "all cases).",
         count=len(results),
         found="; ".join(ratios),
@@ -101,7 +101,7 @@ def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Senten
             case_sentences.append(clause.with_text(f"{case}: {clause.text}."))
     for name in filters:
         clause = _locks_and_ratio(result, tables_by_name, name)
-        case_sentences.append(clause.with_text(f"{case}, {name}: {clause.text}."))
+        case_sentences.append(clause.with_text(f"{case}, {quote_name(name)}: {clause.text}."))
     return [*case_sentences, _burst_sentence(result, case, bound.min())]
 
 
@@ -111,8 +111,8 @@ def _burst_sentence(result: Result, case: str, sigma: float) -> Sentence:
     low, high = float(energy_db.min()), float(energy_db.max())
     energy = tr("{low:.3g} dB", low=low) if high - low < 0.05 else tr("{low:.3g} to {high:.3g} dB", low=low, high=high)
     text = tr(
-        "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all, allow σ_V = {sigma:.3g} m/s (Cramér–Rao "
-        "bound).",
+        "{case}: {pulses} pulses in {burst_ms:.3g} ms, {energy} in all. An ideal burst always locks and reaches the "
+        "Cramér–Rao bound, σ_V = {sigma:.3g} m/s.",
         case=case,
         pulses=spec.pulses,
         burst_ms=1e3 * spec.burst_s,
@@ -134,11 +134,11 @@ def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters:
     if not compared_value.are_distinguished(*values):
         return []
     text = tr(
-        "with {best} σ of the range at the last scan is {near} times its idealisation's, with {worst} {far} times"
-        "{chosen}",
-        best=nearest["filter"],
+        "σ of the range at the last scan is {near} times that of ideal bursts with {best}, and {far} times with "
+        "{worst}{chosen}",
+        best=quote_name(nearest["filter"]),
         near=_ratio(nearest, looks=len(filters)),
-        worst=furthest["filter"],
+        worst=quote_name(furthest["filter"]),
         far=_ratio(furthest, looks=len(filters)),
         chosen=values[0].choice_remark(),
     )
@@ -151,18 +151,16 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
     _, least = compared_value.extreme(locks, LOCK, largest=False)
     if least.value == 1:
         low = numeral(f"{math.floor(1e4 * least.estimate.lo) / 100:.2f}")
-        locked = tr("{low} % or more of the bursts of a scan lock", low=low) + least.choice_remark()
+        locked = tr("at the worst scan {low} % or more of the bursts lock", low=low) + least.choice_remark()
     else:
         share = wording.share(*(100 * end for end in least.estimate)) + least.choice_remark()
-        locked = tr("at least {share} of the bursts of a scan lock", share=share)
+        locked = tr("at the worst scan {share} of the bursts lock", share=share)
     ratios = tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
     final = ratios.iloc[-1]
     if final[RATIO.ends[1]] <= MAX_RATIO_OF_IDEAL:
-        ratio = tr(
-            "σ of the range at the last scan is that of its idealisation, {ratio} times", ratio=_ratio(final, ".4g")
-        )
+        ratio = tr("σ of the range at the last scan is as with ideal bursts, {ratio} times", ratio=_ratio(final, ".4g"))
     else:
-        ratio = tr("σ of the range at the last scan is {ratio} times its idealisation's", ratio=_ratio(final))
+        ratio = tr("σ of the range at the last scan is {ratio} times that of ideal bursts", ratio=_ratio(final))
     return Sentence(f"{locked}; {ratio}", (*least.intervals, *_ratio_intervals(final)))
 
 

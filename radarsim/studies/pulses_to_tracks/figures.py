@@ -64,8 +64,8 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
     if not any(panel.marks for panel in threshold_panels):
         return {}
     caption = tr(
-        "P(not locked): share of bursts, at the worst scan, whose velocity (or acceleration, where used) is in error "
-        "by more than five times its Cramér–Rao bound; no point where all lock, and no estimator with a single point."
+        "P(not locked): share of bursts at the worst scan whose velocity (or acceleration, if used) errs by more "
+        "than five times its Cramér–Rao bound. No point if all lock; no estimator with a single point."
     )
     figure = Figure(
         "threshold",

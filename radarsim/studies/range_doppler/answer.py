@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from radarsim.config.experiment import Experiment
-from radarsim.language.translate import join_names, plural, tr
+from radarsim.language.translate import join_names, plural, quote_name, tr
 from radarsim.report import compared_value, key_labels, sentences, tables, wording
 from radarsim.report.quantities import SIGMA
 from radarsim.report.sentences import Sentence
@@ -27,7 +27,9 @@ def question(experiment: Experiment) -> str:
     if any("velocity" in f.observes for case in experiment.cases for f in case.spec.filters):
         return tr("How much does Doppler reduce the tracking errors of {radars}?", radars=join_names(names))
     return tr(
-        "How large are the errors of {radars} with {filters}?", radars=join_names(names), filters=join_names(filters)
+        "How large are the errors of {radars} with {filters}?",
+        radars=join_names(names),
+        filters=join_names([*map(quote_name, filters)]),
     )
 
 
@@ -102,7 +104,7 @@ def _worst_errors(rows: "pd.DataFrame", filter_name: str) -> Sentence:
         bias_t_s=most_biased["t_s"],
         chosen=sigma.choice_remark() or bias.choice_remark(),
     )
-    return Sentence(f"{filter_name}: {text}", sigma.intervals)
+    return Sentence(f"{quote_name(filter_name)}: {text}", sigma.intervals)
 
 
 def _ambiguity_sentences(results: Sequence[Result]) -> list[Sentence]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.config.experiment import Experiment
-from radarsim.language.translate import term, tr
+from radarsim.language.translate import quote_name, term, tr
 from radarsim.report import (
     caption_remarks,
     case_selection,
@@ -141,11 +141,11 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     if not panels:
         return None
     caption = tr(
-        "Exact steady σ of the range against its settling time, to within 5 %; grey lines join equal manoeuvre "
-        "variances. Star: the least error settled within ten scan periods (dotted)."
+        "Exact steady σ of the range against the time to settle within 5 % of it. Grey lines join equal manoeuvre "
+        "variances. Star: the least σ that settles within ten scan periods (dotted)."
     )
     if names := _unsettled_filters(panels):
-        caption += " " + tr("Without one: {names}.", names=caption_remarks.join_few_names(names))
+        caption += " " + tr("Without one: {names}.", names=caption_remarks.join_few_names(map(quote_name, names)))
     caption += case_selection.left_out_remark(titles, [panel.title for panel in panels])
     return panel_layout.arrange_columns(
         Figure("settling", tr("Steady error against settling time"), caption, tuple(panels))

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Case
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, tr
+from radarsim.language.translate import join_names, quote_name, tr
 from radarsim.report import case_selection, compared_value, gain_sentences, key_labels, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import GAIN, RADIAL
@@ -98,8 +98,8 @@ def _gain_sentence(
             text = tr("{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}", **fields)
         else:
             text = tr(
-                "{quantity}: at {t_s:g} s, the last scan, σ with filter '{filter}' is {gain} {base}",
-                filter=shown["filter"],
+                "{quantity}: at {t_s:g} s, the last scan, σ with filter {filter} is {gain} {base}",
+                filter=quote_name(shown["filter"]),
                 **fields,
             )
         clauses = [Sentence(text, final_gain.intervals), *_long_run_clause(_long_run_gain(results, shown))]
@@ -268,12 +268,12 @@ def _with_baseline(results: Sequence[Result]) -> str:
             return tr("with range alone at the same D_M")
         return tr("with range alone")
     if len({f.name for f in baselines}) == 1:
-        return tr("with filter '{filter}'", filter=baselines[0].name)
+        return tr("with filter {filter}", filter=quote_name(baselines[0].name))
     return tr("with the baseline filter")
 
 
 def _case_label(row: "pd.Series[Any]", labels: Mapping[str, str], has_several_filters: bool) -> str:
-    return labels[row["case"]] + (f", {row['filter']}" if has_several_filters else "")
+    return labels[row["case"]] + (f", {quote_name(row['filter'])}" if has_several_filters else "")
 
 
 def _capitalised(quantity: str) -> str:
@@ -289,7 +289,7 @@ def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> Sentence:
     text = tr(
         "{case}, {filter}: σ of the range at {t_s:g} s is {sigma}.",
         case=key_labels.plain_case_label(result),
-        filter=row["filter"],
+        filter=quote_name(row["filter"]),
         t_s=row["t_s"],
         sigma=sigma.text(tr("m")),
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.language.translate import plural, term, tr
+from radarsim.language.translate import plural, quote_name, term, tr
 from radarsim.report import case_selection, key_labels, tables
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import RADIAL
@@ -103,7 +103,7 @@ def _best_variance(rows: "pd.DataFrame", filter_name: str) -> str:
     row = best.iloc[0]
     return tr(
         "{filter} {variance} (σ {sigma:.4g} m, settled after {settling:g} s)",
-        filter=filter_name,
+        filter=quote_name(filter_name),
         variance=key_labels.format_value(float(row["manoeuvre_variance"]), powers=True),
         sigma=row["steady_sigma"],
         settling=row["settling_s"],
@@ -238,7 +238,7 @@ def _optimised_gains(result: Result, case: str) -> list[Sentence]:
 def _optimised_variance(result: Result, filter_name: str, objective: Best, variance: float) -> str:
     axes = result.axes
     fields = {
-        "filter": filter_name,
+        "filter": quote_name(filter_name),
         "variance": key_labels.format_value(variance, powers=True),
         "rule": tr(
             CRITERION_TEXTS[str(objective.over)], error=objective.minimise, t_s=axes.t_s[(objective.from_k or 1) - 1]

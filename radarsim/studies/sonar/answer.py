@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import shorten_names, tr
+from radarsim.language.translate import list_filters, quote_name, shorten_names, tr
 from radarsim.report import case_selection, compared_value, key_labels, statistics, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
@@ -35,7 +35,7 @@ def question(specs: Sequence[Keys]) -> str:
     if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
         return tr("What does a missed plot cost?")
     names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
-    return tr("How accurate are smoothed range and bearing ({filters})?", filters=shorten_names(names))
+    return tr("How accurate are smoothed range and bearing ({filters})?", filters=list_filters(names))
 
 
 def _has_correlated_errors(specs: Sequence[Keys]) -> bool:
@@ -72,8 +72,8 @@ def _bias_of_conversion(
     result = next(result for result in results if result.name == worst["case"])
     ratio = float(worst["formula_m"] / worst["sigma_range_m"])
     text = tr(
-        "Largest bias of a plot along the line of sight, converted plainly: {bias} (exact), {ratio} σ of the range "
-        "({case})",
+        "Bias of a converted plot along the line of sight: with the plain conversion up to {bias} (exact), {ratio} σ "
+        "of the range ({case})",
         bias=f"{wording.number(float(worst['formula_m']), 3)} {tr('m')}",
         ratio=wording.number(ratio, 3),
         case=key_labels.without_markup(
@@ -81,7 +81,7 @@ def _bias_of_conversion(
         ),
     )
     if any(tables_by_name["conversion"]["frame"] == "cartesian_unbiased"):
-        text += "; " + tr("converted without bias: none (exact)")
+        text += "; " + tr("with the unbiased one none (exact)")
     return [f"{text}."]
 
 
@@ -125,7 +125,8 @@ def _is_surely_less(
 
 def _filters_and_sigma(rows: "pd.DataFrame", sigma: ComparedValue) -> str:
     """Filters of equal σ, and it with the interval."""
-    return f"{shorten_names(list(rows['filter']))}, {sigma.text(key_labels.unit_label(rows['unit'].iloc[0]))}"
+    names = list_filters(rows["filter"])
+    return f"{names}, {sigma.text(key_labels.unit_label(rows['unit'].iloc[0]))}"
 
 
 def _most_optimistic(
@@ -152,7 +153,9 @@ def _most_optimistic(
         return []
     result = next(result for result in results if result.name == worst["case"])
     filters = tables.select_rows(curves, case=worst["case"], component=worst["component"], k=worst["k"])
-    equal = shorten_names(list(filters["filter"][(filters["ratio"] - worst["ratio"]).abs() < EQUAL_RATIOS]))
+    equal = shorten_names(
+        [*map(quote_name, filters["filter"][(filters["ratio"] - worst["ratio"]).abs() < EQUAL_RATIOS])]
+    )
     swept = key_labels.without_markup(key_labels.swept_description(result))
     text = tr(
         "Most optimistic {since}: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan "

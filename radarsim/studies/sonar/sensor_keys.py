@@ -106,7 +106,7 @@ class Sensor(Model):
     further: tuple[FurtherSensor, ...] = key("further sonars", "further sonars on the same target", (), max_length=4)
     false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), DesignMark()] = key(
         "false plots per scan",
-        "mean number of false plots a scan, per km² of the surveyed sector",
+        "mean number of false plots per scan and km² of the surveyed sector",
         0.0,
         symbol="λ",
         unit="km⁻²",

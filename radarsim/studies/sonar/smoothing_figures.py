@@ -62,9 +62,8 @@ def plots_figure(table: "pd.DataFrame") -> Figure | None:
         Panel(x_axis, gain_axis, tuple(gain_lines), direct=False, crosses=tr("the paper's formula")),
     )
     caption = tr(
-        "Left: σ of the position at the last plot (smoothed) and one scan ahead (extrapolated) in σ "
-        "of a single plot, growing memory of degree 1. Right: by how "
-        "much the n-th plot lowers that σ."
+        "Growing memory of degree 1. Left: σ of the position at the last plot (smoothed) and one scan ahead "
+        "(extrapolated), relative to σ of a plot. Right: how much the n-th plot lowers it."
     )
     return Figure("plots", tr("Benefit of each further plot"), caption, figure_panels, 2, PAGE_MM)
 
@@ -155,8 +154,8 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
         figure_panels.append(Panel(panel_layout.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = tr(
-        "σ of the {name} for several detection probabilities, one panel per filter, of {count:,} realisations; "
-        "exact over all patterns of misses where these can be enumerated.",
+        "σ of the {name} for several detection probabilities, one panel per filter, from {count:,} realisations; "
+        "exact over all patterns of misses if these can be enumerated.",
         name=component.words,
         count=cases[0].count,
     ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")

@@ -10,6 +10,7 @@ import pytest
 import radarsim
 from radarsim.api.configs import load
 from radarsim.errors import ConfigError, PlotFault
+from radarsim.language.translate import quote_name
 from radarsim.recordings import csv_output
 from radarsim.recordings.fit import fit
 from radarsim.report import interval_notes, statistics
@@ -74,7 +75,7 @@ def test_answer_names_the_scan_from_which_folded_velocity_is_as_good(result):
     folded = registry.study("ambiguous_doppler")
     assert folded.question(experiment) == "How much does ambiguous Doppler help RLS 4, and from which scan on?"
     sentence, _ = answer_texts(folded, result.cases, result.tables)
-    assert sentence.startswith("RLS 4, D = 15 m/s, memory: ")
+    assert sentence.startswith("RLS 4, D = 15 m/s, “memory”: ")
     assert "all folds are right in" in sentence
 
 
@@ -95,9 +96,9 @@ def test_orders_and_their_sentence():
     curves = curves[curves["k"] >= curves["case"].map({name: counted.k for name, counted in scans.items()})]
     largest = curves.assign(exact=curves["exact_sigma"].fillna(curves["sigma"])).groupby("filter")["exact"].max()
     singles = largest[["order 0", "order 1", "order 2", "order 2 range only"]]
-    text = "Least σ of the range at worst, after the start of the track, in 3 cases: "
-    assert first.startswith(f"{text}{largest.idxmin()}, ")
-    assert f"the best single model order, {singles.idxmin()}, comes to " in first
+    text = "Smallest worst-case σ of the range after the start of the track, over 3 cases: "
+    assert first.startswith(f"{text}{quote_name(largest.idxmin())}, ")
+    assert f"the best single model order, {quote_name(singles.idxmin())}, reaches " in first
     assert {"orders", "sigma_r"} <= set(result.figures)
 
 
@@ -107,10 +108,11 @@ def test_answer_counts_radars_with_folded_velocity_as_good():
     gains = result.gains.query("component == 'Vr' and filter == 'memory'").groupby("case").tail(1)
     good = int((gains["excess_over_oracle_percent_hi"] <= 5).sum())
     assert first.startswith(
-        f"memory: as good as unfolded velocity, within 5 %, in {good} of 4 cases by the last scan; "
+        f"“memory”: σ of the velocity is within 5 % of that with unfolded velocity in {good} of 4 cases at the last "
+        "scan; worst case, "
     )
     worst = gains.loc[gains["excess_over_oracle_percent"].idxmax(), "case"]
-    assert first.split("; ")[1].startswith(worst.replace("ambiguous_rls", "RLS "))
+    assert first.split("; worst case, ")[1].startswith(worst.replace("ambiguous_rls", "RLS "))
 
 
 @pytest.mark.parametrize(
@@ -330,9 +332,9 @@ def test_value_of_memory_is_measured_by_the_error():
     claims = result.tables["claims"]
     memory_claims = claims[claims["claim"] == "P1.E2"]
     assert set(memory_claims["class"]) == {"refuted"}
-    nearest = memory_claims["what"].str.endswith("nearest fold")
+    nearest = memory_claims["quantity"].str.endswith("nearest fold")
     assert set(memory_claims[nearest]["verdict"]) == {"confirmed"}
-    last = memory_claims[~nearest & memory_claims["what"].str.contains("last scan")]
+    last = memory_claims[~nearest & memory_claims["quantity"].str.contains("last scan")]
     assert len(last) == 4
     assert set(last["verdict"]) == {"refuted"}
 

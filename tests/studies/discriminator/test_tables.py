@@ -7,6 +7,7 @@ import pytest
 
 from radarsim.api import configs, run
 from radarsim.bursts.burst import phase_turns, sample_times, signal
+from radarsim.language.translate import quote_name
 from radarsim.papers.discriminator import measures
 from radarsim.papers.evidence import MissingEvidence
 from radarsim.report.drawing.model import Line
@@ -129,8 +130,8 @@ def test_gains_are_left_to_studies_with_common_scans(made):
 def test_answer_names_every_estimator(made):
     first, others = answer_texts(answer, made.cases, made.tables)
     names = made.cases[0].axes.filters
-    assert first.startswith(f"{names[0]}: ")
-    assert all(re.search(rf"(: |; ){re.escape(name)}, \d+(\.\d\d)? % \[", others) for name in names[1:])
+    assert first.startswith(f"“{names[0]}” (")
+    assert all(re.search(rf"(: |; ){re.escape(quote_name(name))}, \d+(\.\d\d)? % \[", others) for name in names[1:])
 
 
 def test_claims_find_their_estimators(made):
@@ -182,7 +183,7 @@ def test_losses_are_told_beside_the_design_first():
     designed = 1 - rows.index.str.rpartition("=").get_level_values(2).astype(float)
     times = rows["event_rate"] / designed
     first = made.answer[0]
-    assert first.startswith("exact tail loses lock in ")
-    assert f", {times.max():.3g} times as often, the most of 4 cases." in first
+    assert first.startswith("“exact tail” loses lock in ")
+    assert f", {times.max():.3g} times the 10⁻⁶ of its design: the largest ratio of 4 cases (" in first
     alone = run.run("discriminator_rare", realisations=400, overrides=["sweep.estimators.0.lock_probability=[0.999]"])
-    assert "times as often" not in alone.answer[0]
+    assert "of its design" not in alone.answer[0]

@@ -89,7 +89,7 @@ def test_other_flights_have_no_claims(result):
     changed = radarsim.run("multimodel", realisations=8, overrides=["target.lag_s=2"])
     table = changed.tables["claims"]
     assert table["class"].eq(NOT_JUDGED).all()
-    assert table["why"].str.contains("target.lag_s is 2, the paper's 1").all()
+    assert table["reason"].str.contains("target.lag_s is 2, the paper's 1").all()
 
 
 def test_figures_are_described(result):
@@ -127,9 +127,11 @@ def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     above = 100 * (wide.div(wide.min(axis=1), axis=0) - 1)
     (best, smallest), (second, more) = above.max().sort_values().iloc[:2].items()
     stage, looks = above[best].idxmax(), wide.size
-    assert f"stage: {best}, σ of the height at most {smallest:.3g} % [" in first
-    assert f"] above the least ({stage}: {wide.loc[stage].idxmin()}); next {second}, {more:.3g} % [" in first
-    assert first.endswith(f"] ({above[second].idxmax()}); intervals for all {looks} compared.")
+    assert f"stage: {best}, with σ of the height at most {smallest:.3g} % [" in first
+    assert (
+        f"] above the least ({stage}, by {wide.loc[stage].idxmin()}); next is {second}, at most {more:.3g} % [" in first
+    )
+    assert first.endswith(f"] above it ({above[second].idxmax()}); intervals for all {looks} compared.")
     gain = stage_ranking.paired_gain(result.cases[0], stage, best, wide.loc[stage].idxmin())
     low, high = (float(end) for end in re.search(r"at most .*? % \[(.*?), (.*?)\]", first).groups())
     assert low < -gain.hi < -gain.lo < high  # paired on the same noise, and wider, as it was chosen
@@ -148,14 +150,14 @@ def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
 
     monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
     case = SimpleNamespace(name="one", swept_values=(), spec=SimpleNamespace(device=""))
-    assert stage_ranking.least_filters(case, stages, stages.iloc[0]) == "a = same (not distinguished from it: near)"
+    assert stage_ranking.least_filters(case, stages, stages.iloc[0]) == "a = “same” (not distinguished from it: “near”)"
     sentence, *_ = answer_texts(answer, [case], {"stages": stages})
     assert sentence.startswith(
-        "Least σ of the height by stage: start: a = same (not distinguished from it: near), 10 m"
+        "Least σ of the height by stage: start: a = “same” (not distinguished from it: “near”), 10 m"
     )
 
     sentence, *_ = answer_texts(answer, [case], {"stages": stages[:2]})
-    assert sentence == "σ of the height by stage: start: a = same, 10 m [1, 99]."  # nothing is least
+    assert sentence == "σ of the height by stage: start: a = “same”, 10 m [1, 99]."  # nothing is least
 
 
 def test_answer_on_several_cases_is_one_sentence(monkeypatch):
@@ -175,15 +177,19 @@ def test_answer_on_several_cases_is_one_sentence(monkeypatch):
 
     monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
     (sentence,) = answer_texts(answer, cases, {"stages": stages})
-    assert "every case: a, σ of the height at most 10 % [8.73, 11.3] above the least (one, start: b); " in sentence
-    assert sentence.endswith("; next b, 100 % [98.7, 101] (two, start); intervals for all 4 compared.")
+    assert (
+        "every case: a, with σ of the height at most 10 % [8.73, 11.3] above the least (one, start, by b); " in sentence
+    )
+    assert sentence.endswith(
+        "; next is b, at most 100 % [98.7, 101] above it (two, start); intervals for all 4 compared."
+    )
     single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})
     assert [line.rpartition("start: ")[2] for line in single_answer] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
     vy_stages = pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)
     sentence, *_ = answer_texts(answer, cases[1:], {"stages": vy_stages})
     assert sentence == (
-        "Least σ of the height in every stage: a; next b, at most 100 % [98.9, 101] above it (start; interval for all "
-        "2 compared)."
+        "Least σ of the height in every stage: a; next is b, at most 100 % [98.9, 101] above it (start; interval for "
+        "all 2 compared)."
     )
 
 

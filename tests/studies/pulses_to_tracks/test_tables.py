@@ -106,28 +106,31 @@ def test_sentences(result):
     study, experiment = registry.study("pulses_to_tracks"), load("pulses")
     assert study.question(experiment).startswith("How well does RLS 4 track from its pulse bursts")
     sentences = answer_texts(study, result.cases, result.tables)
-    assert sentences[-1] == "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all, allow σ_V = 1 m/s (Cramér–Rao bound)."
+    assert sentences[-1] == (
+        "RLS 4: 16 pulses in 0.8 ms, 17.3 dB in all. An ideal burst always locks and reaches the Cramér–Rao bound, "
+        "σ_V = 1 m/s."
+    )
     assert len(sentences) == 7
     ratios = result.tables["idealisations"].query("component == 'r'").groupby("filter").tail(1)
     ratios = ratios.set_index("filter")["paired_over_ideal"]
     near, best, worst, far = re.fullmatch(
-        r"RLS 4: with (.+) σ of the range at the last scan is ([\d.]+) .* times its idealisation's, with (.+) ([\d.]+) "
-        r"\[.*\] times \(interval for all \d compared\)\.",
+        r"RLS 4: σ of the range at the last scan is ([\d.]+) .* times that of ideal bursts with “(.+)”, and "
+        r"([\d.]+) \[.*\] times with “(.+)” \(interval for all \d compared\)\.",
         sentences[0],
-    ).group(2, 1, 3, 4)
+    ).group(1, 2, 4, 3)
     assert (best, worst) == (ratios.idxmin(), ratios.idxmax())
     assert [float(near), float(far)] == pytest.approx([ratios.min(), ratios.max()], rel=5e-3)
-    (spectrum,) = [line for line in sentences if line.startswith("RLS 4, spectrum: ")]
-    assert "idealisation" in spectrum
+    (spectrum,) = [line for line in sentences if line.startswith("RLS 4, “spectrum”: ")]
+    assert "ideal bursts" in spectrum
 
 
 def test_answer_on_several_cases_names_the_case_furthest_from_the_idealisation(swept):
     last = swept.tables["idealisations"].query("component == 'r'").groupby(["case", "filter"]).tail(1)
-    assert swept.answer[0].startswith("σ of the range at the last scan over its idealisation's, at worst of 3 cases: ")
+    assert swept.answer[0].startswith("Largest σ of the range at the last scan over that of ideal bursts, in 3 cases: ")
     for name, filter_rows in last.groupby("filter"):
         worst = filter_rows.loc[filter_rows["paired_over_ideal"].idxmax()]
         where = worst["case"].rpartition("=")[2].replace("-", "−")
-        match = re.search(rf"[:;] {name} ([\d.]+) \[[^]]*\] \(q = {where} dB\)", swept.answer[0])
+        match = re.search(rf"[:;] “{name}” ([\d.]+) \[[^]]*\] \(q = {where} dB\)", swept.answer[0])
         assert float(match[1]) == pytest.approx(worst["paired_over_ideal"], rel=6e-3)
 
 

@@ -243,7 +243,7 @@ def test_answer_names_a_baseline_that_observes_more(expected_radar):
         for v in (1e-3, 1e-2)
     ]
     results = [expected_radar("rls2", filters=velocity)]
-    assert "than with filter 'D 0.001'" in answer_texts(answer, results, made_of(results))[0]
+    assert "than with filter D 0.001" in answer_texts(answer, results, made_of(results))[0]
 
 
 def test_inputs_have_a_row_for_each_radar_that_differs(expected_radar, swept):
@@ -315,7 +315,7 @@ def test_answer_of_a_single_filter(expected_radar):
     one = {"name": "only", "observes": ["range"], "manoeuvre_variance": 1e-3}
     results = [expected_radar("rls2", filters=[one])]
     (sentence,) = answer_texts(answer, results, made_of(results))
-    assert "only: σ of the range at 140 s is 189.3 m" in sentence
+    assert "“only”: σ of the range at 140 s is 189.3 m" in sentence
 
 
 # ---- a world less tidy ----------------------------------------------------------------------------------------------

@@ -95,5 +95,5 @@ def test_cases_of_all_parts_in_one_run(tmp_path):
     assert rows["tracks"] == {"among"}
     assert {"sigma_r", "plots", "modes", "confirmation"} <= set(result.figures)
     assert result.question.startswith("How soon and how surely is a track confirmed")
-    assert result.answer[0].startswith("nearest confirms")
+    assert result.answer[0].startswith("“nearest” confirms")
     assert any("σ of the range after 145 s" in sentence for sentence in result.answer)

@@ -43,11 +43,13 @@ def test_each_config_has_its_figures_and_they_draw(results):
 def test_filters_of_equal_accuracy_are_named_together(results):
     """Without process noise the Kalman filter is growing memory; and what is asked is answered first."""
     first, *_, optimistic = results["sonar_fluctuating"].answer
-    assert "least with growing and kalman, " in first
-    start = "Most optimistic from the manoeuvre on (120 s): growing and kalman (target = sonar turning); the true σ is "
+    assert "least with “growing” and “kalman”, " in first
+    start = (
+        "Most optimistic from the manoeuvre on (120 s): “growing” and “kalman” (target = sonar turning); the true σ is "
+    )
     assert optimistic.startswith(start)
     first, second, *_ = results["sonar_correlated"].answer
-    assert first.startswith("Most optimistic from the first scan on: naive (ρ = 0.9")
+    assert first.startswith("Most optimistic from the first scan on: “naive” (ρ = 0.9")
     curves = results["sonar_correlated"].tables["curves"]
     assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.2f} (exact) times" in first
     assert "least with augmented and differenced, " in second
@@ -59,8 +61,8 @@ def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several
     worst = plain.loc[plain["formula_m"].abs().idxmax()]
     told = results["sonar_conversion"].answer[0]
     bias, ratio = worst["formula_m"], worst["formula_m"] / worst["sigma_range_m"]
-    words = f"plainly: {bias:.3g} m (exact), {ratio:.3g} σ of the range (σ_β = 8°); converted".replace("-", "−")
-    assert f"{words} without bias: none (exact)." in told
+    words = f"conversion up to {bias:.3g} m (exact), {ratio:.3g} σ of the range (σ_β = 8°); with".replace("-", "−")
+    assert f"{words} the unbiased one none (exact)." in told
     half_width = (plain["bias_m_hi"] - plain["bias_m_lo"]) / 2
     assert ((plain["bias_m"] - plain["formula_m"]).abs() < 2 * half_width).all()  # so that it may be called exact
     assert conversion_figure(table[table["across_m"] == table["across_m"].max()]) is None
@@ -158,7 +160,7 @@ def test_the_filter_as_printed_is_growing_memory(walking):
 
 def test_a_subscript_of_a_scan_contradicts_no_print(walking):
     assert set(walking.loc["P3.16", "class"]) == {"not judgeable as stated"}
-    assert walking.loc["P3.16", "why"].str.contains("one subscript of a machine-read scan").all()
+    assert walking.loc["P3.16", "reason"].str.contains("one subscript of a machine-read scan").all()
 
 
 def test_coordinates_apart_are_those_at_once_on_a_linear_trajectory_alone(walking):
@@ -177,20 +179,20 @@ def test_what_is_known_exactly_is_judged_exactly(results):
     own = rows[rows["claim"].isin([f"P3.{n}" for n in (1, 2, 3, 4, 11, 14, 18)])]
     assert len(own) > 20
     assert own["exact"].notna().all()
-    formulas = own[own["what"].str.endswith("over the formula")]
+    formulas = own[own["quantity"].str.endswith("over the formula")]
     assert len(formulas) == 20
     precision = {"condition": LINE, "operations": 20 * TERMS}
     assert_rounded(formulas["exact"], np.ones(20), **precision)
     curves = result.tables["curves"].set_index(["filter", "component", "k"])["exact_sigma"]
     sigma = curves["growing", "r", 1]
-    bought = own[own["what"].str.startswith("σ of the recursion after 20")]["exact"].item()
+    bought = own[own["quantity"].str.startswith("σ of the recursion after 20")]["exact"].item()
     assert_rounded(bought, curves["growing", "r", 20] / curves["growing", "r", 6], **precision)
     ahead = own.loc[own["claim"] == "P3.18", "exact"].to_numpy()
     assert_rounded(
         ahead[:2], closed_forms.sigma_extrapolated(np.array([3, 6])) / closed_forms.sigma_extrapolated(2), **precision
     )
     for n in (2, 3, 5, 8, 20):
-        row = own[own["what"] == f"smoothed σ after {n} plots, over the formula"]
+        row = own[own["quantity"] == f"smoothed σ after {n} plots, over the formula"]
         smoothed = row["exact"].item() * closed_forms.sigma_smoothed(n)
         assert_rounded(smoothed, curves["growing", "r", n] / sigma, **precision)
 

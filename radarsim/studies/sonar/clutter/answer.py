@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import tr
+from radarsim.language.translate import quote_name, tr
 from radarsim.report import case_selection, key_labels, rare_events, sentences, tables, wording
 from radarsim.report.sentences import Sentence
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
@@ -55,11 +55,12 @@ def _sentences_on_rare_events(sought: "pd.DataFrame | None") -> list[Sentence]:
 def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
     """How surely and how soon a tracker confirms a track, how long it keeps it, and its false tracks."""
     if not row["confirmed_share"]:
-        return Sentence(tr("{filter} confirms no track", filter=row["filter"]))
+        return Sentence(tr("{filter} confirms no track", filter=quote_name(row["filter"])))
     life = _life_clause(row, sought)
     text = tr(
-        "{filter} confirms {confirmed} after {time} on average, {life}, {rate} false tracks per hour",
-        filter=row["filter"],
+        "{filter} confirms {confirmed} of the tracks, after {time} on average, {life}, with {rate} false tracks per "
+        "hour",
+        filter=quote_name(row["filter"]),
         confirmed=wording.share(
             *(100 * row[key] for key in ("confirmed_share", "confirmed_share_lo", "confirmed_share_hi"))
         ),
@@ -83,11 +84,11 @@ def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Senten
         if len(ended):
             rates = (100 * ended.iloc[0][key] for key in ("event_rate", "event_rate_lo", "event_rate_hi"))
             share = wording.estimate(rates, "%", ".2g")
-            text = tr("of its tracks {share} ended by the last scan", share=share)
+            text = tr("loses {share} of them by the last scan", share=share)
             return Sentence(text, sentences.intervals("rare", "event_rate", ended.iloc[0]))
     if not row["ends_per_hour"]:
-        return Sentence(tr("no track lost"))
-    text = tr("life {life}", life=_estimate(row, "life_s", tr("s")))
+        return Sentence(tr("loses none"))
+    text = tr("keeps a track for {life}", life=_estimate(row, "life_s", tr("s")))
     return Sentence(text, _tracking_interval(row, "life_s"))
 
 
@@ -102,13 +103,13 @@ def _false_tracks_sought(rows: "pd.DataFrame") -> Sentence:
     trackers = (
         tr(
             "{filter} ({events:,} events, effective sample size {n_eff:,.0f})",
-            filter=row["filter"],
+            filter=quote_name(row["filter"]),
             events=row["events"],
             n_eff=row["n_eff"],
         )
         for _, row in rows.iterrows()
     )
-    return Sentence(tr("False tracks are drawn by importance sampling: {found}.", found="; ".join(trackers)))
+    return Sentence(tr("Rates of false tracks are from importance sampling: {found}.", found="; ".join(trackers)))
 
 
 def _ended_tracks_sought(rows: "pd.DataFrame") -> Sentence:
@@ -116,16 +117,19 @@ def _ended_tracks_sought(rows: "pd.DataFrame") -> Sentence:
     trackers = (
         tr(
             "{filter} {rate:.3g} [{low:.3g}, {high:.3g}] ({events:,} events, effective sample size {n_eff:,.0f})",
-            filter=row["filter"],
+            filter=quote_name(row["filter"]),
             **rare_events.rate_fields(row),
         )
         if rare_events.is_estimated(row)
-        else tr("{filter}: no estimate (effective sample size {n_eff:,.0f})", filter=row["filter"], n_eff=row["n_eff"])
+        else tr(
+            "{filter}: no estimate (effective sample size {n_eff:,.0f})",
+            filter=quote_name(row["filter"]),
+            n_eff=row["n_eff"],
+        )
         for _, row in rows.iterrows()
     )
     text = tr(
-        "The probability that the target's first confirmed track has ended by the last scan, by importance sampling: "
-        "{found}.",
+        "Probability that the target's first confirmed track is lost by the last scan (importance sampling): {found}.",
         found="; ".join(trackers),
     )
     return Sentence(text, sentences.intervals("rare", "event_rate", rows))

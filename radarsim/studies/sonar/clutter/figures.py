@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import join_names, shorten_names, term, tr
+from radarsim.language.translate import join_names, list_filters, term, tr
 from radarsim.report import case_selection, figure_lines, key_labels, math_text, panel_layout, tables, wording
 from radarsim.report.drawing.model import GREY, PAGE_MM, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
@@ -118,8 +118,8 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
         return None
     caption = (
         tr(
-            "Probability that a track of the target was confirmed by that time, of {realisations}; thin "
-            "lines: that a confirmed track exists and is on the target.",
+            "Probability that a track of the target was confirmed by that time, from {realisations}; thin lines: "
+            "that a confirmed track exists and is on the target.",
             realisations=case_selection.realisations_text(results),
         )
     ) + case_selection.cases_left_out_remark(results, shown_results)
@@ -156,7 +156,7 @@ def life_figure(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") 
         return None
     text = join_names(clauses)
     caption = tr(
-        "{panels}, of {realisations}.",
+        "{panels}, from {realisations}.",
         panels=text[0].upper() + text[1:],
         realisations=case_selection.realisations_text(results),
     )
@@ -201,7 +201,7 @@ def _life_quantities(
             name, rates = tr("share of tracks ended by the last scan"), ended.merge(cases, on="case", how="left")
             life = _LifeQuantity("event_rate", name, "", True, rates, tr(ENDS_CAPTION))
     time, wrong, sigma = (tr("time to confirmation"), tr("share of wrong plots"), tr("$\\sigma$ of $r$ of kept tracks"))
-    time_clause, wrong_clause = tr("mean time to its confirmation"), tr("weight of false plots among those used")
+    time_clause, wrong_clause = tr("mean time to confirmation"), tr("weight of false plots among those used")
     sigma_clause = tr("root-mean-square error of the range of kept tracks")
     return (
         life,
@@ -250,13 +250,13 @@ def false_figure(results: Results, tracking: "pd.DataFrame") -> Figure | None:
     keys = ((tr("none occurred: upper end of the interval"), UPPER_END_STYLE),) if len(without_tracks) else ()
     marks = (*_lines(rows, column, rate), *([upper] if keys else []))
     caption = tr(
-        "False tracks confirmed per hour in the whole sector, of {realisations} per case. Plots that confirm a track: "
-        "{rules}.",
-        rules="; ".join(f"{rule} ({shorten_names(names)})" for rule, names in rules.items()),
+        "False tracks confirmed per hour in the whole sector, from {realisations} per case. Plots that confirm a "
+        "track: {rules}.",
+        rules="; ".join(f"{rule} ({list_filters(names)})" for rule, names in rules.items()),
         realisations=case_selection.realisations_text(results),
     )
     if zero_names := rows.groupby("filter", sort=False)[rate].sum().loc[lambda rates: rates == 0].index.tolist():
-        caption += " " + tr("Zero throughout: {names}.", names=shorten_names(zero_names))
+        caption += " " + tr("Zero throughout: {names}.", names=list_filters(zero_names))
     panel = Panel(x, Axis(tr("false tracks per hour"), "log"), marks, keys=keys, direct=False)
     return Figure("false_tracks", tr("False tracks"), caption, (panel,), width_mm=panel_layout.WIDE_MM)
 
@@ -281,8 +281,9 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
         y = Axis(tr("share of target's tracks declared false"), limits=(0, None))
         figure_panels.append(Panel(x, y, tuple(true), direct=False))
     caption = tr(
-        "Error rates of declaring a track true once its log likelihood ratio reaches a threshold, of {realisations} "
-        "of each kind. Left: tracks of false plots (bound: exp(−threshold)). Right: the target's.",
+        "Errors if a track is declared true once its log likelihood ratio reaches a threshold, from {realisations} "
+        "of each kind. Left: tracks of false plots called true (bound: exp(−threshold)). Right: the target's called "
+        "false.",
         realisations=case_selection.realisations_text(results),
     ) + (tr(" Case: {swept}.", swept=_swept_values(case)) if case.swept_values else "")
     return (

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import tr
+from radarsim.language.translate import quote_name, tr
 from radarsim.report import key_labels
 from radarsim.report.drawing.model import GREY, Axis, Figure, Line, Panel, Style
 from radarsim.studies.sonar.clutter.axes import ClutterAxes
@@ -46,12 +46,12 @@ def map_figure(result: CaseResult[ClutterAxes]) -> Figure:
     marks.insert(1, _map_line(_north_east(*z[np.isfinite(z[:, 0])].T), tr("target plots"), Style(1, None, 1, 1.1, 2.0)))
     marks.append(_map_line(course, tr("target"), Style(0, 1, None, 1.8)))
     caption = tr(
-        "Realisation 0 of {name}, tracker {tracker}: {tracks} confirmed tracks near the target among {false} false "
-        "plots of {k} scans; gates of every fourth scan.",
+        "Realisation 0 of {name}, filter {tracker}, over {k} scans. Confirmed tracks near the target: {tracks}; "
+        "false plots: {false}. Gates of every fourth scan.",
         tracks=len(tracks),
         false=len(false_north),
         name=key_labels.plain_case_label(result),
-        tracker="" if f is None else spec.filters[f].name,
+        tracker="" if f is None else quote_name(spec.filters[f].name),
         k=len(axes.k),
     )
     x_axis = Axis(tr("distance east, km"), limits=(west / 1e3, east / 1e3))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import term, tr
+from radarsim.language.translate import quote_name, term, tr
 from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
 from radarsim.report.quantities import Quantity
 from radarsim.report.sentences import Sentence
@@ -74,18 +74,19 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
     looks = sum(np.isnan(row.get(ALARM.exact_column, np.nan)) for row in ranked)
     values = [compared_value.row_value(row, ALARM).chosen_among(looks) for row in extremes]
     remark = next(filter(None, (value.choice_remark() for value in values)), "")
-    texts = [f"{row['filter']}, {value.text(form='.3g')}" for row, value in zip(extremes, values, strict=True)]
+    texts = [
+        f"{quote_name(row['filter'])}, {value.text(form='.3g')}" for row, value in zip(extremes, values, strict=True)
+    ]
     if len(texts) == 1 or not compared_value.are_distinguished(*values):
         text = tr(
-            "probability of an alarm in a test at the end of the manoeuvre, at about {usual:g} false alarms a test: "
-            "{one}.",
+            "detection probability at the end of the manoeuvre, for P_FA ≈ {usual:g} per test: {one}.",
             usual=USUAL_FALSE_ALARM_RATE,
             one="; ".join(texts) + remark,
         )
     else:
         text = tr(
-            "probability of an alarm in a test at the end of the manoeuvre, at about {usual:g} false alarms a test: "
-            "most with {most}, least with {least}.",
+            "detection probability at the end of the manoeuvre, for P_FA ≈ {usual:g} per test: highest with {most}, "
+            "lowest with {least}.",
             usual=USUAL_FALSE_ALARM_RATE,
             most=texts[-1],
             least=texts[0] + remark,
@@ -107,7 +108,7 @@ def _sigma_of_uses(
     text = tr(
         "Measured σ of quantities derived from the track over σ from its covariance ({filter}, {t_s:g} s, {case}): "
         "{ratios}.",
-        filter=first["filter"],
+        filter=quote_name(first["filter"]),
         t_s=uses.iloc[0]["t_s"],
         case=next(key_labels.plain_case_label(result) for result in results if result.name == first["case"]),
         ratios=", ".join(_ratio(row) for _, row in uses.iterrows()),

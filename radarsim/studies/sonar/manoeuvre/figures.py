@@ -124,9 +124,8 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
             y = Axis(tr("detection probability"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
     caption = tr(
-        "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the "
-        "manoeuvre against that at the last scan before it. Lines: exact laws; markers: measured, of "
-        "{count:,} realisations.",
+        "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the manoeuvre against "
+        "that at the last scan before it. Lines: exact; markers: measured, from {count:,} realisations.",
         count=results[0].count,
     )
     return _figure_of_panels("roc", tr("Detections and false alarms"), caption, figure_panels)
@@ -159,8 +158,8 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
         x, y = Axis(key_labels.key_axis_label(members[0], key)), Axis(tr("detection probability"), limits=(0, 1))
         figure_panels.append(Panel(x, y, tuple(marks), title, direct=False))
     caption = tr(
-        "Probability of an alarm of detectors in the range at about {usual:g} false alarms a test, at "
-        "the last scan of the manoeuvre (for a steady target, at the last scan), against the manoeuvre's strength.",
+        "Detection probability of detectors in the range at the last scan of the manoeuvre (of the run, if there is "
+        "none), for P_FA ≈ {usual:g} per test, against the strength of the manoeuvre.",
         usual=USUAL_FALSE_ALARM_RATE,
     )
     return _figure_of_panels("detection", tr("Detection against the strength of the manoeuvre"), caption, figure_panels)
@@ -195,8 +194,8 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("alarm raised"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
     caption = tr(
-        "Probability that a detector in the range has raised its first alarm, against the time since the manoeuvre "
-        "began, at about {usual:g} false alarms a test; exact where windows do not overlap.",
+        "Probability that a detector in the range has raised its first alarm against the time since the manoeuvre "
+        "began, for P_FA ≈ {usual:g} per test; exact if windows do not overlap.",
         usual=USUAL_FALSE_ALARM_RATE,
     )
     return _figure_of_panels("delay", tr("How soon a manoeuvre is detected"), caption, figure_panels)
@@ -244,8 +243,8 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
     case = f" ({key_labels.without_markup(_swept_values(result))})" if result.swept_values else ""
     caption = (
         tr(
-            "σ about the truth over the one computed from the track's covariance to first order{case}, "
-            "of {count:,} realisations.",
+            "True σ divided by that computed from the track's covariance to first order{case}, from {count:,} "
+            "realisations.",
             case=case,
             count=result.count,
         )

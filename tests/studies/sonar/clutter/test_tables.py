@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 import radarsim
+from radarsim.language.translate import quote_name
 from radarsim.report import wording
 from radarsim.studies.sonar.clutter import answer, figures, intervals
 from radarsim.studies.sonar.clutter.kernels import track_sums
@@ -47,8 +48,8 @@ def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
         assert subject.startswith("λ = ")
         sentence = " ".join(of_case)
         for row in case_rows.to_dict("records"):
-            assert f"{row['filter']} confirms " in sentence
-            assert f", life {float(format(row['life_s'], '.3g')):,g} s [" in sentence
+            assert f"{quote_name(row['filter'])} confirms " in sentence
+            assert f", keeps a track for {float(format(row['life_s'], '.3g')):,g} s [" in sentence
             assert f" {float(format(row['false_tracks_per_hour'], '.3g')):,.10g} [" in sentence
 
 
@@ -58,7 +59,7 @@ def test_a_tracker_that_confirms_nothing_keeps_no_track(result):
     lost = table["filter"] == "PDA"
     table.loc[lost, ["confirmed_share", "ends_per_hour", "life_s", "time_to_confirm_s"]] = [0.0, np.nan, np.nan, np.nan]
     first, *_ = answer_texts(answer, result.cases, {"tracking": table})
-    assert ": nearest confirms " in first
+    assert ": “nearest” confirms " in first
     assert first.endswith("; PDA confirms no track.")
     table.loc[:, ["confirmed_share", "ends_per_hour"]] = [0.0, np.nan]
     assert "confirms no track" in answer_texts(answer, result.cases, {"tracking": table})[0]
@@ -137,7 +138,7 @@ def test_false_tracks_that_did_not_occur_are_drawn_as_the_upper_end_of_their_int
         assert (line.lo[1], line.hi[1]) == (row["false_tracks_per_hour_lo"], row["false_tracks_per_hour_hi"])
     np.testing.assert_array_equal(upper.y, table[sparse]["false_tracks_per_hour_hi"])
     assert figure.panels[0].keys == (("none occurred: upper end of the interval", upper.style),)
-    assert "Plots that confirm a track: 2 of 3 (nearest); 3 of 4 (PDA)." in figure.caption
+    assert "Plots that confirm a track: 2 of 3 (“nearest”); 3 of 4 (PDA)." in figure.caption
     table.loc[table["filter"] == "PDA", "false_tracks_per_hour"] = 0.0
     assert figures.false_figure(result.cases, table).caption.endswith("Zero throughout: PDA.")
     assert figures.false_figure(result.cases, table.assign(false_tracks_per_hour=0.0)) is None

@@ -164,7 +164,7 @@ def test_claims_are_judged(result, tables):
     row = rows[rows["claim"] == "P3.9"].iloc[0]
     assert row["lo"] < 0.523 < row["hi"]
     assert row["verdict"] == REFUTED
-    ratios = rows[rows["what"].str.startswith("acceleration at the threshold")]["measured"]
+    ratios = rows[rows["quantity"].str.startswith("acceleration at the threshold")]["measured"]
     assert ratios.to_numpy() == pytest.approx([0.5345, 0.2887], abs=5e-5)
     strong = result.cases[2]
     delays = tables["delays"]
@@ -180,7 +180,7 @@ def test_words(result, tables):
     assert STUDY.question(result.experiment).startswith("How soon and how surely is a manoeuvre detected")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
-        sentence.startswith("Measured σ of quantities derived from the track over σ from its covariance (growing, ")
+        sentence.startswith("Measured σ of quantities derived from the track over σ from its covariance (“growing”, ")
         for sentence in told
     )
     assert all(sentence.endswith(".") for sentence in told)
