@@ -114,10 +114,10 @@ ROOMS = {
         *("studies.floors", "studies.onefile", "studies.planar_tables", "studies.step_clutter"),
     ),
     "studies.planar_tables": (
-        *("config.experiment", "engine.results", "kernels", "report", "report.drawing", "studies.planar"),
+        *("config.experiment", "engine.results", "kernels", "language", "report", "report.drawing", "studies.planar"),
     ),
     "studies.plane": (
-        *("config.cross_checks", "config.key_types", "config.study_keys", "kernels", "studies.planar"),
+        *("config.cross_checks", "config.key_types", "config.study_keys", "kernels", "language", "studies.planar"),
         "studies.stepwise",
     ),
     "studies.step_tracker": (

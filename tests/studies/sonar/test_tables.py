@@ -52,7 +52,7 @@ def test_filters_of_equal_accuracy_are_named_together(results):
     assert first.startswith("Most optimistic from the first scan on: “naive” (ρ = 0.9")
     curves = results["sonar_correlated"].tables["curves"]
     assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.2f} (exact) times" in first
-    assert "least with augmented and differenced, " in second
+    assert "least with “augmented” and “differenced”, " in second
 
 
 def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several(results):
