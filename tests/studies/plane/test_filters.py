@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from radarsim.studies import step_programs
 from radarsim.studies.registry import study
 from tests.studies.plane import naive
 from tests.studies.plane.cases import case_of, member, plots_of, run_of
@@ -116,3 +117,20 @@ def test_kernels_are_the_twins():
 @pytest.mark.parametrize("model", MODELS)
 def test_kernels_of_every_filter_are_the_twins(model, folds):
     compare_runs(case_of(every(model), **FOLDS[folds]), 10)
+
+
+def test_a_filter_is_traced_anew_only_where_its_branches_differ(monkeypatch):
+    """A search of tune asks for many values of a key."""
+    traced = []
+    trace = step_programs.trace_filter
+    monkeypatch.setattr(step_programs, "trace_filter", lambda *given: traced.append(1) or trace(*given))
+    monkeypatch.setattr(step_programs, "TRACED", {})
+    plane = study("plane")
+    first = plane.prepare(case_of([member("extended", sigma_start_velocity_mps=100.0)]))
+    second = plane.prepare(case_of([member("extended", sigma_start_velocity_mps=200.0)]))
+    assert len(traced) == 1
+    assert second.filters[0].kernel is first.filters[0].kernel
+    assert not np.array_equal(second.filters[0].numbers, first.filters[0].numbers)
+    plane.prepare(case_of([member("extended", doppler=False)]))
+    plane.prepare(case_of([member("extended") | {"sigma_acceleration_mps2": 0.0}]))
+    assert len(traced) == 3
