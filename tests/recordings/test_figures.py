@@ -102,7 +102,7 @@ def test_the_report_shows_what_the_terminal_says(tmp_path, monkeypatch):
     assert "radarsim track sonar_smoothing plots" in text  # not where the shipped config lies
     assert text.index('id="figure-track"') < text.index('id="figure-plan"')
     assert "residual of bearing, °" in text
-    assert re.search(r"Advice: the stated values of \w+.* agree with 40 rows\.", text)
+    assert re.search(r"Advice: the stated values of \S+.* agree with 40 rows\.", text)
     for name in ("plan", "track", "residuals", "nis"):
         assert f'id="figure-{name}"' in text
         assert (tmp_path / f"out/figures/{name}.svg").stat().st_size > 1000

@@ -74,7 +74,7 @@ def test_a_filter_whose_column_a_file_lacks_is_named(radarsim, tmp_path):
     (tmp_path / "up.csv").write_text("\n".join(lines) + "\n")
     said = radarsim("track", "chirp", "up.csv", "-o", "track.csv", cwd=tmp_path)
     words = said.stdout + said.stderr
-    assert "down used no plot, because it needs z_down_m: predictions only" in words
+    assert "“down” used no plot, because it needs z_down_m: predictions only" in words
     assert "up took no plot" not in words
     whole = radarsim("track", "chirp", "plots.csv", "-o", "track.csv", cwd=tmp_path)
     assert "took no plot" not in whole.stdout + whole.stderr

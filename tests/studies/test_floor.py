@@ -428,7 +428,7 @@ def test_a_filter_from_outside_has_the_floor_of_all_plots():
     rows = result.curves
     own, best = (rows[rows["filter"].eq(name) & rows["component"].eq("r")] for name in ("raw", "r+Vr"))
     assert np.array_equal(own["floor"], best["floor"])
-    assert any(line.startswith("There the ") and "raw is" in line for line in result.answer)
+    assert any(line.startswith("There the ") and "“raw” is" in line for line in result.answer)
 
 
 # ---- all configs -----------------------------------------------------------------------------------------------------

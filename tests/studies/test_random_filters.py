@@ -124,7 +124,7 @@ def test_numbers_that_repeat_in_each_block_are_said_and_their_intervals_not_show
     assert gains[["gain_lo", "gain_hi"]].isna().all(axis=None)
     others = result.curves.query("filter != 'mine'")
     assert others[["sigma_lo", "sigma_hi"]].notna().all(axis=None)
-    assert result.answer[0].startswith("mine cannot be judged against r+Vr")
+    assert result.answer[0].startswith("“mine” cannot be judged against r+Vr")
     assert "nan" not in " ".join(result.answer)
 
 
@@ -214,7 +214,7 @@ def test_a_share_of_failures_of_realisations_that_depend_on_each_other_has_no_in
         return np.where(plots["range_m"] > plots["range_m"].mean(), plots["range_m"], np.nan)
 
     answer = judged(above_the_mean, realisations=300).answer
-    assert answer[0].startswith("mine fails in 100 % of the realisations (not a number after an estimate: 300)")
+    assert answer[0].startswith("“mine” fails in 100 % of the realisations (not a number after an estimate: 300)")
     assert "nan" not in " ".join(answer)
 
 
@@ -260,7 +260,7 @@ class Learned:
 def test_a_filter_that_has_learned_the_judged_realisations_is_said_in_the_first_sentence():
     result = judged(Learned(), realisations=300, overrides={"target": "turn"})
     assert result.answer[0].startswith(
-        "mine seems to have been trained on these realisations: on other noise its σ is "
+        "“mine” seems to have been trained on these realisations: on other noise its σ is "
     )
     assert 'purpose="training"' in result.warnings[0]
     sound = judged(Learned(purpose="training"), realisations=300, overrides={"target": "turn"})
@@ -288,7 +288,7 @@ def test_a_stored_run_keeps_the_warning_on_training(tmp_path):
     (tmp_path / "mine.yaml").write_text(f"include: [rls2]\n{filters}\nrealisations: 300\n")
     ran = radarsim.run(tmp_path / "mine.yaml", out=tmp_path / "results", figures=False, threads=1)
     stored = radarsim.load(tmp_path / "mine.yaml", out=tmp_path / "results")
-    assert ran.answer[0].startswith("memo seems to have been trained on these realisations")
+    assert ran.answer[0].startswith("“memo” seems to have been trained on these realisations")
     assert stored.answer == ran.answer
     assert any('purpose="training"' in line for line in stored.warnings)
 
@@ -307,7 +307,7 @@ def test_a_filter_that_fails_on_other_noise_is_judged_and_said():
     known = {float(z): x for z, x in zip(plots["range_m"][:, 0], plots.truth[..., 0], strict=True)}
     result = judged(lambda p: np.array([known[float(z)] + 1 for z in p["range_m"][:, 0]]), realisations=300)
     assert "mine: fails on noise of another seed (KeyError: " in result.warnings[-1]
-    assert result.answer[0].startswith("mine seems to have been trained on these realisations")
+    assert result.answer[0].startswith("“mine” seems to have been trained on these realisations")
 
 
 def test_a_filter_that_cannot_take_equal_plots_is_judged():
