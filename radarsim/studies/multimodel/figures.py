@@ -357,10 +357,11 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
         tables_by_name["operations"].loc[tables_by_name["operations"]["case"] == result.name, "operations"].max()
     )
     styles = dict(zip(result.axes.filters, _styles(result), strict=True))
+    sizes = POINT_SIZES_PT if _has_many_filters(result) else POINT_SIZES_PT[2:3]
     for stage, stage_rows in rows.groupby("stage", sort=False):
         marks: list[Line] = []
         for _, row in stage_rows.iterrows():
-            style = replace(styles[row["filter"]], dash=None, size_pt=POINT_SIZES_PT[len(marks) % len(POINT_SIZES_PT)])
+            style = replace(styles[row["filter"]], dash=None, size_pt=sizes[len(marks) % len(sizes)])
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
             marks.append(Line(count, value, key_labels.escape_dollars(row["filter"]), style, lo, hi))
