@@ -1,5 +1,6 @@
 """What flew: the target of an experiment in one line, for the head of its page."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,9 +24,11 @@ def target_words(cases: Sequence[Case]) -> str:
 
 def _motion(target: Any) -> list[str]:
     """Speed, and the size and time of the manoeuvre, as far as the target has them."""
-    speed = getattr(target, "speed_mps", None)
+    speed, velocity = getattr(target, "speed_mps", None), getattr(target, "velocity_mps", None)
     words = [] if speed is None else [_quantity(speed, "m/s")]
-    if speed is None:
+    if velocity is not None:
+        words = [tr("{speed} at the first plot", speed=_quantity(math.hypot(*velocity), "m/s"))]
+    elif speed is None:
         derivatives = (getattr(target, "coefficients", None) or getattr(target, "range_m", None)) or ()
         pairs = zip(derivatives[1:], POLYNOMIAL_UNITS, strict=False) if isinstance(derivatives, tuple) else ()
         words = [_quantity(value, unit) for value, unit in pairs if value]
@@ -34,9 +37,9 @@ def _motion(target: Any) -> list[str]:
         return words
     sizes = ((getattr(target, name, None), unit) for name, unit in ACCELERATION_UNITS.items())
     size = next((_quantity(value, unit) for value, unit in sizes if value), "")
-    if not size:
-        return words
-    return [*words, tr("{size} from {t_s:g} s on", size=size, t_s=start_s)]
+    if size:
+        return [*words, tr("{size} from {t_s:g} s on", size=size, t_s=start_s)]
+    return words if velocity is None else [*words, tr("manoeuvres from {t_s:g} s on", t_s=start_s)]
 
 
 def _quantity(value: float, unit: str) -> str:

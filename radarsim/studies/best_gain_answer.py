@@ -83,7 +83,8 @@ def _clauses(key: NoiseKey, baseline: FilterChoices, other: FilterChoices) -> It
         value: _gain(baseline.sigmas[value], sigma) for value, sigma in other.sigmas.items() if value in baseline.sigmas
     }
     ends = dict.fromkeys(pick(gains, key=lambda value: gains[value].value) for pick in (min, max) if gains)
-    texts = [f"{_span_text(gains[value], is_measured)} ({key.value_text(value)})" for value in ends]
+    form = term("{gain} at {value}") if is_measured else term("{gain} ({value})")
+    texts = [tr(form, gain=_span_text(gains[value], is_measured), value=key.value_text(value)) for value in ends]
     if texts:
         gains_text = texts[0] if len(texts) == 1 else tr("{low} to {high}", low=texts[0], high=texts[1])
         yield tr("with one {symbol} for both {gains}", symbol=key.symbol, gains=gains_text)
@@ -101,5 +102,5 @@ def _span_text(gain: Estimate, is_measured: bool) -> str:
     if low == high:
         return tr("{value} %", value=value)
     if is_measured:
-        return tr("{low} … {high} %", low=low, high=high)
+        return tr("{value} % ({low} … {high})", value=value, low=low, high=high)
     return tr("{low} to {high} %", low=low, high=high)

@@ -14,7 +14,7 @@ TURN = f"target={{kind: turn, {PATH}, start_s: 60, acceleration_g: 0.2, duration
     [
         ("rls2", [], "Target: a polynomial of any degree up to 11; −250 m/s; 4 m/s²."),
         ("rls2", [TURN], "Target: a turn of given g between two straight legs; 12 m/s; 0.2 g from 60 s on."),
-        ("multimodel", [], "Target: an integrated flight."),
+        ("multimodel", [], "Target: an integrated flight; 1430 m/s at the first plot; manoeuvres from 125 s on."),
         ("discriminator", [], ""),
         ("rls2_manoeuvres", [], ""),
     ],

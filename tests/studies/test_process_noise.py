@@ -65,7 +65,7 @@ def test_a_sweep_of_process_noise_says_the_best_of_each_filter_and_the_gain_then
         sigmas = [alone[value][filter_name] for value in values]
         assert f"{filter_name} {texts[int(np.argmin(sigmas))]} (σ {min(sigmas):.4g} m, at " in best
     at_best = 100 * (1 - min(s["r+Vr"] for s in alone.values()) / min(s["r"] for s in alone.values()))
-    low, high = map(float, re.search(r"(−?[\d.]+) … (−?[\d.]+) % with each at its best", gain).groups())
+    low, high = map(float, re.search(r"% \((−?[\d.]+) … (−?[\d.]+)\) with each at its best", gain).groups())
     assert low < at_best < high
     assert gain.startswith("mine, gain in σ of the range at worst, r+Vr over r (95 % intervals): ")
     assert f"with one {symbol} for both" in gain

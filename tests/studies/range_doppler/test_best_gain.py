@@ -177,7 +177,7 @@ def test_interval_of_the_gain_holds_whichever_was_picked():
 
     for _ in range(runs):
         (sentence,) = gain_sentences("mine", "range", "worst", D_M, choices("r", 2.0), [choices("v", 1.0)])
-        low, high = map(float, re.search(r"([\d.]+) … ([\d.]+) % with each", sentence.text).groups())
+        low, high = map(float, re.search(r"% \(([\d.]+) … ([\d.]+)\) with each", sentence.text).groups())
         covered += low <= 50 <= high
     assert covered >= 0.95 * runs
 
@@ -212,5 +212,5 @@ def test_measured_errors_have_intervals_for_all_scans_variances_and_filters_at_o
         widened[(widened["filter"] == name) & (widened["case"].str.endswith("0.1"))][["value", "lo", "hi"]].max()
         for name in ("r", "r+Vr")
     )
-    ends = f"{100 * (1 - v['hi'] / r['lo']):.1f} … {100 * (1 - v['lo'] / r['hi']):.1f} % (10⁻¹)"
+    ends = f"({100 * (1 - v['hi'] / r['lo']):.1f} … {100 * (1 - v['lo'] / r['hi']):.1f}) at 10⁻¹"
     assert ends.replace("-", "−") in gain_sentence(result)
