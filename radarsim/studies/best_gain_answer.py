@@ -42,7 +42,10 @@ class FilterChoices(NamedTuple):
 
     @property
     def best_sigma(self) -> Estimate:
-        """σ with any of the best values: the least, and the ends of all of them."""
+        """σ with any of the best values: the least, and the ends of all of them; of measured ones those of the least,
+        which is under the end of each."""
+        if self.is_measured:
+            return Estimate(*(min(float(s[i]) for s in self.sigmas.values()) for i in range(3)))
         sigmas = [self.sigmas[value] for value in self.best]
         return Estimate(*(pick(float(s[i]) for s in sigmas) for i, pick in enumerate((min, min, max))))
 

@@ -111,7 +111,7 @@ def _sigma_of_uses(
         filter=quote_name(first["filter"]),
         t_s=uses.iloc[0]["t_s"],
         case=next(key_labels.plain_case_label(result) for result in results if result.name == first["case"]),
-        ratios=", ".join(_ratio(row) for _, row in uses.iterrows()),
+        ratios="; ".join(_ratio(row) for _, row in uses.iterrows()),
     )
     return [Sentence(text, sentences.intervals("uses", "ratio", uses))]
 
