@@ -16,7 +16,7 @@ from radarsim.config.study_keys import is_process_noise, process_noise_key
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, quote_name, tr
+from radarsim.language.translate import join_names, tr
 from radarsim.report import compared_value, key_labels, tables
 from radarsim.report.quantities import GAIN, SIGMA
 from radarsim.report.sentences import Sentence
