@@ -159,8 +159,8 @@ def is_drawn(sentence: str, columns: Sequence[DrawnColumn]) -> bool:
 
 def _is_among(value: tuple[float, float, str], column: DrawnColumn) -> bool:
     number, step, unit = value
-    is_share = unit == "%" and "%" not in column.label
-    if not column.values.size or (not is_share and not column.label.endswith(unit)):
+    is_share, has_unit = unit == "%" and ", " not in column.label, ", " in column.label
+    if not column.values.size or (not is_share and (has_unit != bool(unit) or not column.label.endswith(unit))):
         return False
     if is_share and np.abs(column.values).max() > 1:
         return False

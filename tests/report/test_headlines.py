@@ -62,6 +62,8 @@ GAIN, SIGMA, SHARE = (
         (SHARE, "Locked in 100 % [99.1, 100] of the bursts.", False),  # of whatever
         (figure_of("share not locked", 0.03, scale="log"), "Locked in 97.00 % [95.1, 98.2] of the bursts.", True),
         (SIGMA, "A sentence without values at 18.3 m.", False),
+        (figure_of("σ of $V_r$, m/s", 0.1, 0.97), "Velocity: σ is 97.0 % (exact) higher.", False),  # no share
+        (GAIN, "Range: at worst higher by a factor of 18.3 (exact), at 90 s.", False),  # no gain
     ],
 )
 def test_a_sentence_is_about_a_figure_that_draws_its_values(figure, sentence, is_about):

@@ -229,7 +229,7 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ta
     second = key_labels.key_label(members[0], keys[1]).text
     caption = tr(
         "Share of bursts locked at the end, from {count:,} per cell. Last panel: the largest {second} up to which "
-        "the lower end of its interval is above {sure:g}; estimators without a line never reach it.",
+        "the interval is above {sure:g}; no line: nowhere.",
         second=second,
         count=members[0].count,
         sure=CERTAIN_LOCK_RATE,

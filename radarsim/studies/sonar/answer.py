@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import list_filters, quote_name, shorten_names, tr
-from radarsim.report import case_selection, compared_value, key_labels, statistics, tables, wording
+from radarsim.report import case_selection, compared_value, key_labels, sentences, statistics, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.studies.counted_scans import CountedScans
@@ -56,12 +56,12 @@ def answer(
     optimistic = _most_optimistic(results, tables_by_name, scans)
     if _has_correlated_errors([result.spec for result in results]):
         return [*optimistic, *sigma, *map(Sentence, remark)]
-    return [*map(Sentence, _bias_of_conversion(results, tables_by_name)), *sigma, *optimistic, *map(Sentence, remark)]
+    return [*_bias_of_conversion(results, tables_by_name), *sigma, *optimistic, *map(Sentence, remark)]
 
 
 def _bias_of_conversion(
     results: Sequence[CaseResult[SonarAxes]], tables_by_name: "Mapping[str, pd.DataFrame]"
-) -> list[str]:
+) -> list[Sentence]:
     """The largest bias of plots that are converted plainly, by its formula; none if none are plain."""
     if "conversion" not in tables_by_name:
         return []
@@ -82,7 +82,7 @@ def _bias_of_conversion(
     )
     if any(tables_by_name["conversion"]["frame"] == "cartesian_unbiased"):
         text += "; " + tr("with the unbiased one none (exact)")
-    return [f"{text}."]
+    return [Sentence(f"{text}.", sentences.intervals("conversion", "bias_m", worst))]
 
 
 def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd.DataFrame]") -> Sentence:

@@ -118,8 +118,8 @@ def confirmation_figure(results: Results, tracks: "pd.DataFrame") -> Figure | No
         return None
     caption = (
         tr(
-            "Probability that a track of the target was confirmed by that time, from {realisations}; thin lines: "
-            "that a confirmed track exists and is on the target.",
+            "Probability that the target's track was confirmed by that time, from {realisations}; thin lines: that a "
+            "confirmed track is on the target.",
             realisations=case_selection.realisations_text(results),
         )
     ) + case_selection.cases_left_out_remark(results, shown_results)
@@ -281,9 +281,8 @@ def classes_figure(results: Results, classes: "pd.DataFrame") -> Figure | None:
         y = Axis(tr("share of target's tracks declared false"), limits=(0, None))
         figure_panels.append(Panel(x, y, tuple(true), direct=False))
     caption = tr(
-        "Errors if a track is declared true once its log likelihood ratio reaches a threshold, from {realisations} "
-        "of each kind. Left: tracks of false plots called true (bound: exp(−threshold)). Right: the target's called "
-        "false.",
+        "Errors if tracks are declared true when their log likelihood ratio reaches a threshold, from {realisations} "
+        "of each kind. Left: false tracks (bound: exp(−threshold)). Right: the target's.",
         realisations=case_selection.realisations_text(results),
     ) + (tr(" Case: {swept}.", swept=_swept_values(case)) if case.swept_values else "")
     return (

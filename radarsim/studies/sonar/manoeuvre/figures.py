@@ -214,8 +214,8 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
             Panel(panel_layout.time_axis(), y, (*manoeuvre_lines(result), *lines), _swept_values(result), direct=False)
         )
     caption = tr(
-        "Share of realisations in which an adaptive filter is in its manoeuvring mode, and mean probability of an "
-        "imm's manoeuvring model, first coordinate. Dotted: beginning and end of the manoeuvre."
+        "Share of realisations with an adaptive filter in its manoeuvring mode, or mean probability of the "
+        "manoeuvring model (IMM), first coordinate. Dotted: beginning and end of the manoeuvre."
     )
     return _figure_of_panels("modes", tr("Manoeuvre state assumed by the filters"), caption, figure_panels)
 
