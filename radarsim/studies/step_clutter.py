@@ -69,13 +69,13 @@ class ClutteredStudy(StepStudy):
         c = record(self.world, spec)
         flight, halves = self.typical_flight(spec), np.transpose(self.halves(spec))
         expected = max(float(self.expected_false_plots(x, half, c)) for x, half in zip(flight, halves, strict=True))
-        places = max(1, math.ceil(pdtrik(1 - CUT, expected)))
+        places = max(1, math.ceil(pdtrik(1 - CUT, expected))) if expected <= MAX_PLACES else math.inf
         if places > MAX_PLACES:
             raise ConfigError(
-                f"study {self.name}: up to {places} false plots in and about the widest gate, at most {MAX_PLACES} "
-                "are drawn: give a smaller density, or let them begin when tracks are accurate"
+                f"study {self.name}: some {expected:.3g} false plots in and about the widest gate, of which "
+                f"{MAX_PLACES} are drawn: give a smaller density, or let them begin when tracks are accurate"
             )
-        return places
+        return int(places)
 
     def typical_flight(self, spec: Any) -> list[Any]:
         """The true states of the scans without noise."""

@@ -70,3 +70,11 @@ def test_tracks_of_more_filters_are_the_twins(filters):
 def test_recorded_plots_do_not_say_which_is_the_targets():
     with pytest.raises(ConfigError, match=r"filters\.0\.association: known: .*: give nearest or pda"):
         study("plane").tracker(case_of([member("extended", association="known")], STRAIGHT, 10, **CLUTTER))
+
+
+@pytest.mark.parametrize("noise", [1e3, 1e17])
+def test_gates_with_too_many_false_plots_are_refused(noise):
+    """Whatever a search tries."""
+    case = case_of([member("extended") | {"sigma_acceleration_mps2": noise}], STRAIGHT, 10, **CLUTTER)
+    with pytest.raises(ConfigError, match="false plots in and about the widest gate"):
+        study("plane").prepare(case)
