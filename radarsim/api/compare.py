@@ -16,9 +16,10 @@ from radarsim.api.result_content import captions, config_names
 from radarsim.api.result_folder import choose_result, find_result
 from radarsim.api.stored_cases import cases_of_result
 from radarsim.config.experiment import Case, Experiment
-from radarsim.config.find_files import is_stem
+from radarsim.config.find_files import did_you_mean, is_stem
 from radarsim.config.identity import digest, identity_keys, world_keys
-from radarsim.errors import ConfigError
+from radarsim.config.quantity_phrase import PhraseError, parse_phrase
+from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import tr, translate_names
 from radarsim.report import atomic_files, csv_text, provenance
 from radarsim.report import tables as common
@@ -103,13 +104,15 @@ def compare(
     figures: bool | str | Sequence[str] = True,
     width_mm: float | None = None,
     component: str | None = None,
+    wanted: str | None = None,
 ) -> Comparison:
     """Compare results with the first one: differences with 95 % intervals, on common axes.
 
     Each source is a result of `run` or `load`, a config with a stored result in results/ or `out`, or the folder of a
     result; a single mapping gives them by name. out: directory for table, page and figures. component: the one that
-    sentences and summary are about, by default the first. If two results use the same measurements and the same
-    baseline filter, the difference is paired.
+    sentences and summary are about, by default the first; wanted says quantity, component and time in one, as in
+    `solve`: `"gain of Vr at 60 s"`. If two results use the same measurements and the same baseline filter, the
+    difference is paired.
 
     `table` is comparison.csv: a row for each quantity, filter, component and common time. Raises ConfigError where
     results are missing or have nothing in common, StoreError where a stored one is damaged.
@@ -122,7 +125,7 @@ def compare(
     arguments.check_arguments(out=out, figures=figures, width_mm=width_mm)
     formats = arguments.figure_formats(figures)
     runs = _runs_to_compare(sources, Path(RESULTS if out is None else out))
-    comparison_table, comparison = _compare_runs(runs, component)
+    comparison_table, comparison = _compare_runs(runs, component, wanted)
     if out is None:
         return comparison
     return _write_comparison(Path(out) / FOLDER, runs, comparison, comparison_table, formats, width_mm)
@@ -145,7 +148,9 @@ def _runs_to_compare(sources: Sequence[Source | Mapping[str, Source]], out: Path
     return _with_distinct_names(runs)
 
 
-def _compare_runs(runs: Sequence[ComparedRun], component: str | None) -> "tuple[pd.DataFrame, Comparison]":
+def _compare_runs(
+    runs: Sequence[ComparedRun], component: str | None, wanted: str | None
+) -> "tuple[pd.DataFrame, Comparison]":
     """The table of a comparison, and the comparison as it is before anything is written."""
     sides_of_runs = [_sides(run) for run in runs]
     pairs, pairing_notes = comparison_pairs.pairs(_label_sides(sides_of_runs))
@@ -155,7 +160,15 @@ def _compare_runs(runs: Sequence[ComparedRun], component: str | None) -> "tuple[
     shared = table.shared_quantities(side for sides in sides_of_runs for side in sides)
     translate = partial(translate_names, names=config_names(case for run in runs for case in _cases(run)))
     quantities = comparison_sentences.summary_quantities(comparison_table, shared)
-    summaries = summary.summaries(comparison_table, quantities, component)
+    at_s = None
+    if wanted is not None:
+        if component is not None:
+            options = argument("component", "--component"), argument("wanted", "--for")
+            raise ConfigError("{}: stands in {} already".format(*options))
+        compared_quantities = [q for q in shared if (comparison_table["quantity"] == q.value).any()]
+        quantity, component, at_s = asked_of_comparison(wanted, compared_quantities)
+        quantities = [quantity]
+    summaries = summary.summaries(comparison_table, quantities, component, at_s)
     notes = [*comparison_sentences.pairing_lines(comparison_table), *pairing_notes]
     warnings = [line for run in runs for line in (*([run.note] if run.note else []), *_stale_tables(run))]
     labelled_sides = [side for sides in _label_sides(sides_of_runs) for side in sides]
@@ -174,6 +187,22 @@ def _compare_runs(runs: Sequence[ComparedRun], component: str | None) -> "tuple[
         figures_by_name={name: reworded(figure, translate) for name, figure in figures.items()},
     )
     return comparison_table, comparison
+
+
+def asked_of_comparison(wanted: str, measured: Sequence[Quantity]) -> tuple[Quantity, str | None, float | None]:
+    """The quantity, component and time, s, of a phrase, None for the last common time. Raises ConfigError."""
+    option = argument("wanted", "--for")
+    try:
+        phrase = parse_phrase(wanted)
+    except PhraseError as error:
+        raise ConfigError(f"{option}: {error}") from None
+    if phrase.over != "at" or phrase.at_k is not None:
+        raise ConfigError(f"{option}: a comparison is of common times: give one in s, or the end, got {wanted!r}")
+    by_name = {quantity.name: quantity for quantity in measured}
+    if phrase.name not in by_name:
+        suggestion = did_you_mean(phrase.name, by_name)
+        raise ConfigError(f"{option}: must be one of {', '.join(by_name)}, got {phrase.name!r}{suggestion}")
+    return by_name[phrase.name], phrase.component, phrase.at_s
 
 
 def _write_comparison(

@@ -183,10 +183,13 @@ def export(result: str, netcdf: str, out: str) -> None:
 @command_group.main.command()
 @click.argument("sources", nargs=-1, required=True, metavar="A B…", shell_complete=options.complete_config)
 @click.option("--component", metavar="NAME", help="The component of the summary, such as y or Vr; default: the first.")
+@click.option(
+    "--for", "wanted", metavar="TEXT", help="What the summary is of: 'sigma y at 60 s', 'gain of Vr at the end'."
+)
 @options.out_option
 @options.drawing_options
 @options.json_option
-def compare(sources: tuple[str, ...], component: str | None, out: str, drawing: options.Drawing, as_json: bool) -> None:
+def compare(sources: tuple[str, ...], as_json: bool, drawing: options.Drawing, **arguments: Any) -> None:
     """Compare stored runs: differences with intervals.
 
     Each of A, B, … is a config with a stored result in DIR, or the folder of a result: two radars, two configs, or two
@@ -198,7 +201,7 @@ def compare(sources: tuple[str, ...], component: str | None, out: str, drawing: 
     Examples
       radarsim compare rls2 rls4
       radarsim compare rls2.yaml mine.yaml --json
-      radarsim compare multimodel multimodel_1hz --component y
+      radarsim compare multimodel multimodel_1hz --for "sigma y at 60 s"
       radarsim compare results/rls2 results-before/rls2
     """
     from radarsim.api import compare as api_compare
@@ -207,7 +210,7 @@ def compare(sources: tuple[str, ...], component: str | None, out: str, drawing: 
 
     if len(sources) < 2:
         raise click.UsageError(f"compare takes two results or more, got {len(sources)}")
-    compared = api_compare.compare(*sources, component=component, out=out, **drawing.arguments)
+    compared = api_compare.compare(*sources, **arguments, **drawing.arguments)
     if as_json:
         click.echo(json_output.text(json_output.comparison(compared)))
     else:

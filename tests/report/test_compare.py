@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from radarsim.api.compare import asked_of_comparison
 from radarsim.errors import ConfigError
+from radarsim.language.current import use_language
 from radarsim.report import csv_text, statistics, tables
 from radarsim.report.comparison import figures, pairs, sentences, summary, table
 from radarsim.report.comparison.pairs import Side
@@ -192,3 +194,37 @@ def test_a_summary_is_about_the_component_asked_for(errors):
     assert "σ of r at" in summary_of(errors, "ab", component="r").sentence
     with pytest.raises(ConfigError, match="must be one of r, got 'q'"):
         summary_of(errors, "ab", component="q")
+
+
+def test_a_summary_is_about_the_time_asked_for(errors):
+    sides = [side(name, errors, ["base", "one"], noise=name) for name in "ab"]
+    made = table.comparison_table([pairs.Pair(sides[1], sides[0])])
+    first_s, second_s, *_, last_s = sorted(set(made["t_s"]))
+    assert f"σ of r at {second_s:g} s" in summary.summaries(made, [SIGMA], at_s=second_s)[0].sentence
+    with pytest.raises(ConfigError, match=f"must be a common time, from {first_s:g} to {last_s:g} s, the nearest"):
+        summary.summaries(made, [SIGMA], at_s=last_s + 7)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "message"),
+    [
+        ("sgma r", "must be one of sigma, got 'sgma'; did you mean sigma?"),
+        ("worst sigma r", "a comparison is of common times"),
+        ("sigma r at noon", "must be a quantity such as"),
+    ],
+)
+def test_what_a_comparison_cannot_be_asked_is_refused(wanted, message):
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        asked_of_comparison(wanted, [SIGMA])
+
+
+def test_a_comparison_is_asked_with_the_phrase_of_the_other_commands():
+    assert asked_of_comparison("sigma of y at 60 s", [SIGMA]) == (SIGMA, "y", 60.0)
+    assert asked_of_comparison("sigma y at the end", [SIGMA]) == (SIGMA, "y", None)
+
+
+def test_gains_differ_by_points():
+    row = {"percent": np.nan, "difference": 53.7, "unit": "%", "difference_lo": 51.6, "difference_hi": 55.8}
+    assert sentences.change_texts(row)[0] == "+53.7 points [+51.6, +55.8]"
+    with use_language("ru"):
+        assert sentences.change_texts(row)[0] == "+53,7 пункта [+51,6; +55,8]"

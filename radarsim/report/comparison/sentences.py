@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from radarsim.errors import ConfigError, argument
 from radarsim.language.translate import tr
 from radarsim.report.comparison.table import MEANING
 from radarsim.report.quantities import Quantity
@@ -23,9 +26,19 @@ def summary_quantities(comparison: "pd.DataFrame", measured: Iterable[Quantity])
     ]
 
 
-def final_rows(comparison: "pd.DataFrame") -> "pd.DataFrame":
-    """The rows of the last common time of each line, of those with a value on both sides."""
+def final_rows(comparison: "pd.DataFrame", at_s: float | None = None) -> "pd.DataFrame":
+    """The rows of the last common time of each line, or of that at at_s, s, of those with a value on both sides. Raises
+    ConfigError for a time that is not common."""
     keys = ["quantity", "label", "against_label", "filter", "component", "model"]
+    if at_s is not None:
+        t_s = comparison["t_s"].to_numpy(dtype=float)
+        comparison = comparison[np.isclose(t_s, at_s, rtol=1e-9)]
+        if not len(comparison):
+            low, near, high = np.nanmin(t_s), t_s[np.nanargmin(np.abs(t_s - at_s))], np.nanmax(t_s)
+            raise ConfigError(
+                f"{argument('wanted', '--for')}: must be a common time, from {low:g} to {high:g} s, the nearest "
+                f"{near:g} s, got {at_s:g}"
+            )
     last = comparison.groupby(keys, sort=False).tail(1)
     return last[last["value"].notna() & last["against"].notna()]
 
@@ -33,7 +46,9 @@ def final_rows(comparison: "pd.DataFrame") -> "pd.DataFrame":
 def change_texts(row: dict[Any, Any]) -> tuple[str, str]:
     """The difference of a value, with its interval; and the exact difference where known beside a sample."""
     if row["percent"] != row["percent"]:
-        text = f"{signed(row['difference'])} {tr(unit_of(row['unit']))}".rstrip()
+        size = signed(row["difference"])
+        is_share = row["unit"] == "%"
+        text = tr("{size} points", size=size) if is_share else f"{size} {tr(unit_of(row['unit']))}".rstrip()
         return f"{text} {interval(signed(row['difference_lo']), signed(row['difference_hi']))}", ""
     exact = row["exact_percent"]
     if row["lo"] == row["hi"] and row["against_lo"] == row["against_hi"] and exact == exact:

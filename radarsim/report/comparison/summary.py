@@ -41,10 +41,11 @@ class Summary(NamedTuple):
 
 
 def summaries(
-    comparison: "pd.DataFrame", quantities: Sequence[Quantity], component: str | None = None
+    comparison: "pd.DataFrame", quantities: Sequence[Quantity], component: str | None = None, at_s: float | None = None
 ) -> list[Summary]:
-    """A summary for each quantity; of one component, if it is given. Raises ConfigError for an unknown one."""
-    rows = _without_equal_cases(final_rows(comparison))
+    """A summary for each quantity; of one component, and of a time at_s, s, if they are given, else of the last. Raises
+    ConfigError for an unknown one."""
+    rows = _without_equal_cases(final_rows(comparison, at_s))
     by_quantity = [(quantity, rows[rows["quantity"] == quantity.value]) for quantity in quantities]
     _check_component(component, [name for _, of_quantity in by_quantity for name in _components(of_quantity)])
     return [
