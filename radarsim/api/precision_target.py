@@ -32,6 +32,12 @@ class PrecisionTarget(NamedTuple):
     curves: "Table | None"
 
 
+def precision_target(work: CaseWork, percent: float, text: str) -> PrecisionTarget:
+    """The precision of what is asked for, for a case."""
+    quantity = registry.quantity(asked_phrase(text).name, work.case)
+    return PrecisionTarget(percent, quantity, asked_table(work.case, text), heavy_tailed_table(work, quantity))
+
+
 def heavy_tailed_table(work: CaseWork, quantity: Quantity) -> "Table | None":
     """The table of a case's curves where rare large errors may decide a quantity; None where they do not."""
     if not quantity.squares or (work.plan.gaussian and not work.case.user_filters):

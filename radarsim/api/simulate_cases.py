@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from radarsim.api.case_results import case_result
 from radarsim.api.case_work import CaseWork
-from radarsim.api.precision_target import PrecisionTarget, asked_phrase, asked_table, heavy_tailed_table
 from radarsim.api.progress import Progress, WeightedProgress
-from radarsim.api.run_to_precision import collect_to_precision
 from radarsim.config.experiment import Case, Experiment
 from radarsim.engine.collect import collect, compute_share, read_stored
 from radarsim.engine.dispatch import CollectedSums, ShareResult
@@ -20,9 +18,9 @@ from radarsim.engine.executors import Executor
 from radarsim.engine.results import CaseResult
 from radarsim.engine.stop_conditions import Stop
 from radarsim.engine.store.inventory import take_inventory
-from radarsim.studies import registry
 
 if TYPE_CHECKING:
+    from radarsim.api.precision_target import PrecisionTarget
     from radarsim.report.precision import WidestInterval
 
 
@@ -123,10 +121,9 @@ def simulate(
                 collector = _collector(work, options, weighted_progress.case_callback(key), collect)
                 target = None
                 if precision is not None:
-                    quantity = registry.quantity(asked_phrase(quantity_name).name, case)
-                    target = PrecisionTarget(
-                        precision, quantity, asked_table(case, quantity_name), heavy_tailed_table(work, quantity)
-                    )
+                    from radarsim.api.precision_target import precision_target
+
+                    target = precision_target(work, precision, quantity_name)
                 collected_by_key[key] = _collect_case(case, work, target, collector, _stored_count(work, case, options))
             collected, cell = collected_by_key[key]
             if collected.count:
@@ -176,13 +173,15 @@ def _collector(
 def _collect_case(
     case: Case,
     work: CaseWork,
-    target: PrecisionTarget | None,
+    target: "PrecisionTarget | None",
     collector: Callable[[int], CollectedSums],
     at_least: int = 0,
 ) -> "tuple[CollectedSums, WidestInterval | None]":
     """The sums of a case, and the cell of its widest interval where a precision is set. at_least: realisations that are
     stored, and used in any case."""
     if target is not None:
+        from radarsim.api.run_to_precision import collect_to_precision
+
         return collect_to_precision(case, work, target, collector, at_least)
     collected = collector(case.realisations)
     if collected.count < at_least:

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple, TypeVar
 from radarsim.config.common_keys import COMMON_KEYS
 from radarsim.config.experiment import Case
 from radarsim.config.find_files import did_you_mean
-from radarsim.config.quantity_phrase import OVER_SCANS, Over
 from radarsim.config.study_keys import StudyKeys as Keys
 from radarsim.config.study_keys import extend_kinds, possible_kinds
 from radarsim.errors import AUTHOR_ERRORS, ConfigError, RadarsimError, StudyError
@@ -201,8 +200,10 @@ def quantity(name: str, case: Case) -> Quantity:
     return measured[spelt]
 
 
-def counted_from_s(case: Case, component: str | None, over: Over, from_s: float | None) -> float | None:
+def counted_from_s(case: Case, component: str | None, over: str, from_s: float | None) -> float | None:
     """The time, s, from which on the scans of a quantity over several count: the one asked for, else the study's."""
+    from radarsim.config.quantity_phrase import OVER_SCANS
+
     if over in OVER_SCANS and from_s is None:
         scans = study(case.study).counted_scans(case, component)
         return None if scans is None else scans.t_s

@@ -176,7 +176,9 @@ def summary_of(errors, names, filters=("base", "one"), component=None):
 
 def test_a_summary_is_one_sentence_and_one_table_without_the_case_compared_with_itself(errors):
     single = summary_of(errors, "ab")
-    assert re.fullmatch(r"b against a, σ of r at \d+ s: base 0 % \(exact\) and one 0 % \(exact\)\.", single.sentence)
+    assert re.fullmatch(
+        r"b against a, σ of r at \d+ s: “base” 0 % \(exact\) and “one” 0 % \(exact\)\.", single.sentence
+    )
     assert single.table.columns[:4] == ("filter", "of", "b", "a")
     several = summary_of(errors, "abc")
     assert re.fullmatch(r"Against a, σ of r at \d+ s: undecided in 4 of 4 pairs of case and filter\.", several.sentence)
