@@ -142,7 +142,7 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
     needed = half_chi2(1 - FALSE_FINDING_LEVEL / len(names))
     chosen_names: list[str] = []
     start: dict[str, float] = {}
-    value_so_far, results = log_likelihood(counted, {}), []
+    value_so_far, results, weaker_rival = log_likelihood(counted, {}), [], None
     while len(chosen_names) < min(MAX_FINDINGS, len(names)):
         trials = {name: maximise(counted, [*chosen_names, name], start) for name in names if name not in chosen_names}
         trials = {name: maximum for name, maximum in trials.items() if not is_least_share(name, maximum[0][name])}
@@ -162,16 +162,21 @@ def find_errors(likelihood: Likelihood, progress: Progress = no_progress) -> lis
                 names = [MANOEUVRES if name == OUTLIERS else name for name in names if name != CORRELATION]
                 best_name = MANOEUVRES
                 values, top = maximise(counted, [*chosen_names, best_name], start)
+            else:
+                weaker_rival = rival
             rival = None
         values, top = _polish_values(counted, values)
         results.append(Finding(best_name, values[best_name], top - value_so_far, rival=rival))
         chosen_names, start, value_so_far = [*chosen_names, best_name], values, top
+    rows = _rows_of_outliers(likelihood, start) if OUTLIERS in start else ()
     return [
         replace(
             finding,
             value=start[finding.name],
             from_zero=_is_distinguished_from_zero(counted, finding.name, start, value_so_far),
-            rows=_rows_of_outliers(likelihood, start) if finding.name == OUTLIERS else (),
+            rows=rows if finding.name == OUTLIERS else (),
+            # Outliers of which no row is one may be manoeuvres, however the likelihood prefers them.
+            rival=finding.rival or (weaker_rival if finding.name == OUTLIERS and not rows else None),
         )
         for finding in results
         if not is_least_share(finding.name, start[finding.name])  # what was found after it explains the plots too
