@@ -20,6 +20,8 @@ MIN_JUMP_LEGS = 5.0  # median distances from row to row
 MIN_ORBIT_MPS, MIN_ORBIT_M = 5000.0, 150e3  # of a target in orbit, from a radar
 MIN_MOVING_SCATTER = 3.0  # of a track's rows, which half of it must cover: shorter legs may be noise
 MAX_JUMP_STEPS = 5.0  # median steps of a track: after a longer gap its number may be another target's
+MIN_ALTERNATING_ROWS, MIN_ALTERNATING_SHARE = 20, 0.9  # of a track
+MAX_ALTERNATING_RATIO = 0.5  # of the distances from the last row but one and from the last
 MAX_JUMP_SHARE = 0.05  # of rows; where more jump, other checks say why
 NEIGHBOURS = 5  # rows of which a row's place is compared with the median
 MIN_ROWS = 5  # of a track
@@ -104,6 +106,18 @@ def jump_notes(names: Sequence[str], t_s: np.ndarray, positions: np.ndarray, is_
            "{after:.0f} m of range at {time:g} s: a unit, a zero or the target changes there",
            count=len(jumps), track=name, before=before, after=after, time=time_s)
     ]  # fmt: skip
+
+
+def alternation_note(name: str, positions: np.ndarray) -> str | None:
+    """A note that the rows of a track, positions (n, d) in the order of time, alternate between two places: almost each
+    is nearer to the last but one than to the one before it. Errors do not make it so, nor motion."""
+    if len(positions) < MIN_ALTERNATING_ROWS:
+        return None
+    single, double = (np.linalg.norm(positions[2:] - positions[2 - lag : -lag], axis=1) for lag in (1, 2))
+    if (double < MAX_ALTERNATING_RATIO * single).mean() < MIN_ALTERNATING_SHARE:
+        return None
+    return tr("the rows of track {track} alternate between two places, {distance:.0f} m apart (median): two sensors or "
+              "targets have one name", track=name, distance=float(np.median(single)))  # fmt: skip
 
 
 def median_speed(tracks: Sequence[TrackPositions]) -> float:

@@ -282,6 +282,8 @@ class _Import:
         columns = {"t_s": t - self.zero} | self._add_places(batch)
         if not self.all_at_once and self.legs.has_jump(batch.track, t, self._positions(batch, columns)):
             raise NeedsAllRows
+        if not self.result.rows:  # the first batch of rows shows it
+            self._note_alternation(batch, self._positions(batch, columns))
         if self.site_distance and batch.kind == POSITIONS:
             self.site_distance.add(batch)
         if batch.kind == PLOTS:
@@ -300,6 +302,13 @@ class _Import:
         self.result.rows += len(t)
         times, *other_columns = (column_texts(column) for column in columns.values())
         return zip(times, *names.values(), *other_columns, strict=True)
+
+    def _note_alternation(self, batch: Batch, positions: np.ndarray) -> None:
+        """Note the first track of a batch that alternates between two places."""
+        for name, rows in rows_by_name(batch.track).items():
+            if name and (note := target_speed.alternation_note(name, positions[rows])):
+                self.result.notes.append(note)
+                return
 
     def _time_zero(self, first: float) -> float:
         """The origin of t_s, in the times of the recording."""

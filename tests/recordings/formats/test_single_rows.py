@@ -63,6 +63,22 @@ def test_ranges_that_change_their_unit_are_no_swapped_velocities(tmp_path, chang
     assert len(columns["range_m"]) == N
 
 
+@pytest.mark.parametrize("kind", ["two sensors", "errors", "cells"])
+def test_two_sensors_under_one_name_are_noticed(tmp_path, kind):
+    """Against errors that hide the motion, and a target at rest on the border of two range cells."""
+    r, _ = courses()
+    if kind == "errors":
+        r = 30_000 + np.random.default_rng(1).normal(0, 500, N)
+    elif kind == "cells":
+        r = 30_000 + 75.0 * (np.random.default_rng(2).random(N) < 0.5)
+    other = r + 5000 if kind == "two sensors" else np.roll(r, N // 2)
+    rows = [f"{t + shift},7,{a:.1f}" for t, *pair in zip(T, r, other, strict=True) for shift, a in enumerate(pair)]
+    done, columns, _ = imported(tmp_path, "\n".join(["time,track,range_m", *rows]).encode())
+    alternates = [note.startswith("the rows of track 7 alternate between two places, 4825 m") for note in done.notes]
+    assert alternates == [True] * (kind == "two sensors")
+    assert len(columns["range_m"]) == 2 * N
+
+
 def test_the_end_of_a_day_may_be_called_24_00(tmp_path):
     clocks = [f"{int(t // 3600):02}:{int(t % 3600 // 60):02}:{int(t % 60):02}" for t in 86_400 - 150 + T]
     clocks = [clock if clock <= "24:00:00" else "00" + clock[2:] for clock in clocks]
