@@ -146,7 +146,7 @@ ROOMS = {
     ),
     "api.design": (
         *("api", "config", "engine", "language", "report", "report.drawing", "report.user_filters"),
-        "studies.registry",
+        *("studies.counted_scans", "studies.registry"),
     ),
     "api.maintenance": (
         *("api", "config", "engine", "engine.store", "extensions", "kernels.cache", "report"),

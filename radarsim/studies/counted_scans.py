@@ -139,8 +139,18 @@ def result_scans(study: "Study", result: CaseResult[Any], component: str | None 
 
 
 def spread_by_scan(study: "Study", case: Case, axes: Axes, c: int, filters: Sequence[int] | None = None) -> np.ndarray:
-    """The spread (F, K) of the errors in component c about their means, which a target's motion makes: exact where it
-    is known exactly, else of a few realisations with a seed of their own. filters: the F by index, by default all."""
+    """The spread (F, K) of the errors in component c about their means, which a target's motion makes; not-a-number
+    where there is no estimate. filters: the F by index, by default all."""
+    sigma, bias = sigma_and_bias_by_scan(study, case, axes, c, filters)
+    with np.errstate(over="ignore", invalid="ignore"):  # of filters that are lost
+        return np.sqrt(np.maximum(sigma**2 - bias**2, 0.0))
+
+
+def sigma_and_bias_by_scan(
+    study: "Study", case: Case, axes: Axes, c: int, filters: Sequence[int] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """σ and mean (F, K) of the errors in component c: exact where they are known exactly, else of a few realisations
+    with a seed of their own; not-a-number where there is no estimate. filters: the F by index, by default all."""
     chosen = list(range(len(axes.filters)) if filters is None else filters)
     available = np.asarray(axes.available)[chosen, :, c]
     sigma, bias = (np.array(values, dtype=float)[chosen, :, c] for values in (axes.exact_sigma, axes.exact_bias))
@@ -155,5 +165,4 @@ def spread_by_scan(study: "Study", case: Case, axes: Axes, c: int, filters: Sequ
         for name, k, sigma_of_scan, bias_of_scan in curves[["filter", "k", "sigma", "bias"]].to_numpy():
             if name in rows:
                 sigma[rows[name], places[int(k)]], bias[rows[name], places[int(k)]] = sigma_of_scan, bias_of_scan
-    with np.errstate(over="ignore", invalid="ignore"):  # of filters that are lost
-        return np.where(available, np.sqrt(np.maximum(sigma**2 - bias**2, 0.0)), np.nan)
+    return np.where(available, sigma, np.nan), np.where(available, bias, np.nan)

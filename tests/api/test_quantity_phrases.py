@@ -183,7 +183,7 @@ def test_a_long_run_without_a_formula_extends_the_horizon_until_it_has_settled()
     variance = load("ambiguous_rls4").cases[0].spec.filters[1].variances[0]
     limit = steady_sigma(answer.value, variance, radar.scan_period_s, radar.sigma_range_m)
     assert limit == pytest.approx(16, rel=2e-3)
-    assert f"in the long run (settled, at {answer.last_s:g} s)" in answer.lines[1][1]
+    assert f"in the long run (settled; with the keys as stated at {answer.last_s:g} s)" in answer.lines[1][1]
     assert answer.last_s > 140
 
 

@@ -11,7 +11,7 @@ from radarsim.api.design import tuning_search, tuning_space
 from radarsim.api.design.objective import Objective
 from radarsim.api.design.quantities import QuantityName, check_quantity, parse_quantity
 from radarsim.api.design.solve import solve
-from radarsim.api.design.tune import tune
+from radarsim.api.design.tune import judged_point, tune
 from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
 from radarsim.studies import registry
@@ -497,3 +497,12 @@ def test_a_value_at_the_end_of_the_search_has_no_interval():
 def test_many_keys_are_to_be_named():
     with pytest.raises(ConfigError, match="has 8 keys to tune: name those to tune, of models, transition and"):
         tune("multimodel", "sigma y at 60 s", filter="MMA2-122")
+
+
+def test_where_no_sigma_is_exact_the_worst_scan_is_that_of_a_few_realisations():
+    """A turn from 60 s on, with missed plots: the worst σ of the range lies within it or soon after."""
+    turn = "target={kind: turn, range_m: 8e4, speed_mps: 250, aspect_deg: 180, start_s: 60, acceleration_g: 3, "
+    overrides = ["radar.detection_probability=0.85", turn + "duration_s: 20}", "scans=20"]
+    component, t_s = judged_point(load("rls2", overrides), "worst sigma r from 60 s")
+    assert component == "r"
+    assert 60 <= t_s <= 110

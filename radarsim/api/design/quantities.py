@@ -29,7 +29,7 @@ OVER_TEXTS = {  # by what is taken, and whether a time is given
     ("mean", True): term("mean {what} from {t_s:g} s on"),
     ("mean", False): term("mean {what}"),
 }
-SETTLED_AT = term("{what} (settled, at {t_s:g} s)")
+SETTLED_AT = term("{what} (settled; with the keys as stated at {t_s:g} s)")
 
 
 class QuantityName(NamedTuple):

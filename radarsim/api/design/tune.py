@@ -59,6 +59,7 @@ from radarsim.language.translate import plural, tr
 from radarsim.report.user_filters.rival_comparison import TUNED
 from radarsim.report.wording import format_number
 from radarsim.studies import registry
+from radarsim.studies.counted_scans import sigma_and_bias_by_scan
 
 TUNED_OUT = f"{RESULTS}/tuned"  # where the run with tuned values writes
 # More than the seed of the config: the seeds of the noise that is searched with, and that the best is chosen with.
@@ -383,7 +384,7 @@ def tune_baseline(
         members = [*map(all_keys, spec.members), *(result.member(family_case) for result in results)]
         tuned_cases.append(case_with_filters(family_case, members, getattr(spec, "baseline", None)))
     tuned = replace(experiment, cases=tuple(tuned_cases), content=tuned_content(experiment, tuned_cases))
-    return tuned, left_out, _point_of(results[0].quantity, axes)
+    return tuned, left_out, _point_of(results[0].quantity, case, axes)
 
 
 def judged_point(experiment: Experiment, target: str) -> tuple[str, float] | None:
@@ -397,28 +398,25 @@ def judged_point(experiment: Experiment, target: str) -> tuple[str, float] | Non
     if quantity.over == "mean":
         option = argument("wanted", "--for")
         raise ConfigError(f"{option}: a judgement is about one scan: give a time, or worst, got {target!r}")
-    return _point_of(quantity, axes)
+    return _point_of(quantity, case, axes)
 
 
-def _point_of(quantity: MeasuredQuantity, axes: Axes) -> tuple[str, float] | None:
-    """The component and the time, s, of a quantity; of a worst one that at which the best filter's exact σ is largest.
-    None without a component, and of what is not at one scan."""
+def _point_of(quantity: MeasuredQuantity, case: Case, axes: Axes) -> tuple[str, float] | None:
+    """The component and the time, s, of a quantity; of a worst one that at which the best filter's σ is largest. None
+    without a component, and of what is not at one scan."""
     if quantity.over != "at" and quantity.component:
-        return _worst_point(quantity, axes) if quantity.over == "worst" else None
+        return _worst_point(quantity, case, axes) if quantity.over == "worst" else None
     at_s = axes.t_s[-1] if quantity.at_s is None else quantity.at_s
     at_s = at_s if quantity.at_k is None else axes.t_s[list(axes.k).index(quantity.at_k)]
     return (quantity.component, float(at_s)) if quantity.component else None
 
 
-def _worst_point(quantity: MeasuredQuantity, axes: Axes) -> tuple[str, float]:
-    """Raises ConfigError where no exact σ says at which scan it is."""
+def _worst_point(quantity: MeasuredQuantity, case: Case, axes: Axes) -> tuple[str, float]:
+    """By exact σ, else by that of a few realisations."""
     component = str(quantity.component)
     c = [name for name, _ in axes.components].index(component)
-    t_s = np.asarray(axes.t_s, dtype=float)
-    sigma = np.where(axes.available[:, :, c], np.asarray(axes.exact_sigma, dtype=float)[:, :, c], np.inf)
+    sigma, _ = sigma_and_bias_by_scan(registry.study(case.study), case, axes, c)
     best = np.fmin.reduce(np.where(np.isnan(sigma), np.inf, sigma), axis=0)
+    t_s = np.asarray(axes.t_s, dtype=float)
     counted = np.isfinite(best) & (t_s >= (quantity.from_s or 0.0) * (1 - 1e-12))
-    if not counted.any():
-        option = argument("wanted", "--for")
-        raise ConfigError(f"{option}: the worst scan is not known: no exact σ in {component}; give a time")
     return component, float(t_s[np.where(counted, best, -np.inf).argmax()])
