@@ -46,6 +46,7 @@ WORDS = {  # of components in English, which does not inflect them
     **{component.name: component.words for component in (*RADIAL, *COMPONENTS_BY_NAME.values())},
     **{"y": "height", "vy": "rate of climb"},
 }
+SWEPT = re.compile(r"\([^()]* = [^()]*\)")  # the swept values of a case, such as its range
 NO_COMPONENT = re.compile(r"range alone")  # a baseline
 
 
@@ -233,7 +234,8 @@ class _Place(NamedTuple):
         for label, of_names in names.items():
             if label in column.labels:
                 values = column.labels[label].to_numpy()
-                parts = (self.sentence,) if label == "component" else (self.before, self.after, self.sentence)
+                of_component = (SWEPT.sub("", self.sentence),)
+                parts = of_component if label == "component" else (self.before, self.after, self.sentence)
                 named = next(filter(None, (_named(part, of_names) for part in parts)), set())
                 if label == "component":
                     named &= set(values)
