@@ -138,7 +138,7 @@ def _option_text(value: Any) -> str:
 
 
 def _gains_text(trial: Trial) -> str:
-    last = tr("gain {gain} % at the last scan", gain=numeral(f"{trial.last:.0f}"))
+    last = tr("then the gain is {gain} % at the last scan", gain=numeral(f"{trial.last:.0f}"))
     if math.isnan(trial.worst):
         return last
     return tr("{last}, {gain} % at worst from the manoeuvre on", last=last, gain=numeral(f"{trial.worst:.0f}"))

@@ -85,9 +85,9 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
 def _trial_text(trial: Trial) -> str:
     share = numeral(f"{100 * trial.share:.2g}")
     if math.isnan(trial.gain):
-        return tr("{share} % lost", share=share)
+        return tr("then {share} % are lost", share=share)
     gain = numeral(f"{trial.gain:.0f}")
-    return tr("{share} % lost, gain in range {gain} %", share=share, gain=gain)
+    return tr("then {share} % are lost, the gain in range is {gain} %", share=share, gain=gain)
 
 
 def _is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:
