@@ -222,7 +222,8 @@ def test_list_is_one_screen_and_takes_words(tmp_path, monkeypatch):
     assert shown[0].startswith(f"{len(names)} configs ")
     titles = [line for line in listed("P2").splitlines() if line.startswith(("Configs", "Scenarios", "Studies"))]
     assert [title.split()[0] for title in titles] == ["Studies", "Scenarios", "Configs"]
-    assert "multimodel_1hz" in listed("P2")
+    assert "10 variants of multimodel: `radarsim list multimodel`" in listed("P2")
+    assert "multimodel_1hz" in listed("multimodel")
     assert "sonar" not in listed("P2")
     assert "rls2" not in listed("sonar")
     assert "sonar_clutter" in listed("sonar")
