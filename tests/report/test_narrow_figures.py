@@ -119,6 +119,15 @@ def crowded_panels(figure):
     ]
 
 
+@pytest.mark.parametrize("width", WIDTHS_MM)
+def test_a_long_name_in_a_legend_is_broken_into_rows(width):
+    x = np.arange(3.0)
+    names = ("r+V, ideal = r+V+a, ideal = r+V, random jerk = r+V+a, random jerk = r+V = r+V+a", "r")
+    panel = Panel(Axis("x"), Axis("y"), tuple(Line(x, x + n, name) for n, name in enumerate(names)))
+    for count in (1, 3):
+        assert faults_of_widths({"f": Figure("f", "F", "A flight.", (panel,) * count, 3, width)}) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("config", CONFIGS)
 def test_no_figure_of_a_shipped_config_is_cut_or_crowded(config):

@@ -45,6 +45,7 @@ from radarsim.report.wording import with_unbroken_units
 
 FILE_STYLE: Any = {name: STYLE[name] for name in ("pdf.fonttype", "ps.fonttype", "svg.fonttype")}
 WIDTH_STEP_MM = 5.0  # by which a width is increased at which something would be cut, or the figure taller than a page
+MAX_BESIDE_SHARE = 0.45  # of a figure's width, for a legend beside its panel
 A4_HEIGHT_MM = 297.0
 LEAST_PANEL_MM = 15.0  # width of its axes
 ROUNDING_INCHES = 1e-3
@@ -235,12 +236,12 @@ def _draw_common_legend(
     if plan.common is None:
         return
     if plan.stands_beside:
-        draw_legend(grid.flat[0], plan.common, 1, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+        width_mm = MAX_BESIDE_SHARE * figure.width_mm
+        draw_legend(grid.flat[0], plan.common, width_mm, 1, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     elif in_cell:
-        cell_columns = plan.common.columns(figure.width_mm / columns - SIDE_MM)
-        draw_legend(grid.flat[len(plan.panels)], plan.common, cell_columns, loc="center")
+        draw_legend(grid.flat[len(plan.panels)], plan.common, figure.width_mm / columns - SIDE_MM, loc="center")
     else:
-        draw_legend(canvas, plan.common, plan.common.columns(figure.width_mm), loc="outside lower center")
+        draw_legend(canvas, plan.common, figure.width_mm, loc="outside lower center")
 
 
 @contextmanager

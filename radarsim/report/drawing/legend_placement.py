@@ -11,7 +11,7 @@ import numpy as np
 from radarsim.language.translate import tr
 from radarsim.report.drawing.line_points import rough_points
 from radarsim.report.drawing.model import Figure, Line, Panel, Style
-from radarsim.report.drawing.style import LETTER_MM, ROUGH_KEY, ROW_MM, SAMPLE_MM
+from radarsim.report.drawing.style import LETTER_MM, ROUGH_KEY, ROW_MM, SAMPLE_MM, wrap
 from radarsim.report.math_text import plain_text
 
 MAX_END_NAME_LETTERS = 28  # of a name at a line's end
@@ -36,10 +36,15 @@ class Legend:
         longest = max((len(plain_text(name)) for name in self.keys), default=0)
         return max(1, min(len(self.keys), int(width_mm / (LETTER_MM * longest + SAMPLE_MM))))
 
+    def names(self, width_mm: float) -> list[str]:
+        """The names, those that are longer than a width broken into rows."""
+        letters = (width_mm - SAMPLE_MM) / LETTER_MM
+        return [wrap(name, letters, " ") for name in self.keys]
+
     def height_mm(self, width_mm: float) -> float:
         """Height of the legend at a width."""
-        rows = -(-len(self.keys) // self.columns(width_mm)) + bool(self.title)
-        return ROW_MM * rows + 2.0
+        lines = sum(name.count("\n") + 1 for name in self.names(width_mm))
+        return ROW_MM * (-(-lines // self.columns(width_mm)) + bool(self.title)) + 2.0
 
 
 @dataclass(frozen=True)

@@ -37,11 +37,14 @@ def name_line_ends(axes: Axes, panel: Panel) -> list[Annotation]:
     return names
 
 
-def draw_legend(target: Axes | Canvas, legend: Legend, columns: int, **position: Any) -> None:
-    """Draw names and styles, and the crosses of exact values, in so many columns."""
+def draw_legend(
+    target: Axes | Canvas, legend: Legend, width_mm: float, columns: int | None = None, **position: Any
+) -> None:
+    """Draw names and styles, and the crosses of exact values, no wider than asked, in as many columns as fit."""
     handles = [Line2D([], [], **(EXACT if style is None else line_options(style))) for style in legend.keys.values()]
-    spacing: dict[str, Any] = {"ncols": columns, "borderaxespad": 0.3, "labelspacing": 0.3, "columnspacing": 1.2}
-    names, title = list(legend.keys), legend.title or None
+    spacing: dict[str, Any] = {"borderaxespad": 0.3, "labelspacing": 0.3, "columnspacing": 1.2}
+    spacing["ncols"] = columns or legend.columns(width_mm)
+    names, title = legend.names(width_mm), legend.title or None
     drawn_legend = target.legend(handles, names, title=title, alignment="left", **position, **spacing)
     # Inside a panel it may not push it to nothing; beside it, it takes its room.
     drawn_legend.set_in_layout(isinstance(target, Canvas) or "bbox_to_anchor" in position)
@@ -52,8 +55,7 @@ def draw_legend_below(axes: Axes, legend: Legend | None, width_mm: float) -> Non
     if legend is None:
         return
     origin = axes.transAxes + ScaledTranslation(0, -AXIS_MM * MM, axes.figure.dpi_scale_trans)
-    columns = legend.columns(width_mm)
-    draw_legend(axes, legend, columns, loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=origin)
+    draw_legend(axes, legend, width_mm, loc="upper left", bbox_to_anchor=(0.0, 0.0), bbox_transform=origin)
 
 
 def separate_names(names: list[Annotation]) -> None:

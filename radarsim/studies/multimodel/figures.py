@@ -243,11 +243,15 @@ def _sigma_panels(result: CaseResult, rows: Mapping, component: str, title: str)
     _, symbol, unit = SIGMAS[component]
     lines: dict[str, list[Line]] = {}
     has_families = len(result.axes.filters) > MAX_PANEL_LINES
+    kinds = [(options.family, options.merge) for options in result.spec.filters]
+    is_named_by_rule = len(set(kinds)) == len(kinds) and _has_many_filters(result)
     for f, options, style in zip(result.axes.filters, result.spec.filters, _styles(result), strict=True):
         if (result.name, f) in rows:
             family = tr(FAMILIES.get(options.family, options.family)) if has_families else ""
-            name, look = key_labels.escape_dollars(f), replace(style, marker=None)
-            line = figure_lines.line_from_rows(rows[result.name, f], figure_lines.SIGMA[:4], name, look)
+            name, label, look = key_labels.escape_dollars(f), "", replace(style, marker=None)
+            if family and is_named_by_rule:
+                label, look = options.merge.replace("_", " "), replace(look, dash=0)
+            line = figure_lines.line_from_rows(rows[result.name, f], figure_lines.SIGMA[:4], label or name, look, name)
             lines.setdefault(family, []).append(line)
     y = Axis(key_labels.label_with_unit(tr("full r.m.s. error of {symbol}", symbol=symbol), unit), "log")
     stage_lines = _stage_lines([result])
