@@ -224,7 +224,7 @@ def test_covariances_that_no_number_follows_from_are_counted(variance):
         return plots["range_m"][..., None], np.full((*plots["range_m"].shape, 1, 1), variance)
 
     result = judged(believed, realisations=200)
-    assert any("In 200 of 200 realisations mine gives a covariance" in line for line in result.answer)
+    assert any("In 200 of 200 realisations “mine” gives a covariance" in line for line in result.answer)
 
 
 def test_one_block_alone_repeats_nothing():
