@@ -461,9 +461,9 @@ def test_a_covariance_that_is_none_does_not_enter_nees(estimates):
     assert of(result.tables["nees"], k=14)["n"].tolist() == [300]
     assert of(result.tables["failures"], reason="not_positive_definite")["failed"].tolist() == [40]
     assert of(result.tables["failures"], reason="any")["failed"].tolist() == [0]
-    assert any(line.startswith("In 40 of 300 realisations mine gives a covariance") for line in result.answer)
+    assert any(line.startswith("In 40 of 300 realisations “mine” gives a covariance") for line in result.answer)
     none = radarsim.judge("rls2", (estimates, -P)).answer
-    assert any(line.startswith("In 300 of 300 realisations mine gives a covariance") for line in none)
+    assert any(line.startswith("In 300 of 300 realisations “mine” gives a covariance") for line in none)
 
 
 def test_below_the_floor_it_is_said_why(estimates):
