@@ -262,6 +262,12 @@ def test_words_along_the_top_lie_between_a_panel_and_its_title():
     assert axes.transData.transform((1.0, 0.0))[0] == pytest.approx((box.x0 + box.x1) / 2, abs=1)  # a pixel
 
 
+def test_a_line_beyond_its_axis_takes_no_room():
+    panel = Panel(Axis("x"), Axis("y", limits=(99.98, 99.99)), (line(), Reference(0)))
+    (axes,) = drawing_canvas.render(Figure("f", "", "", (panel,))).axes
+    assert axes.get_tightbbox().height < 2 * axes.bbox.height
+
+
 def test_words_of_a_line_at_the_left_rim_stand_right_of_it():
     for value, side in ((1.0, "left"), (9.0, "right")):
         panel = Panel(Axis("x", limits=(0, 10)), Axis("y"), (line(), Reference(value, "x", "shipped")))

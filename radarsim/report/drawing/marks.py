@@ -123,7 +123,8 @@ def _draw_reference(axes: Axes, mark: Reference, x: AxisSpec) -> None:
     text: dict[str, Any] = {"s": f" {mark.label} ", "ha": "right", "va": "bottom", "color": "#555555"}
     if mark.axis_name == "y":
         axes.axhline(mark.value, **options)
-        axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **text)
+        if mark.label:  # an empty text beyond the axis would take room too
+            axes.text(0.99, mark.value, transform=axes.get_yaxis_transform(), **text)
     else:
         axes.axvline(mark.value, **options)
         low, high = x.limits
