@@ -22,7 +22,7 @@ from radarsim.kernels.compiler import aligned_zeros
 from radarsim.kernels.lanes import WIDTH
 from radarsim.studies.plane import design, expected_plot
 from radarsim.studies.registry import study
-from radarsim.studies.stepwise import draw_plots
+from radarsim.studies.step_plots import draw_plots
 
 RADAR = {
     "wavelength_m": 0.1,

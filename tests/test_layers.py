@@ -93,20 +93,28 @@ ROOMS = {
         *("studies.missed_scans", "studies.recording_interface"),
     ),
     "studies.stepwise": (
-        *("config.experiment", "config.study_keys", *SUMS, "kernels", "report", "report.drawing"),
-        *("studies.noise", "studies.onefile", "studies.plot_arrays", "studies.step_checks", "studies.step_programs"),
-        *("studies.recording_interface", "studies.step_likelihood", "studies.step_tables", "studies.step_tracker"),
-        "user_code.errors",
+        *("config.experiment", "config.study_keys", "engine.results", "kernels", "report", "report.drawing"),
+        *("studies.onefile", "studies.plot_arrays", "studies.recording_interface", "studies.step_blocks"),
+        *("studies.step_likelihood", "studies.step_plan", "studies.step_plots", "studies.step_tables"),
+        *("studies.step_tracker", "user_code.errors"),
+    ),
+    "studies.step_blocks": (
+        *("kernels", "studies.step_plan", "studies.step_plots", "studies.step_tracker", "studies.stepwise"),
     ),
     "studies.step_checks": ("kernels", "user_code.errors"),
     "studies.step_clutter": (
         *("config.experiment", "engine.results", "language", "report", "report.drawing"),
-        *("studies.step_checks", "studies.step_programs", "studies.stepwise"),
+        *("studies.step_checks", "studies.step_plan", "studies.step_programs", "studies.stepwise"),
     ),
     "studies.step_likelihood": (
         *("studies.error_law", "studies.missed_scans", "studies.recording_interface", "studies.step_checks"),
         *("studies.stepwise", "user_code.errors"),
     ),
+    "studies.step_plan": (
+        *("config.experiment", *SUMS, "kernels", "studies.noise", "studies.step_checks", "studies.step_programs"),
+        *("studies.stepwise", "user_code.errors"),
+    ),
+    "studies.step_plots": ("kernels", "studies.plot_arrays", "studies.step_plan", "studies.stepwise"),
     "studies.step_programs": ("kernels", "studies.step_checks", "studies.stepwise"),
     "studies.step_tables": ("engine.results", "report", "studies.stepwise"),
     "studies.planar": (

@@ -7,16 +7,15 @@ Python does with whole structures may be used: helper functions, loops over tupl
 number of a realisation may not: it has eight values. An `if` on one raises `NeedsOneValue`, and the innermost line of
 the traceback is the author's.
 
-This module loads no compiler."""
+This module loads no compiler, and NumPy only when a formula is computed."""
 
 import functools
 import hashlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Any
-
-import numpy as np
 
 
 class UnsupportedFormula(TypeError):
@@ -90,7 +89,7 @@ COMPARISONS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "
 
 def _method(op: str, turned: bool = False) -> Callable:
     def method(self, other):
-        if not isinstance(other, Lane | int | float | np.number):
+        if not isinstance(other, Lane | int | float | Real):
             return NotImplemented
         return self.trace.put(op, *((other, self) if turned else (self, other)))
 
@@ -174,6 +173,8 @@ class Trace:
 
     def holds(self, value: Any) -> int:
         """The number of the operation that a mask comes from, or that of a truth value. Raises Unfit of others."""
+        import numpy as np
+
         if isinstance(value, bool | np.bool_):
             value = self.put("<", 0.0, float(value))
         if not isinstance(value, Mask):
@@ -230,11 +231,7 @@ class Trace:
         return Program(tuple(self.ops), tuple(self.outputs), tuple(self.sums))
 
 
-FOLDED_OPERATIONS: dict[str, Callable] = {
-    **{instruction: getattr(np, {"truediv": "true_divide", "sub": "subtract", "mul": "multiply"}.get(op, op))
-       for op, instruction in ARITHMETIC.items()},
-    "sqrt": np.sqrt,
-}  # fmt: skip
+FOLDED_OPERATIONS = {"fadd": "add", "fsub": "subtract", "fmul": "multiply", "fdiv": "true_divide", "sqrt": "sqrt"}
 
 
 def _value(op: str, indices: tuple[int, ...], values_by_index: dict[int, float]) -> float | None:
@@ -248,8 +245,10 @@ def _value(op: str, indices: tuple[int, ...], values_by_index: dict[int, float])
         return 0.0
     if op not in FOLDED_OPERATIONS or None in values:
         return None
+    import numpy as np
+
     with np.errstate(all="ignore"):
-        return float(FOLDED_OPERATIONS[op](*values))
+        return float(getattr(np, FOLDED_OPERATIONS[op])(*values))
 
 
 def case_value(x: Any) -> float | None:
@@ -270,7 +269,7 @@ def map_numbers(function: Callable, *values: Any) -> Any:
 
 def is_number(value: Any) -> bool:
     """Whether a value of a structure is a number of a realisation: a whole number is not, nor a truth value."""
-    return isinstance(value, Lane | float | np.floating)
+    return isinstance(value, Lane | float) or (isinstance(value, Real) and not isinstance(value, Integral))
 
 
 def leaves(value: Any) -> Iterator[Any]:
@@ -293,8 +292,12 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
         return map_numbers(lambda *pair: where(condition, *pair), with_float_numbers(yes), with_float_numbers(no))
     if isinstance(condition, Mask):
         return condition.trace.put("where", condition, yes, no)
-    if isinstance(condition, int) and condition < 0:
-        condition &= 1  # ~True is -2 in Python, ~False -1; joined by & and | with others the last bit says it still
+    if isinstance(condition, int):
+        if condition < 0:
+            condition &= 1  # ~True is -2 in Python, ~False -1; joined by & and | with others the last bit says it still
+        return yes if condition else no
+    import numpy as np
+
     return np.where(condition, yes, no) if isinstance(condition, np.ndarray) else yes if condition else no
 
 
@@ -316,25 +319,33 @@ def maximum(x: Any, y: Any) -> Any:
     return where(x > y, x, y)
 
 
-def _record(op: str, x: Any, library: Callable) -> Any:
-    return x.trace.put(op, x) if isinstance(x, Lane) else plain(library, x)
+def _record(op: str, x: Any, name: str) -> Any:
+    return x.trace.put(op, x) if isinstance(x, Lane) else plain(name, x)
 
 
-def plain(library: Callable, *x: Any) -> Any:
+def plain(name: str, *x: Any) -> Any:
     """The value of one of NumPy's functions: of floats a float, whose arithmetic is faster than that of NumPy's."""
-    return float(library(*x)) if all(isinstance(number, float) for number in x) else library(*x)
+    import numpy as np
+
+    value = getattr(np, name)(*x)
+    return float(value) if all(isinstance(number, float) for number in x) else value
 
 
 def sqrt(x: Any) -> Any:
     """The square root."""
-    return _record("sqrt", x, np.sqrt)
+    return _record("sqrt", x, "sqrt")
 
 
 def nearest(x: Any) -> Any:
     """The nearest whole number, ties to even."""
-    return _record("nearest", x, np.rint)
+    return _record("nearest", x, "rint")
 
 
 def power_of_two(x: Any) -> Any:
     """2**x for whole numbers x from -1022 to 1023."""
-    return _record("power_of_two", x, lambda n: np.ldexp(1.0, np.asarray(n).astype(int)))
+    if isinstance(x, Lane):
+        return x.trace.put("power_of_two", x)
+    import numpy as np
+
+    value = np.ldexp(1.0, np.asarray(x).astype(int))
+    return float(value) if isinstance(x, float) else value

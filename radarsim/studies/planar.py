@@ -10,8 +10,6 @@ import math
 from collections import namedtuple
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from radarsim.config.planar_keys import FlyBy, Radar, Straight, Turn
 from radarsim.kernels.formula_functions import cos, sin, wrap_angle
 from radarsim.kernels.polar_plots import errors_covariance, fold, polar, polar_rows, speed_and_course_rows
@@ -127,6 +125,8 @@ class PlanarStudy(ClutteredStudy):
         """Where speed and course are linear enough in the velocity for their covariance to mean something: the
         second-order term of the speed, v σ² / 2 with σ of the course, is small beside σ of the speed, the other
         components given."""
+        import numpy as np
+
         steps: Any = self.kinds[filter_keys.kind]
         speed, P = self.world(spec).speed, np.zeros((4, 4))
         for k, (s, c) in enumerate(self.typical_states(spec, filter_keys)):
@@ -138,6 +138,8 @@ class PlanarStudy(ClutteredStudy):
 
     def floor(self, spec: Any, axes: "Axes") -> "Floor | None":
         """As `Study.floor`, of straight flights on one course."""
+        import numpy as np
+
         from radarsim.studies.floors.bound import CRB, Floor
         from radarsim.studies.floors.false_plots import information_shares
         from radarsim.studies.floors.straight_flight import straight_flight_bound

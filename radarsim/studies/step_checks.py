@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from radarsim.kernels import small_matrices, tracing
 from radarsim.user_code.errors import call_user_function, user_code_error
+
+if TYPE_CHECKING:
+    import numpy as np
 
 DIFFERENT_FORMULA = "gives another formula each time"
 
@@ -61,15 +62,17 @@ def record(function: Callable[..., Any], *arguments: Any) -> Any:
     if not isinstance(result, tuple):
         raise user_code_error(function, f"must give a tuple or a named record, got {type(result).__name__}")
     numbers = [float(number) for number in tracing.leaves(result)]
-    if not np.isfinite(numbers).all():
+    if not all(map(math.isfinite, numbers)):
         raise user_code_error(function, f"must give finite numbers, got {result!r}"[:200])
     if numbers != [float(number) for number in tracing.leaves(repeated)]:
         raise user_code_error(function, f"{DIFFERENT_FORMULA}: draw in begin, move and plot, by normals")
     return result
 
 
-def to_array(function: Callable[..., Any], values: Any, description: str) -> np.ndarray:
+def to_array(function: Callable[..., Any], values: Any, description: str) -> "np.ndarray":
     """An array (…,) of the numbers that an author's function gives; ConfigError where they are no such numbers."""
+    import numpy as np
+
     try:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):

@@ -21,8 +21,6 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from radarsim.errors import ConfigError
 from radarsim.language.translate import join_names, quote_name, tr
 from radarsim.studies.step_checks import record
@@ -31,6 +29,7 @@ from radarsim.studies.stepwise import StepStudy
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    import numpy as np
     import pandas as pd
 
     from radarsim.config.experiment import Experiment
@@ -57,11 +56,14 @@ class ClutteredStudy(StepStudy):
     def false_quantities(self) -> int:  # type: ignore[override]
         return len(self.window)
 
-    def known_quantities(self, spec: Any, t_s: np.ndarray) -> Sequence[np.ndarray]:
+    def known_quantities(self, spec: Any, t_s: "np.ndarray") -> "Sequence[np.ndarray]":
+        import numpy as np
+
         is_clear = self.false_plots_from_s(spec) is None
         return list(np.zeros((len(self.window), t_s.size)) if is_clear else self.halves(spec))
 
     def false_places(self, spec: Any) -> int:
+        import numpy as np
         from scipy.special import pdtrik
 
         if self.false_plots_from_s(spec) is None:
@@ -102,10 +104,14 @@ class ClutteredStudy(StepStudy):
             yield s, numbers
 
     @functools.lru_cache(maxsize=16)  # noqa: B019  there is one object of the class
-    def halves(self, spec: Any) -> np.ndarray:
+    def halves(self, spec: Any) -> "np.ndarray":
         """Half the widths (W, K) of the window, zero while there are no false plots."""
+        import numpy as np
+
+        from radarsim.studies.step_plan import plot_probability
+
         halves, dt, c = np.zeros((len(self.window), spec.scans)), self.scan_period_s(spec), record(self.world, spec)
-        u, no_noise, missed = (), (0.0,) * self.normals[2], 1 - self._probability(spec)
+        u, no_noise, missed = (), (0.0,) * self.normals[2], 1 - plot_probability(self, spec)
         most_missed = math.floor(math.log(RARE) / math.log(missed)) if missed > 0 else 0
         for keys in spec.filters:
             steps, numbers = self.kinds[keys.kind], record(self.kinds[keys.kind].design, spec, keys)

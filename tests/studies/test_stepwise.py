@@ -20,7 +20,7 @@ from radarsim.papers import one_file_measures
 from radarsim.recordings.report import tables
 from radarsim.recordings.tracking_result import START_ESTIMATES, TrackingResult
 from radarsim.report.quantities import Component
-from radarsim.studies import stepwise
+from radarsim.studies import step_blocks
 from radarsim.studies.onefile import MeasuredColumn
 from radarsim.studies.stepwise import Steps, StepStudy
 from tests.tolerances import assert_rounded, column_sizes, mean_error, sigma_error
@@ -168,7 +168,7 @@ def test_a_move_takes_the_time_of_its_scan():
 def test_a_realisation_is_itself_in_any_block(monkeypatch):
     study = Walk()
     case = case_of(study, detection_probability=0.7)
-    monkeypatch.setattr(stepwise, "MAX_ROWS", 130)  # two eights at once
+    monkeypatch.setattr(step_blocks, "MAX_ROWS", 130)  # two eights at once
     _, together = added(study, case, 40, step=40)
     _, apart = added(study, case, 40, step=3)
     for name, sums in together.items():

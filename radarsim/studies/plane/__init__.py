@@ -9,8 +9,6 @@ from collections import namedtuple
 from types import MappingProxyType
 from typing import Literal
 
-import numpy as np
-
 from radarsim.config.cross_checks import check_error, cross_check
 from radarsim.config.key_types import Flag, NonNegative, Positive, Probability, key, whole_number
 from radarsim.config.study_keys import Member
@@ -100,6 +98,7 @@ Design = namedtuple(
 
 def design(spec, keys):
     """The numbers of a filter."""
+    import numpy as np
     from scipy.special import chdtri
 
     radar, m = spec.radar, 3 if keys.doppler else 2

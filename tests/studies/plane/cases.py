@@ -4,7 +4,7 @@ import numpy as np
 
 from radarsim.api.configs import load
 from radarsim.studies.registry import study
-from radarsim.studies.stepwise import draw_plots
+from radarsim.studies.step_plots import draw_plots
 
 RADAR = {
     "wavelength_m": 0.1,
