@@ -60,8 +60,8 @@ def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
             "Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged_claims), counted=counted
         )
         + tr(
-            "Of each claim the part that is furthest from the paper: up to 0 it agrees, up to 1 it is within the "
-            "tolerance."
+            "Each row shows the claim's largest deviation in units of its tolerance: 0 or less agrees, up to 1 is "
+            "within the tolerance."
         ),
         panels=tuple(panels),
         width_mm=PAGE_MM,

@@ -43,7 +43,9 @@ def join_coinciding_lines(figure: Figure) -> Figure:
         )
         for panel in figure.panels
     )
-    return replace(figure, panels=panels, caption=f"{figure.caption} {tr('“=” joins curves that coincide.')}")
+    return replace(
+        figure, panels=panels, caption=f"{figure.caption} {tr('In the legend, “=” joins names of coinciding curves.')}"
+    )
 
 
 def _joined_name(names: Sequence[str]) -> str:

@@ -103,12 +103,13 @@ def loss_lines(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
     visible = tuple(line for line in losses if (line.y > 0).any())
     names = [quote_name(without_markup(line.name or line.label)) for line in losses if not (line.y > 0).any()]
     remark = (
-        " " + tr("Zero throughout: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
+        " "
+        + tr("No failures, hence not plotted: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
         if names
         else ""
     )
     if any((line.y == 0).any() for line in visible):
-        remark += " " + tr("A zero has no point on this axis.")
+        remark += " " + tr("Zeros are not shown on the logarithmic axis.")
     return visible, remark
 
 

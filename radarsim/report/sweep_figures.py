@@ -103,7 +103,7 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
         key=key_labels.key_label(members[0], key).text,
         realisations=case_selection.realisations_text(members),
     )
-    title = tr("σ over the {key}", key=key_labels.key_label(members[0], key).text)
+    title = tr("σ versus {key}", key=key_labels.key_label(members[0], key).text)
     figure = panel_layout.arrange_columns(Figure(name, title, caption, tuple(panels_drawn)))
     if len(panels_drawn[0].x.ticks) > FEW_NAMES:
         figure = replace(figure, columns=min(2, len(panels_drawn)))
@@ -200,7 +200,7 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         return None
     first, second = (key_labels.key_label(members[0], key).text for key in keys)
     caption = tr(
-        "σ of {component} at the last scan over the {first} and the {second}, from {realisations} per cell. Framed: "
+        "σ of {component} at the last scan against the {first} and the {second}, from {realisations} per cell. Framed: "
         "the least of each map.",
         component=component,
         first=first,
@@ -208,7 +208,7 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         realisations=case_selection.realisations_text(members),
     )
     caption += case_selection.left_out_remark(filters, filters[:MOST_PANELS])
-    return grid.figure(name, tr("σ over the {first} and the {second}", first=first, second=second), caption, maps)
+    return grid.figure(name, tr("σ versus {first} and {second}", first=first, second=second), caption, maps)
 
 
 def _map_axis(result: CaseResult, key: str, values: Sequence) -> Axis:

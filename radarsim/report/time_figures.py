@@ -108,8 +108,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     One panel where no config is swept; else one for each of `group_by_panel`. gains is tables.group_by(table, "case",
     "filter", "component")."""
     caption = tr(
-        "Gain in σ of the {quantity} over filter {base}, from {realisations} with common noise. Below zero: a loss.",
-        quantity=component.words,
+        "Gain over filter {base}, from {realisations} with the same noise for all filters. Below zero: a loss.",
         base=quote_name(results[0].axes.filters[results[0].axes.baseline]),
         realisations=realisations_text(results),
     )
@@ -155,7 +154,7 @@ def _with_remark_on_losses(figure: Figure) -> Figure:
     if not any(panel.y.limits[0] == -CUT_LOSS_PERCENT for panel in figure.panels):
         return figure
     names = caption_remarks.lines_below(figure, -CUT_LOSS_PERCENT)
-    remark = tr("Losses over {loss:g} % are below the axis: {names}.", loss=CUT_LOSS_PERCENT, names=names)
+    remark = tr("Losses above {loss:g} % are off the plot: {names}.", loss=CUT_LOSS_PERCENT, names=names)
     return replace(figure, caption=f"{figure.caption} {remark}")
 
 

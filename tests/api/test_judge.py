@@ -898,7 +898,7 @@ def test_axes_of_a_flight_have_their_words():
     assert (words["x"], words["y"], words["vy"]) == ("distance north", "height", "rate of climb")
     assert set(words) == {name for name, _ in flight.COMPONENTS}
     with use_language("ru"):
-        assert tr("σ of the {quantity}", quantity=words["vy"]) == "СКО скорости набора высоты"
+        assert tr("σ of the {quantity}", quantity=words["vy"]) == "СКО вертикальной скорости"
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from radarsim.language.translate import tr, translate_names
 from radarsim.papers.claim_rows import class_count, class_text
 from radarsim.report.csv_text import to_csv
 from radarsim.report.drawing.model import Figure
+from radarsim.studies import planar, planar_tables, registry
 
 # A config of each study, and what of each other kind is quick.
 QUICK = ["rls2", "multimodel_1hz", "sonar_asynchronous", "sonar_manoeuvre", "discriminator_noise", "ambiguous_rls2"]
@@ -222,3 +223,13 @@ def test_names_of_a_config_stay_apart_and_hold_commas_where_they_did(code):
 def test_the_check_sees_what_is_english():
     assert untranslated("σ of the range, m", {"r"}) == ["the", "range"]
     assert untranslated("СКО $\\sigma$ of r, `radar.scan_period_s` radar.name «plain words»", {"of"}) == []
+
+
+def test_the_components_of_all_studies_have_a_genitive():
+    parts = [
+        part for found in registry.call_studies(lambda study: study.user_filter_components()).values() for part in found
+    ]
+    words = {part.words for part in (*parts, *planar.PlanarStudy.components, planar_tables.ACROSS) if part.words}
+    assert {"speed", "course", "rate of climb"} <= words
+    genitives = {entry.id for entry in current.messages("ru") if entry.context == "genitive"}
+    assert words - genitives == set()

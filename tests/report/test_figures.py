@@ -66,7 +66,7 @@ def test_lines_that_never_lose_are_named_and_not_drawn():
     (line,), said = panel_layout.loss_lines(shares)
     assert line.label == "b"
     assert_rounded(line.y, [0, 0.1, 0.2], size=1)
-    assert said == " Zero throughout: a. A zero has no point on this axis."
+    assert said == " No failures, hence not plotted: a. Zeros are not shown on the logarithmic axis."
     assert panel_layout.loss_lines([replace(shares[1], y=np.full(3, 0.5))])[1] == ""
 
 
@@ -194,7 +194,7 @@ def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
         Figure("f", "", "Drawn.", (curves([1, 2, 3], near, [0, 0, 9]), curves([4, 5, 6], [4, 5, 6])))
     )
     assert [[mark.label for mark in panel.marks] for panel in both.panels] == [["a = b", "c"], ["a = b"]]
-    assert both.caption == "Drawn. “=” joins curves that coincide."
+    assert both.caption == "Drawn. In the legend, “=” joins names of coinciding curves."
     for apart in (
         (curves([1, 2, 3], far),),  # seen to differ
         (curves([1, 2, 3], near), curves([4, 5, 6], [4, 5, 7])),  # in one panel
@@ -660,9 +660,9 @@ def test_losses_far_below_are_cut_and_the_caption_says_so():
         for least in (-150.0, -30000.0)
     }
     assert drawn[-30000.0].panels[0].y.limits == (-100.0, 100.0)
-    assert "below the axis" in drawn[-30000.0].caption
+    assert "off the plot" in drawn[-30000.0].caption
     assert drawn[-150.0].panels[0].y.limits == (None, None)
-    assert "below the axis" not in drawn[-150.0].caption
+    assert "off the plot" not in drawn[-150.0].caption
 
 
 def test_scattered_points_are_all_drawn():

@@ -109,11 +109,17 @@ def rare_figure(results: Sequence[Result], table: "pd.DataFrame") -> dict[str, F
         rare_panels += [Panel(axis, panel_layout.loss_axis(tr("P(a fold is wrong)"), losses), losses)] if losses else []
     if not rare_panels:
         return {}
-    caption = tr(
-        "Share of realisations in which the best hypothesis has a wrong fold by the last scan, from {realisations} "
-        "each.",
-        realisations=case_selection.realisations_text(results),
-    ) + "".join(dict.fromkeys(notes))
+    is_sampled = any(result.spec.rare is not None for result in results)
+    sample = (
+        term("Importance sampling: {realisations} per case, weighted.")
+        if is_sampled
+        else term("From {realisations} each.")
+    )
+    parts = (
+        tr("Share of realisations in which the best hypothesis has a wrong fold by the last scan."),
+        tr(sample, realisations=case_selection.realisations_text(results)),
+    )
+    caption = " ".join(parts) + "".join(dict.fromkeys(notes))
     figure = panel_layout.arrange_columns(Figure("right", tr("P(a fold is wrong)"), caption, tuple(rare_panels)))
     return {"right": figure}
 

@@ -127,13 +127,14 @@ def locks(result: CaseResult, tables_by_name: Mapping) -> Figure:
     for n, name in enumerate(plotted_names):
         filter_rows = rows[(result.name, name)]
         marks.append(figure_lines.line_from_rows(filter_rows, ("t_s", "lock_rate", "lock_lo", "lock_hi"), name, n))
-    caption = tr(
-        "Locked: every component within five times the Cramér–Rao bound of the window. From {count:,} bursts.",
-        count=result.count,
-    )
     panel, remark = _shares(Axis(tr(WINDOW_LABEL), "log"), marks, 0)
-    caption += remark + case_selection.left_out_remark(result.axes.filters, plotted_names)
     lost = panel.y.scale == "log"
+    caption = (
+        tr("Share of bursts that fail to lock: with a component beyond five times the Cramér–Rao bound of the window.")
+        if lost
+        else tr("Share of bursts that lock: with every component within five times the Cramér–Rao bound of the window.")
+    )
+    caption += f" {_sample(result)}{remark}{case_selection.left_out_remark(result.axes.filters, plotted_names)}"
     title = tr("Bursts not locked against the window") if lost else tr("Locked bursts against the window")
     figure = Figure(*("locks", title, caption, (panel,)), width_mm=panel_layout.WIDE_MM, panel_height_mm=80.0)
     return figure
@@ -144,7 +145,15 @@ def _shares(x: Axis, marks: Sequence[Line], lower_limit: float | None = None) ->
     if not panel_layout.has_rare_losses(marks):
         return Panel(x, Axis(tr("share locked"), limits=(lower_limit, 1)), tuple(marks), direct=False), ""
     losses, remark = panel_layout.loss_lines(marks)
-    return Panel(x, panel_layout.loss_axis(tr("share not locked"), losses), losses, direct=False), remark
+    axis = panel_layout.loss_axis(tr("share of bursts that fail to lock"), losses)
+    return Panel(x, axis, losses, direct=False), remark
+
+
+def _sample(result: CaseResult) -> str:
+    """How many bursts a share is from, for a caption."""
+    if result.spec.rare is not None:
+        return tr("Importance sampling; weighted bursts per case: {count:,}.", count=result.count)
+    return tr("Bursts per case: {count:,}.", count=result.count)
 
 
 def accuracy(result: CaseResult, tables_by_name: Mapping) -> Figure:
@@ -192,18 +201,19 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], tables_by_n
         marks.append(figure_lines.line_from_tables(x[order], ends, columns, estimator, Style(n, n % 4, n)))
     scale = "log" if x.min() > 0 and x.max() / x.min() > 20 else "linear"
     key_name = key_labels.key_label(members[0], key).text
-    caption = tr(
-        "Share of bursts locked in the last window against the {called}, from {count:,} each.",
-        called=key_name,
-        count=members[0].count,
-    )
     ticks = thinned_ticks(x[order]) if key in INTEGER_KEYS else ()
     panel, remark = _shares(Axis(_swept_axis(key, members[0]), scale, ticks=ticks), marks)
-    if designed and panel.y.scale == "log":
+    lost = panel.y.scale == "log"
+    if designed and lost:
         panel = replace(panel, marks=(*panel.marks, Line(x[order], x[order], "", Style(GREY, 2, width_pt=0.7))))
         remark += " " + tr("Dotted: designed failure probability of one hand-over.")
-    caption += remark
-    title = tr("Lock against the {called}", called=key_name)
+    if lost:
+        title = tr("Failures to lock against the {called}", called=key_name)
+        caption = tr("Share of bursts that fail to lock in the last window against the {called}.", called=key_name)
+    else:
+        title = tr("Lock against the {called}", called=key_name)
+        caption = tr("Share of bursts locked in the last window against the {called}.", called=key_name)
+    caption += f" {_sample(members[0])}{remark}"
     figure = Figure(name, title, caption, (panel,), width_mm=panel_layout.WIDE_MM, panel_height_mm=70.0)
     return figure
 

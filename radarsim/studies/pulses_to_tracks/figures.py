@@ -65,7 +65,7 @@ def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd
         return {}
     caption = tr(
         "P(not locked): share of bursts at the worst scan whose velocity (or acceleration, if used) errs by more "
-        "than five times its Cramér–Rao bound. No point if all lock; no estimator with a single point."
+        "than five times its Cramér–Rao bound. Points without failures, and curves of a single point, are left out."
     )
     figure = Figure(
         "threshold",
