@@ -125,8 +125,8 @@ ROOMS = {
         *("config.experiment", "engine.results", "kernels", "language", "report", "report.drawing", "studies.planar"),
     ),
     "studies.plane": (
-        *("config.cross_checks", "config.key_types", "config.study_keys", "kernels", "language", "studies.planar"),
-        "studies.stepwise",
+        *("config.cross_checks", "config.key_types", "config.radial_keys", "config.study_keys", "kernels", "language"),
+        *("studies.planar", "studies.stepwise"),
     ),
     "studies.step_tracker": (
         *("kernels.tracing", "studies.missed_scans", "studies.recording_interface", "studies.step_checks"),

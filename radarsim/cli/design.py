@@ -148,7 +148,7 @@ def solve(config: str, key: str, filter_name: str | None, as_json: bool, **value
     "--free",
     multiple=True,
     metavar="KEY[=LOW:HIGH]",
-    help="Key of the filter to tune, and its range; repeatable. Default: every real number that is not zero.",
+    help="Key of the filter to tune, and its range; repeatable. Default: real numbers with an effect, not zero.",
 )
 @click.option(
     "--over",

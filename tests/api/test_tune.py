@@ -7,11 +7,12 @@ import pytest
 
 import radarsim
 from radarsim.api.configs import load
-from radarsim.api.design import tuning_search, tuning_space
+from radarsim.api.design import root_search, tuning_search, tuning_space
 from radarsim.api.design.objective import Objective
 from radarsim.api.design.quantities import QuantityName, check_quantity, parse_quantity
 from radarsim.api.design.solve import solve
 from radarsim.api.design.tune import judged_point, tune
+from radarsim.config.radial_keys import MAX_SPEED_MPS
 from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
 from radarsim.studies import registry
@@ -447,6 +448,28 @@ def test_a_key_without_effect_is_called_so():
     assert f"{some.inert[0]} has no effect on {some.quantity.translated_words}" in some.notes
     sampled = tune("rls2", "sigma r at k 1", filter="r", sampled=True, realisations=64)
     assert sampled.inert == (key,)
+
+
+@pytest.mark.slow
+def test_a_key_without_effect_is_not_tuned_unless_it_is_named():
+    """Without false plots no gate is used."""
+    wanted = {"filter": "EKF+Vr", "overrides": ["scans=4"], "realisations": 32}
+    found = tune("plane", "sigma r at k 4", **wanted)
+    names = ["sigma_acceleration_mps2", "sigma_start_velocity_mps"]
+    assert [key.key for key in found.keys] == [f"filters.1.{name}" for name in names]
+    gate = "filters.1.gate_probability"
+    assert found.inert == (gate,)
+    assert f"{gate} has no effect on {found.quantity.translated_words}" in found.notes
+    named = tune("plane", "sigma r at k 4", **wanted, free=["gate_probability"])
+    assert [key.key for key in named.keys] == [gate]
+    assert named.is_flat
+
+
+def test_a_positive_key_is_searched_by_its_logarithm_up_to_its_bound():
+    (case,) = load("plane").cases
+    (key,) = tuning_space.searched_keys(case, "EKF+Vr", {"sigma_start_velocity_mps": None})
+    assert key.search_range == root_search.search_range(300 / tuning_space.FACTOR, MAX_SPEED_MPS)
+    assert key.search_range.logarithmic
 
 
 def test_the_keys_of_a_filter_in_python_are_not_known(tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from radarsim.api.design import root_search, tuning_search
+from radarsim.api.design.tuning_intervals import keys_without_effect
 from radarsim.api.design.tuning_search import choose_starts, find_minimum, linkage_distance
 from radarsim.api.design.tuning_space import SearchedKey
 
@@ -128,3 +129,19 @@ def test_the_starts_are_few():
     places = [tuple(np.exp(rng.uniform(-9, 9, 5))) for _ in range(300)]
     costs = sorted((objective(place), place) for place in places)
     assert 1 < len(choose_starts(objective.searched, costs)) <= tuning_search.MAX_STARTS
+
+
+class Slope:
+    """A cost that grows with its first key, and refuses the ends of the second, which has no part in it."""
+
+    searched = (
+        SearchedKey(("size",), 1.0, root_search.search_range(0.1, 10)),
+        SearchedKey(("gate",), 0.9, root_search.search_range(0.5, 1)),
+    )
+
+    def __call__(self, place):
+        return place[0] if 0.5 < place[1] < 1 else math.inf
+
+
+def test_a_key_has_no_effect_where_nothing_changes_inside_its_range():
+    assert keys_without_effect(Slope()) == Slope.searched[1:]

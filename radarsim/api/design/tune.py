@@ -29,7 +29,7 @@ from radarsim.api.design.tuning_intervals import (
     FLAT_CHANGE,
     equally_good,
     flat_interval,
-    has_no_effect,
+    keys_without_effect,
     spread_of_tuning,
 )
 from radarsim.api.design.tuning_result import TunedKey, TunedQuantity, TuningResult, family_words
@@ -136,10 +136,10 @@ def tune(
 
     wanted is a quantity of `radarsim solve` with its component, and a time or scan, `"sigma r at 60 s"`, `"gain r at k
     6"`; default: the last scan. free: the keys, by name, `KEY=LOW:HIGH`, or a mapping to the range to search or None;
-    default: all of the filter that are real numbers other than zero. Elements of a matrix of probabilities keep columns
-    that sum to one; zeros stay. over: the family of targets, stems of scenarios or texts `KEY=VALUE`, or values by key;
-    case: some of the config's cases; default: all. Over a family the root of the mean of σ² is least, or the mean rate
-    is best.
+    default: all of the filter that are real numbers other than zero and have an effect. Elements of a matrix of
+    probabilities keep columns that sum to one; zeros stay. over: the family of targets, stems of scenarios or texts
+    `KEY=VALUE`, or values by key; case: some of the config's cases; default: all. Over a family the root of the mean of
+    σ² is least, or the mean rate is best.
 
     Several searches start at places over the whole range; `search_ends` are the values at which they ended.
 
@@ -180,13 +180,17 @@ def tune(
     cost = chooser = FamilyCost(variants, curves, exact, count)
     if not exact:
         cost, chooser = cost.with_noise(SEARCH_SEED_OFFSET), cost.with_noise(CHOICE_SEED_OFFSET)
-    _predict(notify or (lambda line: None), cost, _seconds_of_start(cost))
+    place_s = _seconds_of_start(cost)
+    inert_keys = () if ranges else keys_without_effect(cost)
+    if inert_keys and (acting_keys := [key for key in searched if key not in inert_keys]):
+        cost, chooser = cost.with_keys(acting_keys), chooser.with_keys(acting_keys)
+    _predict(notify or (lambda line: None), cost, place_s)
     found = find_minimum(cost, chooser)
     judge = _judge_exactly if exact else _judge_by_sampling
     pairs, ranges_by_path = judge(cost, found.place)
     found = found._replace(other_hollows=equally_good(chooser, found.place, found.other_hollows))
     given_settings = [setting for setting in (*settings, members[0]) if setting]
-    return _tuning_result(config, cases, cost, found, ranges_by_path, pairs, given_settings)
+    return _tuning_result(config, cases, cost, found, inert_keys, ranges_by_path, pairs, given_settings)
 
 
 def _common_keys(
@@ -239,6 +243,7 @@ def _tuning_result(
     cases: Sequence[Case],
     cost: FamilyCost,
     found: FoundMinimum,
+    inert_keys: Sequence[SearchedKey],
     ranges: Mapping[Path, tuple[float, float]],
     pairs: Sequence[np.ndarray],
     settings: Sequence[str],
@@ -264,11 +269,8 @@ def _tuning_result(
         )
     axes = cost.curves[0].objective.labels(cost.curves[0].cases.base)
     gains = tuning_gains(cost, [family_case.name for family_case in cases], pairs)
-    inert = tuple(
-        prefix + _dotted(searched_key.path)
-        for i, searched_key in enumerate(cost.searched)
-        if searched_key.largest_path is None and has_no_effect(cost, best, i)
-    )
+    inert_keys = [*(key for key in inert_keys if key not in cost.searched), *keys_without_effect(cost, best)]
+    inert = tuple(prefix + _dotted(searched_key.path) for searched_key in inert_keys)
     return TuningResult(
         stem=case.stem,
         filter=filter_name,
@@ -285,7 +287,7 @@ def _tuning_result(
         settings={tuned_key.key: tuned_key.tuned for tuned_key in keys},
         command=_run_command(config, settings, prefix, tuned_values, tuned_keys),
         notes=(
-            *_tuning_notes(cost, best, inert[: len(keys) - 1], tuned_values, ranges),
+            *_tuning_notes(cost, best, () if {key.key for key in keys} <= {*inert} else inert, tuned_values, ranges),
             *_equality_notes(cost, found.other_hollows, ranges),
         ),
         inert=inert,

@@ -51,6 +51,12 @@ class Variants:
         variants.seed, variants.base = seed, replace(self.base, seed=seed)
         return variants
 
+    def with_keys(self, searched: Sequence[SearchedKey]) -> "Variants":
+        """The same with other values of some of the keys."""
+        variants = copy(self)
+        variants.searched = searched
+        return variants
+
     def case_with_value(self, key: str, place: Place) -> Case:
         """The case with other values. Raises ConfigError where the config refuses them."""
         return self.case_with_filter(self.filter(place))
@@ -90,9 +96,17 @@ class FamilyCost:
 
     def with_noise(self, seed_offset: int) -> "FamilyCost":
         """The same with noise of another seed, so much more than that of the config."""
-        variants = [variant.with_seed((variant.case.seed + seed_offset) % 2**64) for variant in self.variants]
+        return self._with_variants(
+            [variant.with_seed((variant.case.seed + seed_offset) % 2**64) for variant in self.variants]
+        )
+
+    def with_keys(self, searched: Sequence[SearchedKey]) -> "FamilyCost":
+        """The same over some of the keys."""
+        return self._with_variants([variant.with_keys(searched) for variant in self.variants])
+
+    def _with_variants(self, variants: Sequence[Variants]) -> "FamilyCost":
         curves = [
-            Curve(variant, "", curve.objective, curve.realisations, curve.progress, sampled=True)
+            Curve(variant, "", curve.objective, curve.realisations, curve.progress, sampled=not self.exact)
             for variant, curve in zip(variants, self.curves, strict=True)
         ]
         return FamilyCost(variants, curves, self.exact, self.count)

@@ -9,8 +9,17 @@ import numpy as np
 
 from radarsim.api.design.jackknife import jackknife_interval
 from radarsim.api.design.tuning_cost import FamilyCost
-from radarsim.api.design.tuning_search import move_keys
-from radarsim.api.design.tuning_space import MIN_PROBABILITY, Path, Place, ProbabilityRange, from_scale, is_at_end
+from radarsim.api.design.tuning_search import from_unit, move_keys
+from radarsim.api.design.tuning_space import (
+    MIN_PROBABILITY,
+    NEAR_END,
+    Path,
+    Place,
+    ProbabilityRange,
+    SearchedKey,
+    from_scale,
+    is_at_end,
+)
 from radarsim.errors import ConfigError
 
 FLAT_CHANGE = 1e-3  # of the quantity: within it a key is as good as tuned
@@ -34,11 +43,19 @@ def flat_interval(cost: FamilyCost, best: Place, i: int) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def has_no_effect(cost: FamilyCost, best: Place, i: int) -> bool:
-    """Whether a key changes nothing over the whole searched range."""
-    search_range = cost.searched[i].search_range
-    ends = (cost((*best[:i], x, *best[i + 1 :])) for x in (search_range.low, search_range.high))
-    return all(math.isclose(value, cost(best), rel_tol=NO_CHANGE) for value in ends)
+def keys_without_effect(cost: FamilyCost, place: Place | None = None) -> tuple[SearchedKey, ...]:
+    """The keys of which none changes anything over its whole searched range. Default: about the stated values."""
+    start = tuple(key.stated for key in cost.searched) if place is None else place
+    return tuple(
+        key for i, key in enumerate(cost.searched) if key.largest_path is None and _has_no_effect(cost, start, i)
+    )
+
+
+def _has_no_effect(cost: FamilyCost, place: Place, i: int) -> bool:
+    """Whether a key changes nothing from near one end of its range to the other: a config may refuse the ends."""
+    ends = (from_unit(cost.searched[i], u) for u in (NEAR_END, 1 - NEAR_END))
+    values = (cost((*place[:i], x, *place[i + 1 :])) for x in ends)
+    return all(math.isclose(value, cost(place), rel_tol=NO_CHANGE) for value in values)
 
 
 def equally_good(chooser: FamilyCost, best: Place, ends: Sequence[Place]) -> tuple[Place, ...]:

@@ -56,7 +56,7 @@ class TuningResult(Displayable):
     training and judged are numbers of realisations a case, none where exact; minimised says what is least, or largest.
     search_ends: the quantity where each of the searches ended, the best first, on the realisations that chose the best.
     settings are the tuned values by key; command is a run with them, of the noise with which the gain is measured.
-    inert: the keys without effect on the quantity."""
+    inert: the keys without effect on the quantity, which are not tuned unless they are named."""
 
     stem: str
     filter: str
@@ -92,6 +92,11 @@ class TuningResult(Displayable):
         return "%" if self.quantity.definition.kind == "size" else tr("points") if self.unit == "%" else tr(self.unit)
 
     @property
+    def is_flat(self) -> bool:
+        """Whether no key has an effect on the quantity."""
+        return {key.key for key in self.keys} <= {*self.inert}
+
+    @property
     def answer(self) -> str:
         """What tuning gains, and how far the search looked."""
         return " ".join(sentence for sentence in (self._gain_sentence, self._search_sentence) if sentence)
@@ -99,7 +104,7 @@ class TuningResult(Displayable):
     @property
     def _search_sentence(self) -> str:
         """How many searches started, and where they ended; empty for one, and where no key has an effect."""
-        if len(self.search_ends) < 2 or len(self.inert) == len(self.keys):
+        if len(self.search_ends) < 2 or self.is_flat:
             return ""
         ends = [format_number(end, ".4g") for end in (min(self.search_ends), max(self.search_ends))]
         where = f"{tr('{low} to {high}', low=ends[0], high=ends[1]) if len({*ends}) > 1 else ends[0]} {tr(self.unit)}"
@@ -135,7 +140,7 @@ class TuningResult(Displayable):
     def _nothing_sentence(self) -> str:
         """That there is nothing to gain, of an exact quantity; empty where there is."""
         fields = {"quantity": self.quantity.translated_words}
-        if len(self.inert) == len(self.keys):
+        if self.is_flat:
             return plural(
                 "There is nothing to tune: {keys} has no effect on {quantity}.",
                 "There is nothing to tune: {keys} have no effect on {quantity}.",

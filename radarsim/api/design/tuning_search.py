@@ -151,7 +151,7 @@ def _spread_places(searched: Sequence[SearchedKey], whole_grids: Sequence[Sequen
     units = qmc.Sobol(len(searched), scramble=False).random_base2(round(math.log2(count))) + 0.5 / count
     return [
         tuple(
-            grid[int(u * len(grid))] if key.search_range.whole_numbers else _from_unit(key, float(u))
+            grid[int(u * len(grid))] if key.search_range.whole_numbers else from_unit(key, float(u))
             for key, grid, u in zip(searched, whole_grids, unit, strict=True)
         )
         for unit in units
@@ -232,7 +232,7 @@ def _to_unit(key: SearchedKey, x: float) -> float:
     return (key.search_range.to_scale(x) - low) / (high - low)
 
 
-def _from_unit(key: SearchedKey, u: float) -> float:
+def from_unit(key: SearchedKey, u: float) -> float:
     """The value at a position from 0 to 1 on the scale of the search."""
     low, high = (key.search_range.to_scale(end) for end in (key.search_range.low, key.search_range.high))
     return key.search_range.from_scale(low + u * (high - low))

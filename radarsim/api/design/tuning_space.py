@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from radarsim.api.design import question, root_search, solve_answer
@@ -148,8 +148,12 @@ def _searched_key(
         raise ConfigError(f"{key.path}: has no value to begin from: {argument('overrides', '--set')} it")
     option = argument("free", "--free")
     range_example = argument('free={"KEY": (LOW, HIGH)}', f"{option} KEY=LOW:HIGH")
+    # A positive key that has an upper bound too is searched on the scale of its value.
+    unbounded = replace(key, high=math.inf) if key.low == 0 and key.value else key
     with rename_arguments_in_errors({question.range_option(): range_example, argument("between"): option}):
-        search_range = question.key_range([key], key.path, between, FACTOR)
+        search_range = question.key_range([unbounded], key.path, between, FACTOR)
+    if between is None and search_range.high > key.high:
+        search_range = root_search.search_range(search_range.low, key.high, key.is_whole)
     if not key.is_whole and (key.low, key.high) == (0, 1) and between is None:
         smallest = min(MIN_PROBABILITY, *(x / 10 for x in (key.value, 1 - key.value) if x > 0))
         search_range = ProbabilityRange(smallest, 1 - smallest, False)

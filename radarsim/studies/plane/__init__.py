@@ -11,6 +11,7 @@ from typing import Literal
 
 from radarsim.config.cross_checks import check_error, cross_check
 from radarsim.config.key_types import Flag, NonNegative, Positive, Probability, key, whole_number
+from radarsim.config.radial_keys import MAX_SPEED_MPS
 from radarsim.config.study_keys import Member
 from radarsim.errors import ConfigError
 from radarsim.kernels import gaussian_filters
@@ -64,7 +65,7 @@ class Filter(Member):
     )
     mean_stay_s: Positive = key("mean stay in a model", "before it changes to the other, s", 60.0, only={"kind": "imm"})
     sigma_start_velocity_mps: Positive = key(
-        "σ of the first velocity", "of either coordinate, before a plot, m/s", 300.0
+        "σ of the first velocity", "of either coordinate, before a plot, m/s", 300.0, le=MAX_SPEED_MPS
     )
     sigma_start_acceleration_mps2: Positive = key(
         "σ of the first acceleration", "of either coordinate, m/s²", 30.0, only={"model": "acceleration"}
