@@ -28,6 +28,7 @@ from radarsim.report.case_selection import swept_cases, swept_keys
 from radarsim.report.drawing.model import Figure
 from radarsim.report.drawing.page_figure import DrawnFigure
 from radarsim.report.page_links import sources_behind_figure
+from radarsim.report.quantities import RADIAL
 from radarsim.report.row_notes import with_note_texts
 from radarsim.report.user_filters import rows as user_filters_rows
 from radarsim.studies.registry import study
@@ -93,7 +94,8 @@ def write_files(
             name: sources_behind_figure(name, case_study.drawn_from(), tables_by_name) for name in figures_by_name
         }
         figures_by_name = headlines.with_headlines(
-            figures_by_name, answer.texts, answer.sources, sources, swept_cases(results), swept_keys(results)
+            *(figures_by_name, answer.texts, answer.sources, sources, swept_cases(results), swept_keys(results)),
+            case_study.user_filter_components() or RADIAL,
         )
         question = question_text(experiment)
     except RadarsimError:

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import tr
+from radarsim.language.translate import Term, inflect, tr
 from radarsim.report import wording
 from radarsim.report.drawing.model import Bars, Figure, Heat, Line, Mark
 from radarsim.report.math_text import plain_text
+from radarsim.report.quantities import Component
 
 DIGITS = r"[−-]?\d[\d\u202f\u00a0]*(?:[.,]\d+)*"
 POWER = r"(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
@@ -20,6 +21,9 @@ AFTER_VALUE = rf"{POWER}(?P<unit>[ \u00a0][^\s\[(]+)?(?:[ \u00a0]\w+)?[ \u00a0]"
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 ROUNDING = 1e-9
 MAX_LETTERS = 200  # of a headline
+COMPONENT_KINDS = "sigma", "gain", "dynamic"  # of figures whose names end with that of their component
+FORMS = "", "genitive"  # of a component's words in sentences
+QUOTED_NAME = re.compile("“[^”]*”|«[^»]*»")
 STRONG_PT, THIN_PT = 2.0, 0.8  # widths of lines that the headline names, and of others
 
 
@@ -30,23 +34,29 @@ def with_headlines(
     sources_by_figure: Mapping[str, Collection[str]],
     single_cases: Collection[str] = (),
     swept_keys: Collection[str] = (),
+    components: Sequence[Component] = (),
 ) -> dict[str, Figure]:
     """The figures with a headline each.
 
     sources_of_answer: tables that each sentence of the answer rests on, or a table's column, "folds.right";
     sources_by_figure: those that are drawn; single_cases: how sentences on one of several cases begin, which none of
-    these figures is about; swept_keys: as figures name them, for no figure is about one that it lacks."""
+    these figures is about; swept_keys: as figures name them, for no figure is about one that it lacks; components: of
+    the study, whose names end those of figures."""
 
     def headline(name: str, figure: Figure) -> str:
         values = drawn_values(figure)
         words = _words_of(figure)
         foreign_keys = [f"{key} = " for key in swept_keys if key not in words]
+        kind, _, component = name.partition("_")
+        is_of_component = kind in COMPONENT_KINDS and any(component == other.name for other in components)
         for sentence, sources in zip(answer, sources_of_answer, strict=True):
             text = first_statement(sentence)
             is_on_one_case = any(case in text.partition(":")[0] for case in single_cases)
             is_elsewhere = is_on_one_case or any(key in text for key in foreign_keys)
-            is_of_sources = all(_is_source(source, sources_by_figure[name]) for source in sources)
-            if is_of_sources and not is_elsewhere and len(text) <= MAX_LETTERS and is_drawn(text, values):
+            is_on_other_component = is_of_component and first_component(text, components) != component
+            if is_elsewhere or is_on_other_component or len(text) > MAX_LETTERS:
+                continue
+            if _are_sources(sources, sources_by_figure[name]) and is_drawn(text, values):
                 return text
         return plain_text(figure.title)
 
@@ -105,6 +115,27 @@ def _words_of(figure: Figure) -> str:
         )
     ]
     return plain_text("\n".join([figure.title, *texts]))
+
+
+def first_component(sentence: str, components: Sequence[Component]) -> str:
+    """The name of the component that a sentence names first, outside quoted names; empty if it names none."""
+    names = {words.lower(): part.name for part in components if part.words for words in _word_forms(part.words)}
+    longest_first = sorted(names, key=len, reverse=True)
+    pattern = "|".join(rf"\b{re.escape(words)}\b" for words in longest_first)
+    match = re.search(pattern, QUOTED_NAME.sub("", sentence.lower())) if names else None
+    return names[match[0]] if match else ""
+
+
+def _word_forms(words: str) -> list[str]:
+    """The forms of a component's words in sentences; a user's have one."""
+    return [inflect(words, form) for form in FORMS] if isinstance(words, Term) else [words]
+
+
+def _are_sources(sources: Collection[str], drawn: Collection[str]) -> bool:
+    """Whether a sentence rests on what a figure draws; on every table of a figure that draws several."""
+    tables = {source.partition(".")[0] for source in drawn}
+    is_complete = len(tables) < 2 or tables <= {source.partition(".")[0] for source in sources}
+    return is_complete and all(_is_source(source, drawn) for source in sources)
 
 
 def _is_source(source: str, drawn: Collection[str]) -> bool:

@@ -2,7 +2,12 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-TABLES_BY_KIND = {"sigma": ("curves",), "sweep": ("curves",), "dynamic": ("curves",), "gain": ("gains",)}
+SOURCES_BY_KIND = {
+    "sigma": ("curves.sigma",),
+    "sweep": ("curves.sigma",),
+    "dynamic": ("curves.bias",),
+    "gain": ("gains.gain",),
+}
 
 
 def tables_behind_figure(
@@ -16,12 +21,12 @@ def tables_behind_figure(
 def sources_behind_figure(
     figure_name: str, declared: Mapping[str, Sequence[str]], table_names: Collection[str]
 ) -> tuple[str, ...]:
-    """As `tables_behind_figure`, with the column, "folds.right", if the study declares which one is drawn."""
+    """As `tables_behind_figure`, with the column, "folds.right", if it is known which one is drawn."""
     prefixes = sorted((name for name in declared if figure_name.startswith(name)), key=len)
     if prefixes and figure_name not in table_names:
         names: Sequence[str] = declared[prefixes[-1]]
     elif figure_name in table_names:
         names = declared.get(figure_name, (figure_name,))
     else:
-        names = TABLES_BY_KIND.get(figure_name.partition("_")[0], ())
+        names = SOURCES_BY_KIND.get(figure_name.partition("_")[0], ())
     return tuple(name for name in names if name.partition(".")[0] in table_names)

@@ -15,10 +15,12 @@ from radarsim.report.case_selection import swept_cases, swept_keys
 from radarsim.report.drawing.model import Axis, Figure, Heat, Line, Panel, Style
 from radarsim.report.math_text import plain_text
 from radarsim.report.page_links import sources_behind_figure
+from radarsim.report.quantities import RADIAL
 from radarsim.studies.registry import study
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 MAX_CAPTION_WORDS = 40
+TABLES = "curves", "gains", "operations", "stages"
 
 
 def figure_of(label, *values, scale="linear"):
@@ -88,6 +90,49 @@ def test_a_headline_is_of_the_tables_and_of_all_cases_of_its_figure():
     assert one_of_two["f"].headline == "The title"
 
 
+SENTENCES = {
+    "en": (
+        "Range: σ is 18.3 % (exact) lower than with range alone.",
+        "Radial velocity: σ is 18.3 % (exact) lower than with range alone.",
+        "“range only”: σ of the radial velocity is 18.3 % (exact) lower.",
+        "Gain over r there: 18.3 % (exact).",
+    ),
+    "ru": (
+        "Дальность: СКО на 18,3 % (точно) меньше.",
+        "СКО радиальной скорости на 18,3 % (точно) меньше, чем по одной дальности.",
+        "«дальность»: СКО радиальной скорости на 18,3 % (точно) меньше.",
+        "Выигрыш там же: 18,3 % (точно).",
+    ),
+}
+
+
+@pytest.mark.parametrize("code", SENTENCES)
+def test_a_headline_is_of_the_component_of_its_figure(code):
+    with use_language(code):
+        for sentence, component in zip(SENTENCES[code], ("r", "Vr", "Vr", ""), strict=True):
+            figures = {f"gain_{part.name}": GAIN for part in RADIAL}
+            sources = dict.fromkeys(figures, ("gains.gain",))
+            named = headlines.with_headlines(figures, [sentence], [()], sources, components=RADIAL)
+            of_answer = {name for name, figure in named.items() if figure.headline == sentence}
+            assert of_answer == ({f"gain_{component}"} if component else set())
+
+
+def test_a_headline_is_of_the_column_and_of_all_tables_of_its_figure():
+    sources = {
+        name: sources_behind_figure(name, {"cost": ("stages", "operations")}, TABLES) for name in ("sigma_r", "cost")
+    }
+    figures = {"sigma_r": SIGMA, "cost": SIGMA}
+    sentence = "Range: 18.3 m (exact)."
+
+    def headline_figures(*of_sentence):
+        named = headlines.with_headlines(figures, [sentence], [of_sentence], sources, components=RADIAL)
+        return {name for name, figure in named.items() if figure.headline == sentence}
+
+    assert headline_figures("curves.sigma") == {"sigma_r"}
+    assert headline_figures("curves.bias") == headline_figures("stages.sigma") == set()
+    assert headline_figures("stages.sigma", "operations") == {"cost"}
+
+
 def test_a_headline_ends_with_its_first_statement_unless_that_begins_a_list():
     assert headlines.first_statement("Range: 3 m; once settled 2 m.") == "Range: 3 m."
     assert headlines.first_statement("By stage: start: 3 m; after: 2 m.") == "By stage: start: 3 m; after: 2 m."
@@ -109,12 +154,18 @@ def check_words_of_figures(result):
             declared = study(result.experiment.study).drawn_from()
             sources = {name: sources_behind_figure(name, declared, tables) for name in figures}
             keys = swept_cases(result.cases), swept_keys(result.cases)
-            named = headlines.with_headlines(figures, answer.texts, answer.sources, sources, *keys)
+            components = study(result.experiment.study).user_filter_components() or RADIAL
+            named = headlines.with_headlines(figures, answer.texts, answer.sources, sources, *keys, components)
             long = {name: len(plain_text(figure.caption).split()) for name, figure in figures.items()}
             assert {name: count for name, count in long.items() if count > MAX_CAPTION_WORDS} == {}
             sentences = [headlines.first_statement(text) for text in answer.texts]
-            for figure in named.values():
+            component_names = [part.name for part in components]
+            for name, figure in named.items():
                 assert figure.headline in (*sentences, plain_text(figure.title))
+                kind, _, component = name.partition("_")
+                has_component = kind in headlines.COMPONENT_KINDS and component in component_names
+                if has_component and figure.headline != plain_text(figure.title):
+                    assert headlines.first_component(figure.headline, components) == component
                 assert not re.search(r"95 %", figure.caption) or "interval lies" in figure.caption or code != "en"
 
 
