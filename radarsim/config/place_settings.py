@@ -45,7 +45,7 @@ def key_paths(document: Document, model: type[StudyKeys], key: str, missing_ok: 
     Raises NoSuchKey if there is none; returns an empty list with missing_ok."""
     try:
         if "." in key or key in allowed_keys(model):
-            return [_dotted_path(document, key)]
+            return [_dotted_path(document, key, model.bare_keys)]
         return _paths_in_members(document, model, key)
     except NoSuchKey:
         if missing_ok:
@@ -53,8 +53,9 @@ def key_paths(document: Document, model: type[StudyKeys], key: str, missing_ok: 
         raise
 
 
-def _dotted_path(document: Document, key: str) -> KeyPath:
-    """The place of a dotted key; members of a list are given by index or name. Raises NoSuchKey."""
+def _dotted_path(document: Document, key: str, bare_keys: str) -> KeyPath:
+    """The place of a dotted key; members of a list are given by index or name. bare_keys: the list whose keys may stand
+    without it. Raises NoSuchKey."""
     path: KeyPath = ()
     for step in key.split("."):
         holder = document.get(path)
@@ -65,7 +66,9 @@ def _dotted_path(document: Document, key: str) -> KeyPath:
             if named_indices:
                 step = str(named_indices[0])
             if not step.isdecimal() or int(step) >= len(holder):
-                raise NoSuchKey(f"{'.'.join(map(str, path))} is a list: its items are 0 to {len(holder) - 1}")
+                is_bare = path == (bare_keys,) and any(isinstance(member, dict) and step in member for member in holder)
+                cure = f"; the key alone, {step}, means it in each" if is_bare and key.endswith(f".{step}") else ""
+                raise NoSuchKey(f"{'.'.join(map(str, path))} is a list: its items are 0 to {len(holder) - 1}{cure}")
             path = (*path, int(step))
         elif isinstance(holder, dict) or holder is ABSENT:
             path = (*path, step)

@@ -75,7 +75,7 @@ class Straight(Flight):
 
     kind: Literal["straight"] = key("kind", "straight flight")
     range_m: Positive = key("range", "range at the first plot, m")
-    speed_mps: NonNegative = key("speed", "speed, constant, m/s")
+    speed_mps: NonNegative = key("speed", "speed, constant, m/s", le=radial_keys.MAX_SPEED_MPS)
     aspect_rad: Number = key("aspect angle", "direction of flight from the line of sight outwards, rad")
 
 

@@ -138,7 +138,7 @@ class Turn(ManoeuvreStart):
     range_m: Positive = key("range", "range at the first plot, m")
     speed_mps: Annotated[Positive, Field(le=MAX_SPEED_MPS)] = key("speed", "speed, constant, m/s")
     aspect_rad: Number = key(
-        "aspect angle", "direction of flight from the line of sight outwards, rad (pi: straight in)"
+        "aspect angle", "direction of flight from the line of sight outwards, rad (0: straight out)"
     )
     acceleration_g: Annotated[Number, Field(ge=-100, le=100)] = key(
         "acceleration",

@@ -4,6 +4,7 @@ Errors of plots are a record or tuple with sigma (3,), rho, their correlation of
 unambiguous velocity interval. m: how many numbers of a plot a filter uses, 2 or 3. States and laws as in
 `radarsim.kernels.gaussian_filters`."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +13,7 @@ from radarsim.kernels.gaussian_filters import Law, State, linearised_law, take, 
 from radarsim.kernels.packed_matrices import add
 from radarsim.kernels.polar_plots import converted, errors_covariance, fold, law_of_position, polar, polar_rows
 from radarsim.kernels.small_matrices import dot, times, update
-from radarsim.kernels.tracing import where
+from radarsim.kernels.tracing import minimum, where
 
 RESOLVED = 6  # standard deviations of a velocity in the unambiguous interval: with fewer its fold is not known
 
@@ -40,7 +41,8 @@ def law_of_plot(state: State, errors: Any, m: int, unscented: bool) -> Law:
         return mean, add(S, (R[0], R[1], R[3])), C
     S = add(S, R)
     with_r, with_b, *with_state = where(is_fold_known(S[5], errors.span), (S[2], S[4], *C[2]), (0.0,) * (2 + len(C[2])))
-    return mean, (S[0], S[1], with_r, S[3], with_b, S[5]), (C[0], C[1], tuple(with_state))
+    variance = minimum(S[5], errors.span * errors.span / math.tau)  # a folded velocity is nowhere less likely than even
+    return mean, (S[0], S[1], with_r, S[3], with_b, variance), (C[0], C[1], tuple(with_state))
 
 
 def take_converted_plot(state: State, z: Sequence[Any], errors: Any, m: int, unbiased: bool, linear: bool) -> State:

@@ -192,8 +192,8 @@ def track(
 
     PLOTS.csv has a header and one row per plot, with increasing times at any spacing. An empty cell is a missing value;
     other columns are ignored. Its columns are t_s and the measurements of the study's sensor, as `radarsim simulate`
-    writes them: `range_m, velocity_mps` (range_doppler), `range_m, bearing_rad` (sonar), `range_m, elevation_rad,
-    azimuth_rad` or `x_m, y_m, z_m` (multimodel).
+    writes them: `range_m, velocity_mps` (range_doppler), `range_m, bearing_rad` (sonar), those and
+    `velocity_mps` (plane), `range_m, elevation_rad, azimuth_rad` or `x_m, y_m, z_m` (multimodel).
 
     It also reports gaps and missing values, and whether the accuracies in the config agree with the plots: the filters'
     innovations are tested (NIS, 1 for a consistent filter). If a gap is so long that only rounding errors would follow,

@@ -2,11 +2,13 @@
 
     class Plane(PlanarStudy):                       # besides what `radarsim.studies.step_clutter` needs:
         Filter, kinds = …                           # keys of filters, and their steps
+        def tells_folds(self, spec, keys): …        # whether a filter knows the fold of a velocity
 
 Letters: x north, y east, m; a bearing b and a course from north to the east, rad; r range, v radial velocity outwards.
 """
 
 import math
+from abc import abstractmethod
 from collections import namedtuple
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +22,7 @@ from radarsim.studies.onefile import MeasuredColumn
 from radarsim.studies.step_clutter import ClutteredStudy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import pandas as pd
 
@@ -161,6 +163,17 @@ class PlanarStudy(ClutteredStudy):
             shares = information_shares(detection, per_unit, m) if c.density else None
             bounds[m] = straight_flight_bound(axes.t_s, rows[:, :m], errors, maps, detection, shares)
         return Floor(CRB, tuple(bounds[m] for m in m_of_filters), bounds[3])
+
+    @abstractmethod
+    def tells_folds(self, spec: Any, keys: Any) -> bool:
+        """Whether a filter ever knows the fold of a velocity, or uses none."""
+
+    def _sentences(self, result: "CaseResult", tables_by_name: "Mapping[str, pd.DataFrame]") -> "Iterator[Sentence]":
+        """As of every study; then the filters whose velocities never count."""
+        from radarsim.studies.planar_tables import unused_velocity_sentences
+
+        yield from super()._sentences(result, tables_by_name)
+        yield from unused_velocity_sentences(self, result)
 
     def tables(self, results: "Sequence[CaseResult]") -> "dict[str, pd.DataFrame]":
         from radarsim.report import tables

@@ -8,10 +8,11 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.kernels.polar_plots import polar
-from radarsim.language.translate import term
+from radarsim.language.translate import join_names, quote_name, term, tr
 from radarsim.report import case_selection, statistics, tables, time_figures
 from radarsim.report.drawing.model import Figure
 from radarsim.report.quantities import Component
+from radarsim.report.sentences import Sentence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,3 +50,18 @@ def position_figure(results: Sequence[CaseResult], positions: "pd.DataFrame", ex
     visible, remark = case_selection.select_cases_by_panel(results, names)
     across = time_figures.sigma_figure("position", visible, groups, ACROSS)
     return replace(across, caption=across.caption + remark)
+
+
+def unused_velocity_sentences(study: "PlanarStudy", result: CaseResult) -> list[Sentence]:
+    """The filters that never know the fold of a velocity, if there are any."""
+    spec = result.spec
+    folds = study.span_mps(spec) is not None
+    blind = [quote_name(keys.name) for keys in spec.filters if folds and not study.tells_folds(spec, keys)]
+    if not blind:
+        return []
+    text = tr(
+        "No velocity counts in {filters}: its fold is never known (a higher repetition_rate_hz, "
+        "or a smaller process noise).",
+        filters=join_names(blind),
+    )
+    return [Sentence(case_selection.after_swept_values(result, text))]

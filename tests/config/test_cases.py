@@ -152,6 +152,11 @@ OVERRIDES = [
     ("scans=!!int 3", "--set scans: tags (tag:yaml.org,2002:int) are not read"),
     ("filters.2.name=x", "--set filters.2.name: filters is a list: its items are 0 to 1"),
     ("filters.q.name=x", "--set filters.q.name: filters is a list: its items are 0 to 1"),
+    (
+        "filters.manoeuvre_variance=1",
+        "--set filters.manoeuvre_variance: filters is a list: its items are 0 to 1; the key alone, manoeuvre_variance, "
+        "means it in each",
+    ),
     ("radr.x=3", "--set radr.x: radr: unknown key; did you mean radar? allowed: "),
     ("scans.x=3", "--set scans.x: scans has no keys of its own"),
     ("filters.0.name.x=3", "--set filters.0.name.x: filters.0.name has no keys of its own"),

@@ -517,15 +517,26 @@ def test_what_a_turn_costs_is_the_exact_error_in_it():
 def test_advice_of_part_of_the_rows_says_of_which(tmp_path, monkeypatch):
     monkeypatch.setattr(type(study_part.recording_interface(loaded().cases[0])), "rows_asked", 40)
     found, followed = advised(tmp_path, recording(np.random.default_rng(5)))
-    said = "from {} rows of {}, in {} stretches spread over all tracks and the whole time"
-    assert said.format(40, 60, 1) in sentences.advice_statements(followed, found)[-1].text
+    said = "from {} rows of {}, in {} spread over all tracks and the whole time"
+    assert said.format(40, 60, "1 stretch") in sentences.advice_statements(followed, found)[-1].text
     rows = [row + (f",{name}" if i else ",track")
             for name in "abc" for i, row in enumerate((tmp_path / "advised.csv").read_text().splitlines())
             if i or name == "a"]  # fmt: skip
     (tmp_path / "several.csv").write_text("\n".join(rows))
     followed = track.track_plots(loaded(), tmp_path / "several.csv", threads=1)
     monkeypatch.setattr(type(study_part.recording_interface(loaded().cases[0])), "rows_asked", 120)
-    assert said.format(120, 180, 3) in sentences.advice_statements(followed, advice.advise(followed))[-1].text
+    assert (
+        said.format(120, 180, "3 stretches") in sentences.advice_statements(followed, advice.advise(followed))[-1].text
+    )
+
+
+def test_rows_without_a_plot_are_no_part_that_is_left_out(tmp_path):
+    columns = recording(np.random.default_rng(5))
+    for name in ("range_m", "velocity_mps"):
+        columns[name][[7, 20]] = np.nan
+    found, followed = advised(tmp_path, columns)
+    assert found.used_rows.rows == SCANS - 2
+    assert not any("spread over" in statement.text for statement in sentences.advice_statements(followed, found))
 
 
 def test_what_is_asked_is_spread_over_all_tracks_and_their_whole_time():

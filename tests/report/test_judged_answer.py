@@ -143,6 +143,7 @@ def test_a_recognised_fault_comes_first_then_the_verdict_and_the_next_step():
     assert "stand too late" in fault or "stand a scan too late" in fault
     assert verdict.startswith("“mine” is worse than r+Vr")
     assert next_step.startswith("Next: mend this")
+    assert "read as r (m), Vr (m/s)" in next_step
 
 
 def test_the_judgement_is_verdict_consistency_and_next_step():

@@ -75,10 +75,12 @@ class FilterComparison:
 
 @dataclass(frozen=True)
 class UsedRows:
-    """The rows used for advice: their number, in how many stretches, spread over all tracks and the whole time."""
+    """The rows used for advice: their number, in how many stretches, spread over all tracks and the whole time; beside
+    them those without a plot."""
 
     rows: int
     stretches: int
+    empty: int
 
 
 @dataclass(frozen=True)
@@ -103,8 +105,9 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
     progress is called with the number of likelihoods computed."""
     case, interface = followed.case, recording_interface(followed.case)
     results = list(followed.tracks.values()) or [followed]
-    stretches = [without_empty_rows(stretch) for result in results for stretch in result.sample.stretches()]
-    stretches = [stretch for stretch in stretches if len(stretch["t_s"]) >= MIN_TRACK_ROWS]
+    kept = [stretch for result in results for stretch in result.sample.stretches()]
+    with_plots = [without_empty_rows(stretch) for stretch in kept]
+    stretches = [stretch for stretch in with_plots if len(stretch["t_s"]) >= MIN_TRACK_ROWS]
     if not stretches or unknown_inherited_keys(case, "likelihood"):
         return None
     sample = sample_rows(stretches, interface.rows_asked)
@@ -113,7 +116,8 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
     if not likelihoods:
         return None
     comparison = compare_filters(list(likelihoods.values()))
-    used_rows = UsedRows(sum(len(stretch["t_s"]) for stretch in sample), len(sample))
+    rows = [sum(len(stretch["t_s"]) for stretch in group) for group in (sample, kept, with_plots)]
+    used_rows = UsedRows(rows[0], len(sample), empty=rows[1] - rows[2])
     if speed := impossible_column_speed(stretches):
         return Advice(comparison, [], used_rows, impossible_speed=speed)
     fault = detect_case_velocity_fault(case, stretches)

@@ -198,14 +198,14 @@ def _best_filter_text(comparison: FilterComparison) -> str:
 
 
 def _used_rows_statement(followed: TrackingResult, used_rows: UsedRows) -> list[Statement]:
-    """The rows on which best filter and advice rest, unless these are all."""
-    if used_rows.rows >= followed.rows:
+    """The rows on which best filter and advice rest, unless these are all with a plot."""
+    if used_rows.rows + used_rows.empty >= followed.rows:
         return []
     text = tr(
-        "from {rows} of {all}, in {stretches} stretches spread over all tracks and the whole time",
+        "from {rows} of {all}, in {stretches} spread over all tracks and the whole time",
         rows=row_count_text(used_rows.rows),
         all=followed.rows,
-        stretches=used_rows.stretches,
+        stretches=plural("{count} stretch", "{count} stretches", used_rows.stretches),
     )
     return [Statement("", text)]
 

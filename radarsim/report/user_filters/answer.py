@@ -89,11 +89,12 @@ def _judge_filter(result: CaseResult, name: str, prefix: str, tables_by_name: Ta
         verdict = sentences.compose(text + verdict.text, [*failing, verdict])
     consistency = _consistency_sentence(result, name, tables_by_name)
     is_unsound = bool(faults or failing or comparison.dependence)
+    components = ", ".join(f"{component} ({wording.unit(unit) or 1})" for component, unit in result.axes.components)
     main = [
         *faults,
         verdict.with_text(prefix + verdict.text),
         *([] if faults else [consistency]),
-        Sentence(_next_step(comparison, is_unsound, is_trained=_training_ratio(result, name) is not None)),
+        Sentence(_next_step(comparison, components if is_unsound else "", _training_ratio(result, name) is not None)),
     ]
     return Judgement(
         main,
@@ -107,16 +108,17 @@ def _judge_filter(result: CaseResult, name: str, prefix: str, tables_by_name: Ta
     )
 
 
-def _next_step(comparison: RivalComparison, is_unsound: bool, is_trained: bool) -> str:
-    """What to do after a verdict. is_unsound: whether estimates are missing, at fault, or depend on each other."""
+def _next_step(comparison: RivalComparison, unsound: str, is_trained: bool) -> str:
+    """What to do after a verdict. unsound: the components as which estimates were read that are missing, at fault, or
+    depend on each other."""
     gains = [comparison.gain_against(rival) for rival in comparison.rivals]
     undecided = [
         gain for gain in gains if gain.estimate.lo <= 0 <= gain.estimate.hi and not gain_sentences.is_equal(gain)
     ]
     if is_trained:
         return tr('Next: train it on other noise: radarsim.plots(…, purpose="training").')
-    if is_unsound:
-        return tr("Next: mend this; the numbers are of the estimates as they stand.")
+    if unsound:
+        return tr("Next: mend this; the estimates were read as {components}.", components=unsound)
     if undecided:
         needed = _deciding_realisations(undecided[-1], int(comparison.sigma["n"]))
         if not math.isfinite(needed):

@@ -234,6 +234,16 @@ class Plane(PlanarStudy):
             return None
         return [] if rate is None else [(("radar.repetition_rate_hz", factor * rate),) for factor in (2.0, 4.0)]
 
+    def tells_folds(self, spec, keys):
+        if not keys.doppler:
+            return True
+        for s, c in self.typical_states(spec, keys):
+            states, _ = s if c.kind == "converted" else Tracking.predict(s, spec.radar.scan_period_s, (), c)
+            laws = [expected_plot(state, c)[1] for state in (states[:2] if c.kind == "imm" else (states,))]
+            if c.first or any(is_fold_known(S[5], c.span) for S in laws):
+                return True
+        return False
+
     def tracker(self, case):
         if self.false_places(case.spec):
             for i, keys in enumerate(case.spec.filters):

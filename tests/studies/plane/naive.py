@@ -154,6 +154,8 @@ class Filter:
         if m == 3 and S[2, 2] * RESOLVED**2 >= self.span**2:
             S[2, :2] = S[:2, 2] = 0
             C[:, 2] = 0
+        if m == 3:
+            S[2, 2] = min(S[2, 2], self.span**2 / (2 * np.pi))
         return mean, S, C
 
     def update(self, plots, there=None, density=0.0):

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+import radarsim
 from radarsim.studies import step_programs
+from radarsim.studies.plane import moments
 from radarsim.studies.registry import study
 from tests.studies.plane import naive
-from tests.studies.plane.cases import case_of, member, plots_of, run_of
+from tests.studies.plane.cases import RADAR, STRAIGHT, case_of, member, plots_of, run_of
 
 MODELS = ("velocity", "acceleration", "turn")
 FOLDS = {"unfolded": {}, "folded": {"repetition_rate_hz": 4000.0}, "fold not known": {"repetition_rate_hz": 800.0}}
@@ -134,3 +136,28 @@ def test_a_filter_is_traced_anew_only_where_its_branches_differ(monkeypatch):
     plane.prepare(case_of([member("extended", doppler=False)]))
     plane.prepare(case_of([member("extended") | {"sigma_acceleration_mps2": 0.0}]))
     assert len(traced) == 3
+
+
+@pytest.mark.parametrize("rate_hz", [100.0, 800.0, 1500.0, 40e3])
+def test_a_filter_whose_velocities_never_count_is_as_without_doppler(rate_hz):
+    filters = [
+        member(kind, model, doppler=doppler)
+        for kind, model in (("extended", "velocity"), ("converted", "velocity"), ("imm", "turn"))
+        for doppler in (False, True)
+    ]
+    spec, plane = case_of(filters, STRAIGHT, 12, repetition_rate_hz=rate_hz).spec, study("plane")
+    last = [moments(*list(plane.typical_states(spec, keys))[-1]) for keys in spec.filters]
+    for i in range(0, len(filters), 2):
+        (_, without), (_, P) = last[i : i + 2]
+        assert plane.tells_folds(spec, spec.filters[i + 1]) != np.allclose(P, without, rtol=1e-2)
+
+
+def test_the_answer_names_filters_whose_velocities_never_count():
+    keys = {"study": "plane", "target": STRAIGHT, "scans": 6, "realisations": 200, "filters": SHIPPED[:2]}
+    answers = [
+        [text for text in radarsim.run(keys | {"radar": RADAR | rate}).answer if "No velocity counts" in text]
+        for rate in ({}, {"repetition_rate_hz": 800.0})
+    ]
+    assert not answers[0]
+    assert len(answers[1]) == 1
+    assert "“extended velocity Vr”" in answers[1][0]
