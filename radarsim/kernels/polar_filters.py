@@ -41,7 +41,7 @@ def law_of_plot(state: State, errors: Any, m: int, unscented: bool) -> Law:
         return mean, add(S, (R[0], R[1], R[3])), C
     S = add(S, R)
     with_r, with_b, *with_state = where(is_fold_known(S[5], errors.span), (S[2], S[4], *C[2]), (0.0,) * (2 + len(C[2])))
-    variance = minimum(S[5], errors.span * errors.span / math.tau)  # a folded velocity is nowhere less likely than even
+    variance = minimum(S[5], errors.span * errors.span / math.tau)  # the peak is no lower than an even density
     return mean, (S[0], S[1], with_r, S[3], with_b, variance), (C[0], C[1], tuple(with_state))
 
 
