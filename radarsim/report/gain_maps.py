@@ -73,7 +73,7 @@ def _figure(name: str, grid: sweep_figures.SweptGrid, panels: Sequence[Panel]) -
     members = grid.members
     axes, (first, second) = members[0].axes, (key_labels.key_label(members[0], key).text for key in grid.keys)
     caption = tr(
-        "Gain against {base} in σ at the last scan over the {first} and the {second}, ± half the width of its 95 % "
+        "Gain against {base} in σ at the last scan against the {first} and the {second}, ± half the width of its 95 % "
         "interval (none where filters are nearly alike), of {realisations} in each cell.",
         base=axes.filters[axes.baseline],
         first=first,
@@ -82,7 +82,7 @@ def _figure(name: str, grid: sweep_figures.SweptGrid, panels: Sequence[Panel]) -
     )
     shown = panels[: sweep_figures.MOST_PANELS]
     caption += case_selection.left_out_remark([p.title for p in panels], [p.title for p in shown])
-    return grid.figure(name, tr("Gain over the {first} and the {second}", first=first, second=second), caption, shown)
+    return grid.figure(name, tr("Gain versus {first} and {second}", first=first, second=second), caption, shown)
 
 
 def gain_map_sentences(
