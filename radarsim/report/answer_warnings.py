@@ -1,14 +1,14 @@
 """Warnings on the intervals that an answer rests on, with the realisations that they need."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import list_filters, plural, shorten_names
-from radarsim.report import provenance, rare_events
+from radarsim.report import case_selection, provenance, rare_events
 from radarsim.report.interval_notes import BELIEVED_VARIES, HEAVY_TAILS, MIN_EFFECTIVE, estimate_counts
 from radarsim.report.row_notes import concerns, note_kinds
 from radarsim.report.sentences import Sentence
@@ -55,29 +55,38 @@ def narrow_interval_warning(
     if not rows_by_table:
         return []
     count = sum(map(len, rows_by_table))
-    names = dict.fromkeys(name for rows in rows_by_table for name in rows["filter"])
-    filters = list_filters(names, MAX_NAMES)
+    filters = _filters_and_cases(rows_by_table, results)
     enough = np.max(np.concatenate([needed_realisations(rows, tables_by_name, results) for rows in rows_by_table]))
     if np.isfinite(enough):  # it is NaN if the number is unknown for one of the rows
         line = plural(
-            "{count} interval of the answer is too narrow because few realisations decide it ({filters}): "
-            "run with -n {needed}",
-            "{count} intervals of the answer are too narrow because few realisations decide them "
-            "({filters}): run with -n {needed}",
+            "An interval of the answer is too narrow ({filters}): few realisations decide it. Run with -n {needed}.",
+            "{count} intervals of the answer are too narrow ({filters}): few realisations decide them. Run with -n "
+            "{needed}.",
             count,
             filters=filters,
             needed=roughly(float(enough)),
         )
     else:
         line = plural(
-            "{count} interval of the answer may be too narrow because rare realisations decide it and few or "
-            "none occurred ({filters}): run with a larger -n",
-            "{count} intervals of the answer may be too narrow because rare realisations decide them and few "
-            "or none occurred ({filters}): run with a larger -n",
+            "An interval of the answer may be too narrow ({filters}): few of the rare realisations that decide it "
+            "occurred. Run with a larger -n.",
+            "{count} intervals of the answer may be too narrow ({filters}): few of the rare realisations that decide "
+            "them occurred. Run with a larger -n.",
             count,
             filters=filters,
         )
     return [line]
+
+
+def _filters_and_cases(rows_by_table: "Iterable[pd.DataFrame]", results: Sequence[CaseResult]) -> str:
+    """The filters of rows; with their cases, where there are several."""
+    rows_by_table = list(rows_by_table)
+    filters = list_filters(dict.fromkeys(name for rows in rows_by_table for name in rows["filter"]), MAX_NAMES)
+    if len(results) < 2:
+        return filters
+    names = dict(zip((r.name for r in results), case_selection.distinct_case_names(results), strict=True))
+    cases = dict.fromkeys(names[case] for rows in rows_by_table for case in rows["case"])
+    return f"{filters}; {shorten_names(list(cases), MAX_NAMES)}"
 
 
 def affected_rows(

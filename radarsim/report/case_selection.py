@@ -36,11 +36,7 @@ def select_reported(results: Sequence[CaseResult], max_cases: int = 3) -> tuple[
     """The cases that an answer reports: all, or the first and last of more than so many; and words on the others."""
     if len(results) <= max_cases:
         return list(results), []
-    remark = plural(
-        "The case in between is in the report's tables.",
-        "The {count} cases in between are in the report's tables.",
-        len(results) - 2,
-    )
+    remark = plural("The other case is in the tables.", "The other {count} cases are in the tables.", len(results) - 2)
     return [results[0], results[-1]], [remark]
 
 

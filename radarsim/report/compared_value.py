@@ -4,7 +4,7 @@ Answers, headlines, captions and rankings take their numbers from here, so that 
 scan and the same value. An extreme of measured values is chosen by their noise: it has an interval that holds for all
 values among which it was chosen."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -62,10 +62,22 @@ class ComparedValue:
         return tr("{value} (exact)", value=" ".join(filter(None, (value, unit))))
 
     def choice_remark(self) -> str:
-        """In brackets, among how many measured values it was chosen; empty where it was not, or has no interval."""
+        """In brackets, for how many measured values its interval holds; empty where it was not chosen, or has none."""
         if self.looks < 2 or np.isnan(self.estimate.lo):
             return ""
-        return " " + tr("(interval for all {count} compared)", count=self.looks)
+        return f" ({simultaneity_text(self.looks)})"
+
+
+def simultaneity_text(count: int) -> str:
+    """That intervals hold for so many values at once, and how surely."""
+    return tr("95 % for both together") if count == 2 else tr("95 % for all {count} together", count=count)
+
+
+def choice_remarks(values: Sequence[ComparedValue]) -> list[str]:
+    """Remarks behind values that are alike in how they were chosen: behind the last one that has an interval."""
+    remarks = [value.choice_remark() for value in values]
+    last = max((i for i, remark in enumerate(remarks) if remark), default=-1)
+    return [remark if i == last else "" for i, remark in enumerate(remarks)]
 
 
 def row_value(row: Row, quantity: Quantity = SIGMA) -> ComparedValue:

@@ -19,11 +19,11 @@ from radarsim.report.quantities import RADIAL
 from radarsim.studies.multimodel.tables import stage_gain, stage_names
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 
-NUMBER = r"[−-]?(?:\d[\d,\u202f\u00a0]*(?:\.\d+)?|∞)(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
+NUMBER = r"[−+-]?(?:\d[\d,\u202f\u00a0]*(?:\.\d+)?|∞)(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 UNIT = r"(?:[ \u00a0](?:%|°|k?m/s²|k?m/s|k?m|s|к?м/с²|к?м/с|к?м|с|Hz\S*|Гц\S*|rad\S*|рад\S*|m²|м²))?"
 MEASURED = re.compile(rf"(?P<value>{NUMBER}){UNIT} \[(?P<low>{NUMBER}), (?P<high>{NUMBER})\]")
 EXACT = re.compile(rf"(?P<value>{NUMBER}){UNIT}(?: (?:lower|higher))? \((?:exact|точно)\)")
-FOR_ALL = re.compile(r"intervals? for all|интервал\w* сразу для всех")
+FOR_ALL = re.compile(r"95[ \u00a0]% (?:for (?:all|both)|сразу для)")
 RUSSIAN_COMMA = re.compile(r"(?<=\d),(?=\d)")
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 TIME = re.compile(rf"(?<!= )(?<![\d.,])({NUMBER})[ \u00a0][sс](?![\w/]| \[)")

@@ -87,7 +87,7 @@ def test_an_extreme_is_the_exact_one_or_says_that_it_was_chosen():
     row, value = compared_value.extreme(rows, GAIN)
     assert (row.name, value.looks) == (0, 2)
     assert value.estimate.lo < 31.1 < 36.7 < value.estimate.hi
-    assert value.choice_remark() == " (interval for all 2 compared)"
+    assert value.choice_remark() == " (95 % for both together)"
     row, value = compared_value.extreme(rows.assign(exact_percent=[30.9, 31.2]), GAIN)
     assert (row.name, value.value, value.is_exact, value.choice_remark()) == (1, 31.2, True, "")
 
@@ -126,3 +126,11 @@ def test_values_that_noise_orders_are_not_distinguished():
     exact = [ComparedValue(Estimate(v, v, v), True) for v in (1.0, 1.0)]
     assert not compared_value.are_distinguished(*exact)
     assert SIGMA.exact_column == "exact_sigma"
+
+
+def test_a_remark_stands_once_behind_the_last_value_with_an_interval():
+    measured, exact = (ComparedValue(Estimate(5.0, 4.0, 6.0), is_exact).chosen_among(4) for is_exact in (False, True))
+    remark = " (95 % for all 4 together)"
+    assert compared_value.choice_remarks([measured, measured]) == ["", remark]
+    assert compared_value.choice_remarks([measured, exact]) == [remark, ""]
+    assert compared_value.choice_remarks([exact, exact]) == ["", ""]

@@ -57,7 +57,7 @@ def test_the_reader_notices_what_contradicts_a_table():
     assert read_sentence("33,8 % [31,1; 36,7]", measured, "ru").read == ["33.8 % [31.1, 36.7]"]
     assert read_sentence("at worst 32.0 % (exact) higher", exact).faults
     assert read_sentence("33.8 % [29.0, 38.0]", measured).faults
-    assert read_sentence("33.8 % [29.0, 38.0] (interval for all 14 compared)", measured).read
+    assert read_sentence("33.8 % [29.0, 38.0] (95 % for all 14 together)", measured).read
 
 
 def test_the_reader_tells_all_from_nearly_all():

@@ -73,7 +73,7 @@ def test_gains_over_two_keys_are_maps_with_their_intervals_and_sentences():
     for (k, r), row in (least, greatest):
         assert f"{row['gain_percent']:.3g} %" in sentence.text
         assert f"scans = {k}, σ of the measured range = {r} m" in sentence.text or f"{r} m" in sentence.text
-    assert "(interval for all 6 compared)" in sentence.text
+    assert "(95 % for all 6 together)" in sentence.text
     assert not list(gain_maps.map_groups(run.run("rls2", realisations=8).cases))
 
 

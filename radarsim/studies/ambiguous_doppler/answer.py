@@ -70,22 +70,22 @@ def answer(
     remedies = remedy_answer.remedy_sentence(filters, tables_by_name)
     if not (answered := [*noise.sentences, *of_all_cases[:1], *of_cases, *remedies]):
         return list(map(Sentence, remark))
-    return [*answered, _prior_sentence(results), *map(Sentence, remark)]
+    mentions_span = any("D = " in sentence.text or "D/2" in sentence.text for sentence in answered)
+    return [*answered, _prior_note(results, mentions_span), *map(Sentence, remark)]
 
 
-def _prior_sentence(results: Sequence[Result]) -> Sentence:
-    """What the filters know before the first plot, in any case."""
+def _prior_note(results: Sequence[Result], mentions_span: bool) -> Sentence:
+    """What the filters know before the first plot, in any case; and what D is, where the answer mentions it."""
     velocity, acceleration = (
         _span_text([getattr(result.spec.prior, name) for result in results])
         for name in ("sigma_velocity_mps", "sigma_acceleration_mps2")
     )
     text = tr(
-        "Prior of the filters: σ of the velocity {velocity} m/s, of the acceleration {acceleration} m/s²; D: "
-        "unambiguous interval of the velocity.",
+        "Note: prior of the filters: σ of the velocity {velocity} m/s, of the acceleration {acceleration} m/s²",
         velocity=velocity,
         acceleration=acceleration,
     )
-    return Sentence(text)
+    return Sentence(f"{text}; {tr('D is the unambiguous interval of the velocity')}." if mentions_span else f"{text}.")
 
 
 def _span_text(values: Sequence[float]) -> str:
@@ -140,7 +140,7 @@ def _sigma_m(row: "pd.Series[Any]") -> str:
 
 def _scans_remark(rows: "Iterable[pd.Series[Any]]") -> str:
     """That intervals hold for all scans at once, where a largest value was measured."""
-    return " " + tr("(intervals for all scans at once)") if any(_largest_sigma(row).looks > 1 for row in rows) else ""
+    return " " + tr("(95 % for all scans together)") if any(_largest_sigma(row).looks > 1 for row in rows) else ""
 
 
 def _least_error_of_all(
@@ -196,9 +196,9 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
         return []
     errors = [
         tr("{filter}, {sigma} at scan {k}", filter=quote_name(row["filter"]), sigma=_sigma_m(row), k=row["k"])
+        + _scans_remark([row])
         for _, row in worst.iterrows()
     ]
-    remark = _scans_remark(row for _, row in worst.iterrows())
     subject = tr("largest σ of the range {since}", since=wording.since(*counted))
     clauses = ["; ".join(errors)]
     axes = result.axes
@@ -217,7 +217,7 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
         )
     elif np.isfinite(best_order):
         clauses.append(tr("with the trajectory known, the best order of each scan gives {best:.4g} m", best=best_order))
-    text = f"{key_labels.plain_case_label(result)}, {subject}{remark}: {'; '.join(clauses)}."
+    text = f"{key_labels.plain_case_label(result)}, {subject}: {'; '.join(clauses)}."
     intervals = [interval for _, row in worst.iterrows() for interval in _largest_sigma(row).intervals]
     return [Sentence(text, tuple(intervals))]
 
@@ -230,6 +230,7 @@ class _CaseComparison(NamedTuple):
     text: str
     clause: Sentence
     deciding: tuple[sentences.MeasuredInterval, ...]
+    is_undecided: bool  # whether its interval at the last scan holds the limit
 
 
 def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
@@ -242,21 +243,28 @@ def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -
                 since = _first_good_scan(gains) or np.inf
                 text = f"{key_labels.plain_case_label(result)}: {clause.text}"
                 deciding = _near_the_limit(gains.tail(1))
-                above = gains["excess_over_oracle_percent"].iloc[-1]
-                comparisons.setdefault(name, []).append(_CaseComparison(since, above, text, clause, deciding))
+                above, low = gains[["excess_over_oracle_percent", "excess_over_oracle_percent_lo"]].iloc[-1]
+                is_undecided = bool(np.isinf(since) and not low > AS_GOOD_PERCENT and above <= LOST_PERCENT)
+                case = _CaseComparison(since, above, text, clause, deciding, is_undecided)
+                comparisons.setdefault(name, []).append(case)
     if not comparisons:
         return []
     good = {name: sum(np.isfinite(case.since_scan) for case in cases) for name, cases in comparisons.items()}
     worst = {name: max(cases, key=lambda case: case[:3]) for name, cases in comparisons.items()}
     best_name = min(comparisons, key=lambda name: (-good[name], worst[name][:3]))
+    undecided = sum(case.is_undecided for case in comparisons[best_name])
+    ties = sum(case.clause.text == worst[best_name].clause.text for case in comparisons[best_name]) - 1
+    also = ", " + plural("as in {count} other case", "as in {count} other cases", ties) if ties else ""
     text = tr(
         "{filter}: σ of the velocity is within {percent:g} % of that with unfolded velocity in {good} of {count} "
-        "cases at the last scan; worst case, {worst}.",
+        "cases at the last scan{undecided}; worst case, {worst}{also}.",
+        undecided=", " + tr("undecided in {count}", count=undecided) if undecided else "",
         filter=quote_name(best_name),
         percent=AS_GOOD_PERCENT,
         good=good[best_name],
         count=len(comparisons[best_name]),
         worst=worst[best_name].text,
+        also=also,
     )
     by_limit = (interval for case in comparisons[best_name] for interval in case.deciding)
     return [Sentence(text, (*worst[best_name].clause.intervals, *by_limit))]
@@ -305,6 +313,11 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, loo
                 tables.select_rows(tables_by_name["folds"], case=result.name, filter=name).iloc[-1], final["k"], looks
             )
         ]
+    return [_excess_clause(final, looks)]
+
+
+def _excess_clause(final: "pd.Series[Any]", looks: int) -> Sentence:
+    """By how much σ of the velocity is above the oracle's at the last scan; with signs where that may be within 5 %."""
     ratio = Estimate(
         *(
             100.0 + final[key]
@@ -312,17 +325,22 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, loo
         )
     )
     above = ComparedValue(ratio, is_exact=False).chosen_among(looks).mapped(lambda percent: percent - 100.0)
-    fields = {"above": above.text("%", ".3g") + above.choice_remark(), "k": final["k"]}
-    if final["excess_over_oracle_percent"] <= AS_GOOD_PERCENT:
+    fields = {"k": final["k"], "chosen": above.choice_remark()}
+    if above.estimate.lo > AS_GOOD_PERCENT:
         text = tr(
-            "σ of the velocity is {above} above that of unfolded velocity at scan {k}, the last: perhaps within "
-            "{percent:g} %",
-            percent=AS_GOOD_PERCENT,
+            "σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last{chosen}",
+            above=above.text("%", ".3g"),
             **fields,
         )
     else:
-        text = tr("σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last", **fields)
-    return [Sentence(text, sentences.intervals("gains", "excess_over_oracle_percent", final))]
+        text = tr(
+            "σ of the velocity differs by {above} from that of unfolded velocity at scan {k}, the last{chosen}: "
+            "perhaps within {percent:g} %",
+            above=above.text("%", "+.3g"),
+            percent=AS_GOOD_PERCENT,
+            **fields,
+        )
+    return Sentence(text, sentences.intervals("gains", "excess_over_oracle_percent", final))
 
 
 def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
@@ -332,8 +350,9 @@ def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
     text = tr(
         "at scan {k} the velocity is off by more than D/2 in {share} of realisations",
         k=k,
-        share=wording.share(*(100 * end for end in share.estimate)) + share.choice_remark(),
+        share=wording.share(*(100 * end for end in share.estimate)),
     )
+    text += share.choice_remark()
     if folds[BEYOND_SHARE] > remedy_answer.LOST_SHARE:
         text = tr("lost: {off}", off=text)
     return Sentence(text, sentences.intervals("folds", BEYOND_SHARE, folds))

@@ -73,12 +73,13 @@ def _worst_against_design(results: Sequence[CaseResult], tables_by_name: TablesB
     rate = compared_value.row_value(row, LOSS).chosen_among(len(losses))
     text = tr(
         "{estimator} loses lock in {rate} of the bursts, {times:.3g} times the {designed:.3g} of its design: the "
-        "largest ratio of {count} cases (interval for all of them).",
+        "largest ratio of {count} cases{chosen}.",
         estimator=quote_name(row["filter"]),
         rate=rate.text(form=".3g"),
         designed=designed,
         times=times,
         count=len(losses),
+        chosen=rate.choice_remark(),
     )
     return [Sentence(text, rate.intervals)]
 
@@ -152,12 +153,13 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
     )
     text = plural(
         "{estimator}: locked in {least} to {most}; {count} case of {realisations}.",
-        "{estimator}: locked in {least} to {most}; {count} cases of {realisations} each (intervals for all of them).",
+        "{estimator}: locked in {least} to {most}; {count} cases of {realisations} each ({together}).",
         len(cases),
         estimator=quote_name(name),
         least=lowest,
         most=highest,
         realisations=case_selection.realisations_text(cases),
+        together=compared_value.simultaneity_text(len(cases)),
     )
     return Sentence(text, _lock_intervals(*(rows[result.name] for result in extremes)))
 

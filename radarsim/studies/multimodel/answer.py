@@ -93,19 +93,18 @@ def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") 
         "second": quote_name(second["filter"]),
         "more": above[1],
         "where": _stage_label(results, second),
-        "count": len(rows),
+        "together": compared_value.simultaneity_text(len(rows)),
     }
     if not closest["above"]:
         text = tr(
             "Least σ of the height in every stage: {filter}; next is {second}, at most {more} above it ({where}; "
-            "interval for all {count} compared).",
+            "{together}).",
             **fields,
         )
         return [Sentence(text, sentences.intervals("stages", "sigma", second))]
     text = tr(
-        "Never far from the best filter of {every}: {filter}, with σ of the height at most {percent} above the least "
-        "({closest_where}, by {best}); next is {second}, at most {more} above it ({where}); intervals for all "
-        "{count} compared.",
+        "Smallest worst excess of σ of the height over the best filter of {every} ({together}): {filter}, {percent} "
+        "({closest_where}, where {best} is best); next is {second}, {more} ({where}).",
         every=tr("each stage of every case") if len(results) > 1 else tr("each stage"),
         percent=above[0],
         closest_where=_stage_label(results, closest),
@@ -131,23 +130,23 @@ def _least_sigma(result: CaseResult, stages: "pd.DataFrame", component: str, qua
     rows = tables.select_rows(stages, case=result.name, component=component)
     best = rows.loc[rows.groupby("stage", sort=False)["sigma"].idxmin()]
     looks = int(rows["sigma"].map("{:.9g}".format).groupby(rows["stage"]).nunique().max())
-    clauses = [
-        f"{tr(str(row['stage']))}: {stage_ranking.least_filters(result, rows, row)}, {_least_sigma_text(row, looks)}"
-        for _, row in best.iterrows()
-    ]
+    clauses = [_least_sigma_clause(result, rows, row, looks) for _, row in best.iterrows()]
     remark = compared_value.row_value(best.iloc[0]).chosen_among(looks).choice_remark()
-    fields = {"quantity": quantity, "stages": "; ".join(clauses) + remark}
+    fields = {"quantity": quantity, "stages": "; ".join(clauses)}
     text = (
-        tr("Least σ of {quantity} by stage: {stages}.", **fields)
+        tr("Least σ of {quantity} by stage{chosen}: {stages}.", chosen=remark, **fields)
         if looks > 1
         else tr("σ of {quantity} by stage: {stages}.", **fields)
     )
     return Sentence(case_selection.after_swept_values(result, text), sentences.intervals("stages", "sigma", best))
 
 
-def _least_sigma_text(row: "pd.Series[Any]", looks: int) -> str:
-    """σ of a row of the stages, the least of so many."""
-    return _three_digits(compared_value.row_value(row).chosen_among(looks), key_labels.unit_label(row["unit"]))
+def _least_sigma_clause(result: CaseResult, rows: "pd.DataFrame", best: "pd.Series[Any]", looks: int) -> str:
+    """The filter of the least σ of a stage, σ, chosen among so many, and the filters not distinguished from it."""
+    filters, close = stage_ranking.least_filters(result, rows, best)
+    sigma = _three_digits(compared_value.row_value(best).chosen_among(looks), key_labels.unit_label(best["unit"]))
+    remark = " " + tr("(not distinguished from {others})", others=close) if close else ""
+    return f"{tr(str(best['stage']))}: {filters}, {sigma}{remark}"
 
 
 def _three_digits(value: ComparedValue, unit: str) -> str:

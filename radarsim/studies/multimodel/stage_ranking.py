@@ -5,7 +5,7 @@ The least is chosen by the values themselves: a gain decides by an interval that
 from typing import TYPE_CHECKING, Any
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import list_filters, quote_name, tr
+from radarsim.language.translate import list_filters, quote_name
 from radarsim.report import gain_sentences, statistics
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.statistics import Estimate
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 MAX_CLOSE_NAMES = 3  # of filters that cannot be distinguished from the best
 
 
-def least_filters(result: CaseResult, rows: "pd.DataFrame", best: "pd.Series[Any]") -> str:
-    """The filter of the least σ in a stage, those equal to it, and those that cannot be distinguished from it.
+def least_filters(result: CaseResult, rows: "pd.DataFrame", best: "pd.Series[Any]") -> tuple[str, str]:
+    """The filter of the least σ in a stage with those equal to it; and those that cannot be distinguished from it.
 
     rows: of one component; best: the one of the least σ."""
     names = list(rows.loc[rows["stage"] == best["stage"], "filter"])
@@ -33,10 +33,7 @@ def least_filters(result: CaseResult, rows: "pd.DataFrame", best: "pd.Series[Any
     equal = [name for name, gain in gains.items() if gain.hi - gain.lo < gain_sentences.SINGLE and not gain.lo > 0]
     close = [name for name, gain in gains.items() if not gain.lo > 0 and name not in equal]
     equal_names = " = ".join(map(quote_name, [best["filter"], *equal]))
-    if not close:
-        return equal_names
-    others = list_filters(close, MAX_CLOSE_NAMES)
-    return tr("{filter} (not distinguished from it: {others})", filter=equal_names, others=others)
+    return equal_names, list_filters(close, MAX_CLOSE_NAMES) if close else ""
 
 
 def percent_above(result: CaseResult, row: "pd.Series[Any]", best_filter: str, looks: int) -> ComparedValue:

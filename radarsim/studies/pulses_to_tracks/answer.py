@@ -80,9 +80,9 @@ def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName)
         for row in worst.to_dict("records")
     ]
     text = tr(
-        "Largest σ of the range at the last scan over that of ideal bursts, in {count} cases: {found} (intervals for "
-        "all cases).",
+        "Largest σ of the range at the last scan over that of ideal bursts, in {count} cases ({together}): {found}.",
         count=len(results),
+        together=compared_value.simultaneity_text(len(results)),
         found="; ".join(ratios),
     )
     return [Sentence(text, _ratio_intervals(worst))]
@@ -151,10 +151,15 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
     _, least = compared_value.extreme(locks, LOCK, largest=False)
     if least.value == 1:
         low = numeral(f"{math.floor(1e4 * least.estimate.lo) / 100:.2f}")
-        locked = tr("at the worst scan {low} % or more of the bursts lock", low=low) + least.choice_remark()
+        locked = tr(
+            "all {count:,} bursts lock (at every scan {low} % or more{chosen})",
+            count=int(locks["n"].sum()),
+            low=low,
+            chosen=f"; {compared_value.simultaneity_text(least.looks)}" if least.looks > 1 else "",
+        )
     else:
-        share = wording.share(*(100 * end for end in least.estimate)) + least.choice_remark()
-        locked = tr("at the worst scan {share} of the bursts lock", share=share)
+        share = wording.share(*(100 * end for end in least.estimate))
+        locked = tr("at the worst scan {share} of the bursts lock", share=share) + least.choice_remark()
     ratios = tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
     final = ratios.iloc[-1]
     if final[RATIO.ends[1]] <= MAX_RATIO_OF_IDEAL:

@@ -98,12 +98,12 @@ def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd
     values = [
         compared_value.sigma_value(rows.iloc[0], tables_by_name).chosen_among(looks) for rows in (lowest, highest)
     ]
-    remark = next(filter(None, (value.choice_remark() for value in values)), "")
+    remarks = compared_value.choice_remarks(values)
     fields = {
         "quantity": COMPONENTS_BY_NAME[component].words,
         "t_s": final["t_s"].iloc[0],
-        "least": _filters_and_sigma(lowest, values[0]),
-        "most": _filters_and_sigma(highest, values[1]) + remark,
+        "least": _filters_and_sigma(lowest, values[0]) + remarks[0],
+        "most": _filters_and_sigma(highest, values[1]) + remarks[1],
     }
     if order.nunique() == 1:
         text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)

@@ -154,11 +154,11 @@ def test_prior_follows_the_speed_of_the_target():
 def test_prior_is_in_the_answer():
     """One sentence for all cases, whatever else the answer says."""
     small = BOAT | {"scans": 4, "realisations": 60}
-    (line,) = [line for line in radarsim.run(small).answer if line.startswith("Prior")]
-    assert line.startswith("Prior of the filters: σ of the velocity 14.4 m/s, of the acceleration 0.48 m/s²")
+    (line,) = [line for line in radarsim.run(small).answer if line.startswith("Note")]
+    assert line.startswith("Note: prior of the filters: σ of the velocity 14.4 m/s, of the acceleration 0.48 m/s²")
     swept = small | {"sweep": {"target.speed_mps": [10, 20]}}
-    (line,) = [line for line in radarsim.run(swept).answer if line.startswith("Prior")]
-    assert "σ of the velocity 12 to 24 m/s, of the acceleration 0.4 to 0.8 m/s²; D: " in line
+    (line,) = [line for line in radarsim.run(swept).answer if line.startswith("Note")]
+    assert "σ of the velocity 12 to 24 m/s, of the acceleration 0.4 to 0.8 m/s²; D is " in line
 
 
 @pytest.mark.parametrize("config", ["ambiguous_depth", "ambiguous_manoeuvre", "ambiguous_orders", "orders"])

@@ -87,7 +87,8 @@ def test_orders_and_their_sentence():
     assert set(table["filter"]) == {"likelihood", "expected error", "intersection"}
     assert len(result.tables["folds"]) == 0
     sentences = answer_texts(registry.study("ambiguous_doppler"), result.cases, result.tables)
-    first, *sentences, _ = sentences
+    first, *sentences, prior = sentences
+    assert prior.endswith(" m/s²."), "no D in the answer, and none explained"
     assert len(sentences) == 3
     assert all("the best combination" in sentence for sentence in sentences)
     study, curves = registry.study("ambiguous_doppler"), result.curves.query("component == 'r'")
@@ -106,25 +107,44 @@ def test_answer_counts_radars_with_folded_velocity_as_good():
     result = radarsim.run("ambiguous", realisations=400)
     first = result.answer[0]
     gains = result.gains.query("component == 'Vr' and filter == 'memory'").groupby("case").tail(1)
-    good = int((gains["excess_over_oracle_percent_hi"] <= 5).sum())
+    is_good = gains["excess_over_oracle_percent_hi"] <= 5
+    is_undecided = (
+        ~is_good & (gains["excess_over_oracle_percent_lo"] <= 5) & (gains["excess_over_oracle_percent"] < 100)
+    )
     assert first.startswith(
-        f"“memory”: σ of the velocity is within 5 % of that with unfolded velocity in {good} of 4 cases at the last "
-        "scan"
+        f"“memory”: σ of the velocity is within 5 % of that with unfolded velocity in {is_good.sum()} of 4 cases at "
+        f"the last scan, undecided in {is_undecided.sum()}"
     )
     worst = gains.loc[gains["excess_over_oracle_percent"].idxmax(), "case"]
     assert f"worst case, {worst.replace('ambiguous_rls', 'RLS ')}: " in " ".join(result.answer[:2])
+
+
+def test_worst_case_is_said_to_tie(result):
+    """Two cases of the same tables: neither is worse."""
+    gains = result.tables["gains"].copy()
+    columns = ["excess_over_oracle_percent", "excess_over_oracle_percent_lo", "excess_over_oracle_percent_hi"]
+    gains.loc[(gains["component"] == "Vr") & (gains["filter"] == "memory"), columns] = (500.0, 400.0, 600.0)
+    tables = {**result.tables, "gains": gains}
+    first, *_ = answer_texts(registry.study("ambiguous_doppler"), [result.cases[0]] * 3, tables)
+    assert first.endswith(", as in 2 other cases.")
 
 
 @pytest.mark.parametrize(
     ("ends", "words"),
     [
         (
-            (4.9, 3.7, 6.1),
-            "σ of the velocity is 4.9 % [3.7, 6.1] above that of unfolded velocity at scan 15, the last: perhaps",
+            (4.9, -3.7, 6.1),
+            "σ of the velocity differs by +4.9 % [−3.7, +6.1] from that of unfolded velocity at scan 15, the last: "
+            "perhaps within 5 %;",
         ),
         (
-            (5.1, 4.1, 6.2),
-            "σ of the velocity is still 5.1 % [4.1, 6.2] above that of unfolded velocity at scan 15, the last;",
+            (5.3, 4.1, 6.2),
+            "σ of the velocity differs by +5.3 % [+4.1, +6.2] from that of unfolded velocity at scan 15, the last: "
+            "perhaps within 5 %;",
+        ),
+        (
+            (6.2, 5.1, 7.4),
+            "σ of the velocity is still 6.2 % [5.1, 7.4] above that of unfolded velocity at scan 15, the last;",
         ),
     ],
 )
@@ -136,7 +156,8 @@ def test_interval_around_five_percent_is_not_called_above(result, ends, words):
     ] = ends
     sentence, prior = answer_texts(registry.study("ambiguous_doppler"), result.cases, {**result.tables, "gains": gains})
     assert words in sentence
-    assert prior.startswith("Prior of the filters: ")
+    assert prior.startswith("Note: prior of the filters: ")
+    assert prior.endswith("; D is the unambiguous interval of the velocity.")
 
 
 @pytest.mark.parametrize("combine", [False, True])

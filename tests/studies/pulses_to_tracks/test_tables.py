@@ -115,18 +115,24 @@ def test_sentences(result):
     ratios = ratios.set_index("filter")["paired_over_ideal"]
     near, best, worst, far = re.fullmatch(
         r"RLS 4: σ of the range at the last scan is ([\d.]+) .* times that of ideal bursts with “(.+)”, and "
-        r"([\d.]+) \[.*\] times with “(.+)” \(interval for all \d compared\)\.",
+        r"([\d.]+) \[.*\] times with “(.+)” \(95 % for all \d together\)\.",
         sentences[0],
     ).group(1, 2, 4, 3)
     assert (best, worst) == (ratios.idxmin(), ratios.idxmax())
     assert [float(near), float(far)] == pytest.approx([ratios.min(), ratios.max()], rel=5e-3)
     (spectrum,) = [line for line in sentences if line.startswith("RLS 4, “spectrum”: ")]
     assert "ideal bursts" in spectrum
+    locks = result.tables["locks"].assign(lock_rate=1.0, lock_lo=0.99, lock_hi=1.0)
+    tables_of_locks = {**result.tables, "locks": locks}
+    (spectrum,) = [
+        line for line in answer_texts(study, result.cases, tables_of_locks) if line.startswith("RLS 4, “spectrum”: ")
+    ]
+    assert f": all {locks['n'][locks['filter'] == 'spectrum'].sum():,} bursts lock (at every scan 9" in spectrum
 
 
 def test_answer_on_several_cases_names_the_case_furthest_from_the_idealisation(swept):
     last = swept.tables["idealisations"].query("component == 'r'").groupby(["case", "filter"]).tail(1)
-    assert swept.answer[0].startswith("Largest σ of the range at the last scan over that of ideal bursts, in 3 cases: ")
+    assert swept.answer[0].startswith("Largest σ of the range at the last scan over that of ideal bursts, in 3 cases (")
     for name, filter_rows in last.groupby("filter"):
         worst = filter_rows.loc[filter_rows["paired_over_ideal"].idxmax()]
         where = worst["case"].rpartition("=")[2].replace("-", "−")

@@ -36,7 +36,9 @@ def answer(results: Sequence[CaseResult[ClutterAxes]], tables_by_name: "Mapping[
     for result in reported:
         sought = None if events is None else events[(events["case"] == result.name) & events["sought"]]
         rows = tables.select_rows(tracking, case=result.name)
-        clauses = sentences.join("; ", [_tracker_clause(row, sought) for _, row in rows.iterrows()])
+        clauses = sentences.join(
+            "; ", [_tracker_clause(row, sought, float(result.axes.t_s[-1])) for _, row in rows.iterrows()]
+        )
         case = key_labels.without_markup(key_labels.swept_description(result))
         answer.append(clauses.with_text(f"{case}: {clauses.text}." if case else f"{clauses.text}."))
         answer += _sentences_on_rare_events(sought)
@@ -52,11 +54,11 @@ def _sentences_on_rare_events(sought: "pd.DataFrame | None") -> list[Sentence]:
     return answer
 
 
-def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
+def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None", run_s: float) -> Sentence:
     """How surely and how soon a tracker confirms a track, how long it keeps it, and its false tracks."""
     if not row["confirmed_share"]:
         return Sentence(tr("{filter} confirms no track", filter=quote_name(row["filter"])))
-    life = _life_clause(row, sought)
+    life = _life_clause(row, sought, run_s)
     text = tr(
         "{filter} confirms {confirmed} of the tracks, after {time} on average, {life}, with {rate} false tracks per "
         "hour",
@@ -77,8 +79,10 @@ def _tracking_interval(row: "pd.Series[Any]", name: str) -> tuple[sentences.Meas
     return sentences.intervals("tracking", name, row)
 
 
-def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Sentence:
-    """How long a tracker keeps a track; where ends were sought, how many tracks have ended by the last scan."""
+def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None", run_s: float) -> Sentence:
+    """How long a tracker keeps a track; where ends were sought, how many tracks have ended by the last scan.
+
+    A mean life over that of the run, run_s, is extrapolated."""
     if sought is not None:
         ended = sought[(sought["filter"] == row["filter"]) & (sought["event"] == ENDED_TRACK_EVENT)]
         if len(ended):
@@ -88,7 +92,13 @@ def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None") -> Senten
             return Sentence(text, sentences.intervals("rare", "event_rate", ended.iloc[0]))
     if not row["ends_per_hour"]:
         return Sentence(tr("loses none"))
-    text = tr("keeps a track for {life}", life=_estimate(row, "life_s", tr("s")))
+    fields = {"life": _estimate(row, "life_s", tr("s"))}
+    is_extrapolated = row["life_s"] > run_s
+    text = (
+        tr("keeps a track for {life} (extrapolated)", **fields)
+        if is_extrapolated
+        else tr("keeps a track for {life}", **fields)
+    )
     return Sentence(text, _tracking_interval(row, "life_s"))
 
 

@@ -66,30 +66,31 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
             for rows in final_rows
             if len(rows)
         ),
-        key=lambda row: row["decides"],
+        key=lambda row: -row["decides"],
     )
     if not ranked:
         return []
     extremes = ranked[:: len(ranked) - 1 or 1]
     looks = sum(np.isnan(row.get(ALARM.exact_column, np.nan)) for row in ranked)
     values = [compared_value.row_value(row, ALARM).chosen_among(looks) for row in extremes]
-    remark = next(filter(None, (value.choice_remark() for value in values)), "")
+    remarks = compared_value.choice_remarks(values)
     texts = [
-        f"{quote_name(row['filter'])}, {value.text(form='.3g')}" for row, value in zip(extremes, values, strict=True)
+        f"{quote_name(row['filter'])}, {value.text(form='.3g')}{remark}"
+        for row, value, remark in zip(extremes, values, remarks, strict=True)
     ]
     if len(texts) == 1 or not compared_value.are_distinguished(*values):
         text = tr(
             "detection probability at the end of the manoeuvre, for P_FA ≈ {usual:g} per test: {one}.",
             usual=USUAL_FALSE_ALARM_RATE,
-            one="; ".join(texts) + remark,
+            one="; ".join(texts),
         )
     else:
         text = tr(
             "detection probability at the end of the manoeuvre, for P_FA ≈ {usual:g} per test: highest with {most}, "
             "lowest with {least}.",
             usual=USUAL_FALSE_ALARM_RATE,
-            most=texts[-1],
-            least=texts[0] + remark,
+            most=texts[0],
+            least=texts[-1],
         )
     intervals = [interval for value in values for interval in value.intervals]
     return [Sentence(case_selection.after_swept_values(result, text), tuple(intervals))]

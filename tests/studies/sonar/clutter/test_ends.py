@@ -254,7 +254,7 @@ def test_tables_tell_the_curve_and_how_tracks_end():
         how = own[own["event"] != "target's track ended"].set_index("event")["event_rate"]
         assert list(how.index) == ["target's track dropped", "target's track lost"]
         assert_rounded(how.sum(), curve.iloc[-1]["event_rate"], operations=20 * 4)
-    assert "has ended by the last scan, by importance sampling: a " in " ".join(result.answer)
+    assert "is lost by the last scan (importance sampling): a " in " ".join(result.answer)
     assert not result.tables["rare"]["event"].str.contains("false").any()
 
 

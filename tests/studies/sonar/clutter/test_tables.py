@@ -39,7 +39,7 @@ def result():
 
 
 def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
-    rows = result.tables["tracking"]
+    rows, run_s = result.tables["tracking"], result.cases[0].axes.t_s[-1]
     by_case = {}
     for sentence in result.answer:
         by_case.setdefault(sentence.partition(": ")[0], []).append(sentence)
@@ -50,6 +50,10 @@ def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
         for row in case_rows.to_dict("records"):
             assert f"{quote_name(row['filter'])} confirms " in sentence
             assert f", keeps a track for {float(format(row['life_s'], '.3g')):,g} s [" in sentence
+            assert (
+                "] (extrapolated)"
+                in sentence.partition(f"{quote_name(row['filter'])} confirms ")[2].partition("false tracks")[0]
+            ) == (row["life_s"] > run_s)
             assert f" {float(format(row['false_tracks_per_hour'], '.3g')):,.10g} [" in sentence
 
 
