@@ -209,7 +209,7 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
         return None
     caption = tr(
         "Mean (bias) and standard deviation of the error in the {quantity}, from {realisations}; σ² is the sum of "
-        "their squares. Only cases whose bias exceeds the standard deviation at some time.",
+        "their squares. Only cases whose bias sometimes exceeds the standard deviation.",
         quantity=component.words,
         realisations=realisations_text(results),
     )

@@ -124,7 +124,7 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
             y = Axis(tr("detection probability"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
     caption = tr(
-        "Detectors of manoeuvres in the range: probability of an alarm at the last scan of the manoeuvre against "
+        "Detectors of manoeuvres in the range: alarm probability at the last scan of the manoeuvre against "
         "that at the last scan before it. Lines: exact; markers: measured, from {count:,} realisations.",
         count=results[0].count,
     )
@@ -194,7 +194,7 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("alarm raised"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
     caption = tr(
-        "Probability that a detector in the range has raised its first alarm against the time since the manoeuvre "
+        "Probability that a detector in the range has alarmed against the time since the manoeuvre "
         "began, for P_FA ≈ {usual:g} per test; exact if windows do not overlap.",
         usual=USUAL_FALSE_ALARM_RATE,
     )
