@@ -66,11 +66,11 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
             for rows in final_rows
             if len(rows)
         ),
-        key=lambda row: -row["decides"],
+        key=lambda row: row["decides"],
     )
     if not ranked:
         return []
-    extremes = ranked[:: len(ranked) - 1 or 1]
+    extremes = ranked[::-1][:: len(ranked) - 1 or 1]
     looks = sum(np.isnan(row.get(ALARM.exact_column, np.nan)) for row in ranked)
     values = [compared_value.row_value(row, ALARM).chosen_among(looks) for row in extremes]
     remarks = compared_value.choice_remarks(values)
