@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from radarsim.report import wording
 
 LINE_LETTERS, MAX_LINES = 80, 3  # of a sentence on a terminal
+ORDINARY_WORD = re.compile(r"(?:[^\W\d_]{2,}|[а-яё])[ ,]")  # at the beginning; other words are names of filters
 SENTENCE_END = re.compile(r"(?<=[\w%)\]]\.) (?=[A-ZА-ЯЁ])")
 MAX_VISIBLE_LETTERS = 200  # of an answer above its figure
 
@@ -30,9 +31,21 @@ def split_long_sentence(sentence: str) -> list[str]:
         if is_short(f"{parts[-1]}; {clause}."):
             parts[-1] += f"; {clause}"
         else:
-            parts.append(f"{subject}: {clause}" if colon else clause[:1].upper() + clause[1:])
+            parts.append(f"{subject}: {clause}" if colon else capitalise_like(sentence, clause))
     end = "." if sentence.endswith(".") else ""
     return [f"{part}{end}" for part in parts]
+
+
+def capitalise_like(sentence: str, clause: str) -> str:
+    """A clause as a sentence of its own: with a capital if the sentence has one, and the clause begins with no name.
+
+    >>> capitalise_like("The least", "the largest is b"), capitalise_like("The least", "r+Vr is")
+    ('The largest is b', 'r+Vr is')
+    >>> capitalise_like("a is", "b is")
+    'b is'
+    """
+    has_capital = sentence[:1].isupper() and ORDINARY_WORD.match(clause) is not None
+    return clause[:1].upper() + clause[1:] if has_capital else clause
 
 
 def is_short(sentence: str) -> bool:

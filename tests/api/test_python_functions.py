@@ -138,7 +138,7 @@ def test_claims(tmp_path):
         assert document(found.rows) == printed("claims", *names, "--out", tmp_path)
         assert len(repr(found).splitlines()) <= 3
     own = radarsim.claims("rls2", out=tmp_path)
-    assert own.table["number"].dtype == own.table["measured"].dtype == float
+    assert own.table["variants_of"].dtype == own.table["measured"].dtype == float
     assert set(result.tables["claims"].columns) <= set(own.table.columns)
     assert own.figures == (("claims",) if (own.table["verdict"] != "not run").any() else ())
     with pytest.raises(radarsim.ConfigError, match="P9 is no claim and no paper"):

@@ -254,7 +254,9 @@ def test_tables_tell_the_curve_and_how_tracks_end():
         how = own[own["event"] != "target's track ended"].set_index("event")["event_rate"]
         assert list(how.index) == ["target's track dropped", "target's track lost"]
         assert_rounded(how.sum(), curve.iloc[-1]["event_rate"], operations=20 * 4)
-    assert "is lost by the last scan (importance sampling): a " in " ".join(result.answer)
+    lost = "confirmed track is lost by the last scan (importance sampling): "
+    assert [sentence.split(lost)[1][0] for sentence in result.answer if lost in sentence] == ["a", "b"]
+    assert [sentence[:11] for sentence in result.answer if "confirms" in sentence] == ["a confirms ", "b confirms "]
     assert not result.tables["rare"]["event"].str.contains("false").any()
 
 
