@@ -173,12 +173,14 @@ def _load_experiments(
     configs: Sequence[str], overrides: tuple[str, ...], precision: float | None, of: str, decide: bool, quiet: bool
 ) -> "tuple[list[Experiment], str]":
     """The experiments, all checked, with the quantities that their claims and a precision need; and what that is of."""
-    from radarsim.api import load_experiments, long_experiment, precision_target
+    from radarsim.api import load_experiments
     from radarsim.api import run as api_run
-    from radarsim.cli import console
 
     loaded = load_experiments.load_all(configs, overrides)
     if precision is not None:
+        from radarsim.api import long_experiment, precision_target
+        from radarsim.cli import console
+
         precision_target.check_precision(loaded, precision, of)
         of_config = of
         loaded, of = precision_target.with_long_run(loaded, of)

@@ -1,6 +1,7 @@
 """Tuning a filter: the best values against dense grids and `solve`, the gain against the truth, what is refused."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -309,11 +310,21 @@ def test_a_filter_is_judged_against_the_tuned_one_too():
     result = radarsim.judge(
         "rls2", rival(20 * found.keys[0].tuned), against="tuned", overrides=["target=turn"], realisations=3000
     )
-    first = result.answer[0]
-    assert first.startswith("“mine” is better than r+Vr, the config's best in r at 140 s: gain ")
-    assert ", and worse than r+Vr, tuned: gain −" in first
-    assert f"whose σ is {found.all.tuned:.4g} m; its σ is " in first
-    last = result.curves.query("component == 'r' and k == 15").set_index("filter")
+    lead = "“mine” is better than r+Vr, the config's best in r at 140 s: "
+    last, last_ar = (result.curves.query(f"component == '{c}' and k == 15").set_index("filter") for c in ("r", "ar"))
+    gain, gain_tuned, gain_ar = (
+        f"{100 * (1 - rows.loc['mine', 'sigma'] / rows.loc[name, 'sigma']):.3g}".replace("-", "−")
+        for rows, name in ((last, "r+Vr"), (last, "r+Vr, tuned"), (last_ar, "r+Vr"))
+    )
+    first, second = result.answer[:2]
+    assert first.startswith(f"{lead}gain {gain} % [")
+    assert f", and worse than “r+Vr, tuned”: gain {gain_tuned} % [−" in first
+    assert f"], whose σ is {found.all.tuned:.4g} m (exact), but worse than r+Vr in ar" in first
+    assert f" there: gain {gain_ar} % [" in first
+    exact = last.loc["r+Vr", "exact_sigma"]
+    sigma = exact * last.loc["mine", "sigma"] / last.loc["r+Vr", "sigma"]
+    assert second.startswith(f"{lead}its σ is {sigma:.4g} m [")
+    assert second.endswith(f"], that of r+Vr {exact:.4g} m (exact).")
     assert last.loc["r+Vr, tuned", "exact_sigma"] == found.all.tuned
     plain = radarsim.run("rls2", overrides=["target=turn"], realisations=3000).curves
     own = result.curves[result.curves["filter"].isin(["r", "r+Vr"])]
@@ -332,14 +343,19 @@ def test_a_rival_that_is_the_tuned_filter_gains_nothing_on_it():
 
 @pytest.mark.slow
 def test_both_rivals_stand_beside_the_floor():
+    """σ of the plots' range is the exact one of r+Vr times the ratio of both over the same plots, as the gain is."""
     result = radarsim.judge("rls2", lambda plots: plots["range_m"], name="raw", against="tuned",
                             realisations=100)  # fmt: skip
     (floor,) = [line for line in result.answer if line.startswith("There the ")]
-    sigma = result.curves.query("filter == 'raw' and component == 'r' and k == 15")[["sigma", "sigma_lo", "sigma_hi"]]
-    least = result.curves.query("filter == 'raw' and component == 'r' and k == 15")["floor"].item()
-    value, lo, hi = (f"{100 * (one / least - 1):.3g}" for one in sigma.to_numpy()[0])
-    assert f": raw is {value} % [{lo}, {hi}] above it, r+Vr " in floor
-    assert ", tuned " in floor
+    last = result.curves.query("component == 'r' and k == 15").set_index("filter")
+    least = last.loc["raw", "floor"]
+    exact, tuned = (last.loc[name, "exact_sigma"] for name in ("r+Vr", "r+Vr, tuned"))
+    sigma = exact * last.loc["raw", "sigma"] / last.loc["r+Vr", "sigma"]
+    own = re.search(rf": “raw” is {100 * (sigma / least - 1):.3g} % \[(\S+), (\S+)\] above it, r\+Vr ", floor)
+    assert own
+    assert float(own[1]) < 100 * (250.0 / least - 1) < float(own[2])  # σ of a plot's range is 250 m
+    assert tuned == pytest.approx(least)  # the target moves as the model says: the tuned filter is at the floor
+    assert floor.endswith(f"r+Vr {100 * (exact / least - 1):.3g} % (exact) and “r+Vr, tuned” 0 % (exact).")
 
 
 @pytest.mark.slow
