@@ -174,10 +174,11 @@ def test_in_the_matched_world_sampled_intervals_hold_the_variance(matched):
 
 @pytest.mark.slow
 def test_a_gain_is_not_that_of_the_training(matched):
-    """Of a filter at its best: on the noise of its training a gain is never negative, on other noise it is, often."""
-    given = {"sampled": True, "realisations": 200}
-    gains = [tune(matched_world.config(1e-3), "sigma r", seed=seed, **given).all for seed in range(5)]
-    assert min(one.gain for one in gains) < 0
+    """Of a filter at its best: the noise on which the best is searched and chosen prefers another value with this seed,
+    so that it gains there; on other noise it loses."""
+    found = tune(matched_world.config(1e-3), "sigma r", seed=11, sampled=True, realisations=200)
+    assert found.keys[0].tuned != found.keys[0].stated
+    assert found.all.gain < 0
 
 
 @pytest.mark.slow
