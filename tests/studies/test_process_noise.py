@@ -125,7 +125,7 @@ def test_a_filter_that_loses_in_a_manoeuvre_is_told_what_helps_and_that_helps():
 
 
 def test_folded_velocities_in_the_plane_have_a_remedy():
-    folded = PLANE | {"radar": PLANE["radar"] | {"repetition_rate_hz": 1200, "detection_probability": 0.85}}
+    folded = PLANE | {"radar": PLANE["radar"] | {"repetition_rate_hz": 1600, "detection_probability": 0.85}}
     folded |= {"scans": 61, "target": TARGET | {"start_s": 60}}
     sentence = remedy(folded)
     assert "radar.repetition_rate_hz=" in sentence

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 SIZES = {"velocity": 4, "acceleration": 6, "turn": 5}
-RESOLVED = 6.0  # standard deviations of a predicted velocity in an interval whose fold is known
+RESOLVED = 10.0  # standard deviations of a predicted velocity in an interval whose fold is known
 CENTRE = 1 / 3  # weight of the central sigma point
 
 

@@ -16,7 +16,7 @@ from tests.tolerances import Z, mean_error, share_error, sigma_error
 N, SCANS, DETECTION = 6000, 9, 0.7
 RADAR = {
     "detection_probability": DETECTION,
-    "repetition_rate_hz": 4000.0,
+    "repetition_rate_hz": 6500.0,
     "false_plots_per_km2": 0.04,
     "false_plots_from_s": 22.0,
 }
