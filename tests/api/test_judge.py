@@ -768,7 +768,7 @@ def test_rare_differences_are_said_to_decide_where_they_are_rare(every):
         assert (
             of(result.gains, filter="mine", baseline="r+Vr")["note"].eq(str(interval_notes.ALIKE_FILTERS)).mean() > 0.7
         )
-        assert "rare realisations decide them and few or none occurred (mine)" in result.warnings[0]
+        assert "too narrow (“mine”): few of the rare realisations that decide them occurred" in result.warnings[0]
 
 
 @pytest.mark.slow
