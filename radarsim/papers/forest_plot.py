@@ -59,10 +59,7 @@ def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
         caption=plural(
             "Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged_claims), counted=counted
         )
-        + tr(
-            "Each row shows the claim's largest deviation in units of its tolerance: 0 or less agrees, up to 1 is "
-            "within the tolerance."
-        ),
+        + tr("Each claim's largest deviation, in tolerances: 0 or less agrees, up to 1 is tolerated."),
         panels=tuple(panels),
         width_mm=PAGE_MM,
     )
