@@ -156,24 +156,16 @@ def tune(
     4.187 (m/s³)² 36.3 % True
     """
     settings = combine_overrides(arguments.check_arguments(overrides, threads=threads), None, seed)
-    if isinstance(over, Mapping):
-        over = [
-            text for key, values in over.items() for value in values for text in arguments.check_arguments({key: value})
-        ]
-    arguments.check_texts((*over, *free))
-    ranges = dict(range_list := [*map(parse_range, free.items() if isinstance(free, Mapping) else free)])
-    if len(ranges) < len(range_list):
-        raise ConfigError(f"{argument('free', '--free')}: a key is given twice")
-    members = [*dict.fromkeys(text if "=" in text else f"target={text}" for text in over)] or [""]
+    members, ranges = _family_members(over), _ranges_by_key(free)
     cases, user_filters = family_cases(config, settings, members, [case] if isinstance(case, str) else case)
     request = quantities.parse_quantity(wanted, filter)
     quantity, _ = resolve_quantity(request, cases[0], user_filters)
-    filter_name = str(quantity.filter)
-    searched, count = _common_keys(cases, filter_name, ranges), arguments.whole_number(realisations)
-    count = BATCHES * max(2, (count or cases[0].realisations) // BATCHES)
+    searched = _common_keys(cases, str(quantity.filter), ranges)
+    count = arguments.whole_number(realisations) or cases[0].realisations
+    count = BATCHES * max(2, count // BATCHES)
     variants, curves = list[Variants](), list[Curve]()
     for family_case in cases:
-        variants.append(variant := Variants(family_case, filter_name, searched, quantity.definition.paired))
+        variants.append(variant := Variants(family_case, str(quantity.filter), searched, quantity.definition.paired))
         quantity, _ = resolve_quantity(request, variant.base)
         curves.append(Curve(variant, "", Objective([quantity], threads), count, progress, sampled))
     exact = all(curve.exact for curve in curves)
@@ -186,11 +178,28 @@ def tune(
         cost, chooser = cost.with_keys(acting_keys), chooser.with_keys(acting_keys)
     _predict(notify or (lambda line: None), cost, place_s)
     found = find_minimum(cost, chooser)
-    judge = _judge_exactly if exact else _judge_by_sampling
-    pairs, ranges_by_path = judge(cost, found.place)
+    pairs, ranges_by_path = (_judge_exactly if exact else _judge_by_sampling)(cost, found.place)
     found = found._replace(other_hollows=equally_good(chooser, found.place, found.other_hollows))
     given_settings = [setting for setting in (*settings, members[0]) if setting]
     return _tuning_result(config, cases, cost, found, inert_keys, ranges_by_path, pairs, given_settings)
+
+
+def _family_members(over: Mapping[str, Sequence[Any]] | Sequence[str]) -> list[str]:
+    """The setting `KEY=VALUE` of each member of the family; a single empty one where there is no family."""
+    if isinstance(over, Mapping):
+        pairs = [{key: value} for key, values in over.items() for value in values]
+        over = [text for pair in pairs for text in arguments.check_arguments(pair)]
+    arguments.check_texts(over)
+    return [*dict.fromkeys(text if "=" in text else f"target={text}" for text in over)] or [""]
+
+
+def _ranges_by_key(free: Mapping[str, Sequence[float] | None] | Sequence[str]) -> dict[str, tuple[float, float] | None]:
+    """The range to search of each key, None for that of the search's own. Raises ConfigError for a key given twice."""
+    arguments.check_texts([*free])
+    pairs = [parse_range(item) for item in (free.items() if isinstance(free, Mapping) else free)]
+    if len(ranges := dict(pairs)) < len(pairs):
+        raise ConfigError(f"{argument('free', '--free')}: a key is given twice")
+    return ranges
 
 
 def _common_keys(
