@@ -41,7 +41,7 @@ MOTION = LinearGaussianTimeInvariantTransitionModel(
 
 def case_of(kind: str, doppler: bool, density: float, association: str):
     radar = dict(zip(("sigma_range_m", "sigma_bearing_rad", "sigma_velocity_mps"), SIGMA, strict=True))
-    radar |= {"wavelength_m": 0.1, "scan_period_s": DT, "detection_probability": DETECTION, "repetition_rate_hz": 4e4}
+    radar |= {"wavelength_m": 0.1, "scan_period_s": DT, "detection_probability": DETECTION, "repetition_rate_hz": 1e5}
     radar |= {"false_plots_per_km2": 1e6 * density, "false_plots_from_s": CLEAR * DT}
     target = {"kind": "straight", "range_m": 60e3, "speed_mps": 250, "aspect_rad": 2.5, "bearing_rad": -2}
     one = {"name": "one", "kind": kind, "doppler": doppler, "sigma_acceleration_mps2": 2, "association": association}
