@@ -32,21 +32,41 @@ def with_meaning_of_crosses(figure: Figure) -> Figure:
 
 def conventions(figures: Iterable[Figure]) -> str:
     """What holds in all figures and their captions do not repeat, as far as any of these figures needs it."""
-    panels = [panel for figure in figures for panel in figure.panels]
-    lines = [mark for panel in panels for mark in panel.marks if isinstance(mark, Line)]
+    described = list(figures)
+    panels = [panel for figure in described for panel in figure.panels]
+    lines = [line for panel in panels for line in _lines(panel)]
+    banded = [panel for panel in panels if _has_bands(panel)]
     sentences = []
-    if any(line.lo is not None and np.isfinite(line.lo).any() for line in lines):
+    if banded and all(panel.has_intervals for panel in banded):
         sentences.append(tr("Bands and whiskers: 95 % intervals."))
+    elif any(panel.has_intervals for panel in banded):
+        sentences.append(tr("Bands and whiskers: 95 % intervals, unless a legend says otherwise."))
     if any(rough_points(line).any() for line in lines):
         sentences.append(tr("Thin lines and open points: rough, as a note in the table says."))
     if any(_has_crosses(panel) and not panel.crosses for panel in panels):
         sentences.append(tr("Crosses: exact values."))
+    if any(figure.has_joined_names for figure in described):
+        sentences.append(tr("“=” joins the names of coinciding curves."))
+    if any(_has_zeros(panel) for panel in panels):
+        sentences.append(tr("Logarithmic axes show no zeros."))
     return " ".join(sentences)
 
 
+def _lines(panel: Panel) -> list[Line]:
+    return [mark for mark in panel.marks if isinstance(mark, Line)]
+
+
 def _has_crosses(panel: Panel) -> bool:
-    lines = (mark for mark in panel.marks if isinstance(mark, Line))
-    return any(line.exact is not None and np.isfinite(line.exact).any() for line in lines)
+    return any(line.exact is not None and np.isfinite(line.exact).any() for line in _lines(panel))
+
+
+def _has_bands(panel: Panel) -> bool:
+    return any(line.lo is not None and np.isfinite(line.lo).any() for line in _lines(panel))
+
+
+def _has_zeros(panel: Panel) -> bool:
+    """Whether a line lacks points since they are zero on a logarithmic axis."""
+    return panel.y.scale == "log" and any((np.asarray(line.y) == 0).any() for line in _lines(panel))
 
 
 def lines_below(figure: Figure, limit: float) -> str:
@@ -70,7 +90,7 @@ def _line_name(panel: Panel | None, line: Line) -> str:
 
 def _named_lines(panel: Panel) -> list[Line]:
     """The lines of a panel that have a name and a point."""
-    lines = (mark for mark in panel.marks if isinstance(mark, Line) and plain_text(mark.name or mark.label))
+    lines = (line for line in _lines(panel) if plain_text(line.name or line.label))
     return [line for line in lines if np.isfinite(line.y).any()]
 
 

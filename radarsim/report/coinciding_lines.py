@@ -5,13 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from radarsim.language.translate import term, tr
 from radarsim.report.drawing.model import Figure, Line, Mark
 from radarsim.report.panel_layout import holding
 
 SAME_FRACTION = 0.01  # of a value
 HALF_LINE_WIDTH = 0.004  # of a panel's height: half the width of a line
-CONVENTION = term("In the legend, “=” joins names of coinciding curves.")  # in captions
 
 
 def join_coinciding_lines(figure: Figure) -> Figure:
@@ -44,7 +42,7 @@ def join_coinciding_lines(figure: Figure) -> Figure:
         )
         for panel in figure.panels
     )
-    return replace(figure, panels=panels, caption=f"{figure.caption} {tr(CONVENTION)}")
+    return replace(figure, panels=panels, has_joined_names=True)
 
 
 def _joined_name(names: Sequence[str]) -> str:

@@ -98,18 +98,15 @@ def loss_axis(label: str, lines: Sequence[Line]) -> Axis:
 
 
 def loss_lines(lines: Sequence[Line]) -> tuple[tuple[Line, ...], str]:
-    """The complements of shares that have a loss, and words on zeros, which a logarithmic axis lacks, for a caption."""
+    """The complements of shares that have a loss, and the names of the others, for a caption."""
     losses = tuple(map(complement_line, lines))
     visible = tuple(line for line in losses if (line.y > 0).any())
     names = [quote_name(without_markup(line.name or line.label)) for line in losses if not (line.y > 0).any()]
     remark = (
-        " "
-        + tr("No failures, hence not plotted: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
+        " " + tr("Without failures: {names}.", names=caption_remarks.join_few_names(names, MAX_MISSING_NAMES))
         if names
         else ""
     )
-    if any((line.y == 0).any() for line in visible):
-        remark += " " + tr("Zeros are not shown on the logarithmic axis.")
     return visible, remark
 
 

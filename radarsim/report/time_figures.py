@@ -108,7 +108,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
     One panel where no config is swept; else one for each of `group_by_panel`. gains is tables.group_by(table, "case",
     "filter", "component")."""
     caption = tr(
-        "Gain over filter {base}, from {realisations} with the same noise for all filters. Below zero: a loss.",
+        "Gain over filter {base}, from {realisations} with the same noise for all filters.",
         base=quote_name(results[0].axes.filters[results[0].axes.baseline]),
         realisations=realisations_text(results),
     )

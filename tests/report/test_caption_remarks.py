@@ -46,3 +46,12 @@ def test_conventions_are_those_that_figures_need():
     rough = figure((replace(line("a", 1.0), lo=ends, hi=ends),))
     assert caption_remarks.conventions([banded]) == "Bands and whiskers: 95 % intervals."
     assert caption_remarks.conventions([rough]).endswith("rough, as a note in the table says.")
+    quantiles = replace(banded, panels=tuple(replace(panel, has_intervals=False) for panel in banded.panels))
+    assert caption_remarks.conventions([quantiles]) == ""
+    both = caption_remarks.conventions([banded, quantiles])
+    assert both == "Bands and whiskers: 95 % intervals, unless a legend says otherwise."
+    joined = replace(quantiles, has_joined_names=True)
+    assert caption_remarks.conventions([joined]) == "“=” joins the names of coinciding curves."
+    (panel,) = figure((line("a", 0.0),)).panels
+    zeros = replace(joined, panels=(replace(panel, y=Axis("y", "log")),), has_joined_names=False)
+    assert caption_remarks.conventions([zeros]) == "Logarithmic axes show no zeros."

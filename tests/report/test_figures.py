@@ -66,7 +66,7 @@ def test_lines_that_never_lose_are_named_and_not_drawn():
     (line,), said = panel_layout.loss_lines(shares)
     assert line.label == "b"
     assert_rounded(line.y, [0, 0.1, 0.2], size=1)
-    assert said == " No failures, hence not plotted: a. Zeros are not shown on the logarithmic axis."
+    assert said == " Without failures: a."
     assert panel_layout.loss_lines([replace(shares[1], y=np.full(3, 0.5))])[1] == ""
 
 
@@ -194,7 +194,7 @@ def test_lines_that_coincide_in_every_panel_are_drawn_once_and_named_together():
         Figure("f", "", "Drawn.", (curves([1, 2, 3], near, [0, 0, 9]), curves([4, 5, 6], [4, 5, 6])))
     )
     assert [[mark.label for mark in panel.marks] for panel in both.panels] == [["a = b", "c"], ["a = b"]]
-    assert both.caption == "Drawn. In the legend, “=” joins names of coinciding curves."
+    assert both.has_joined_names
     for apart in (
         (curves([1, 2, 3], far),),  # seen to differ
         (curves([1, 2, 3], near), curves([4, 5, 6], [4, 5, 7])),  # in one panel

@@ -10,10 +10,8 @@ from radarsim.api import result_content
 from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.language.current import language_codes, use_language
-from radarsim.language.translate import tr
 from radarsim.report import headlines
 from radarsim.report.case_selection import swept_cases, swept_keys
-from radarsim.report.coinciding_lines import CONVENTION
 from radarsim.report.drawing.model import Axis, Figure, Heat, Line, Panel, Style
 from radarsim.report.math_text import plain_text
 from radarsim.report.page_links import sources_behind_figure
@@ -159,7 +157,7 @@ def check_words_of_figures(result):
             components = study(result.experiment.study).user_filter_components() or RADIAL
             named = headlines.with_headlines(figures, answer.texts, answer.sources, sources, *keys, components)
             captions = {name: plain_text(figure.caption) for name, figure in figures.items()}
-            long = {name: len(text.replace(tr(CONVENTION), "").split()) for name, text in captions.items()}
+            long = {name: len(text.split()) for name, text in captions.items()}
             assert {name: count for name, count in long.items() if count > MAX_CAPTION_WORDS} == {}
             sentences = [headlines.first_statement(text) for text in answer.texts]
             component_names = [part.name for part in components]

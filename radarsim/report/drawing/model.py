@@ -121,8 +121,8 @@ class Panel:
     direct: lines are named at their ends where the names fit, else in a legend; not direct: always in a legend. legend:
     "right" puts it beside a single panel, "none" leaves the names to another panel. line_title: what these names are. A
     remark is above the panel, at its right. A panel without marks adds its keys to the legend. crosses: the name of the
-    exact values' crosses; empty: exact. equal: x and y have one scale, as on a map. height_mm: instead of the figure's,
-    in a figure of one column."""
+    exact values' crosses; empty: exact. has_intervals: bands are 95 % intervals, else what a name in the legend says.
+    equal: x and y have one scale, as on a map. height_mm: instead of the figure's, in a figure of one column."""
 
     x: Axis
     y: Axis
@@ -135,6 +135,7 @@ class Panel:
     legend: str = "best"
     remark: str = ""
     crosses: str = ""
+    has_intervals: bool = True
     equal: bool = False
     height_mm: float | None = None
 
@@ -143,7 +144,8 @@ class Panel:
 class Figure:
     """A figure of one or more panels in rows of `columns`; the caption describes content and marks.
 
-    headline is the run's answer in a sentence of plain text, which its first figure bears."""
+    headline is the run's answer in a sentence of plain text, which its first figure bears. has_joined_names: whether
+    "=" joins names of coinciding curves."""
 
     name: str
     title: str
@@ -154,6 +156,7 @@ class Figure:
     panel_height_mm: float = 62.0
     share_y: bool = False
     headline: str = ""
+    has_joined_names: bool = False
 
 
 def reworded(figure: Figure, translate: Callable[[str], str]) -> Figure:

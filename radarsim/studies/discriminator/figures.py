@@ -102,16 +102,16 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
             component_rows[column].to_numpy(float) for column in ("t_s", "median", "q05", "q95", "posterior_crb")
         )
         marks = (
-            Line(t, middle, tr("median"), Style(0, 0, 0), low, high),
+            Line(t, middle, tr("median, 5 to 95 % of bursts"), Style(0, 0, 0), low, high),
             Line(t, 3.0 * bound, "3σ", Style(1, 1)),
             Line(t, burst[:, n], tr("one burst"), Style(2, 2, 2, size_pt=2.4)),
         )
         y = Axis(key_labels.label_with_unit(*SYMBOLS[component]), "log")
         title = f"{letter}  {tr(QUANTITIES[component])}"
-        panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), y, marks, title, direct=False))
+        panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), y, marks, title, direct=False, has_intervals=False))
     caption = tr(
-        "Windows of {name} and absolute error of each component: median and band from 5 to 95 % of {count:,} "
-        "bursts, locked or not. Dashed: three times the Cramér–Rao bound, prior included. Dotted: the first burst.",
+        "Windows of {name} and absolute error of each component, from {count:,} bursts, locked or not. 3σ: three "
+        "times the Cramér–Rao bound, prior included. One burst: the first.",
         name=quote_name(name),
         count=result.count,
     )
@@ -130,9 +130,9 @@ def locks(result: CaseResult, tables_by_name: Mapping) -> Figure:
     panel, remark = _shares(Axis(tr(WINDOW_LABEL), "log"), marks, 0)
     lost = panel.y.scale == "log"
     caption = (
-        tr("Share of bursts that fail to lock: with a component beyond five times the Cramér–Rao bound of the window.")
+        tr("Share of bursts with a component beyond five times the Cramér–Rao bound of the window.")
         if lost
-        else tr("Share of bursts that lock: with every component within five times the Cramér–Rao bound of the window.")
+        else tr("Share of bursts with every component within five times the Cramér–Rao bound of the window.")
     )
     caption += f" {_sample(result)}{remark}{case_selection.left_out_remark(result.axes.filters, plotted_names)}"
     title = tr("Bursts not locked against the window") if lost else tr("Locked bursts against the window")

@@ -374,8 +374,8 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
         cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     cost_panels = _with_legend(cost_panels, result, dash=None)
     caption = tr(
-        "σ of the height over a stage and the mean count of arithmetic operations of one update; where points "
-        "coincide, the smaller marks lie on the larger ones.{of_case}",
+        "σ of the height over each stage against arithmetic operations per update. Coinciding points: small marks on "
+        "large ones.{of_case}",
         of_case=_case_sentence(result, results),
     )
     return _figure_of_panels("cost", tr("Cost and accuracy"), caption, cost_panels, 62)
@@ -395,10 +395,7 @@ MOTIONS = {"uniform": term("constant velocity"), "accelerated": term("constant a
 def _case_sentence(result: CaseResult, results: Sequence[CaseResult]) -> str:
     """A sentence that names the case shown, if there are several."""
     return (
-        tr(
-            " For {plain_label}; the other cases are only in the tables.",
-            plain_label=key_labels.plain_case_label(result),
-        )
+        tr(" For {plain_label}; other cases: in the tables.", plain_label=key_labels.plain_case_label(result))
         if len(results) > 1
         else ""
     )

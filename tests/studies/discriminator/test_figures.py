@@ -24,11 +24,11 @@ def test_a_share_of_failures_is_said_to_be_one():
     figure = figure_of_locks({"dense": [1, 1, 1], "wide": [0.99, 0.999, 1]})
     (panel,) = figure.panels
     assert panel.y.label == "share of bursts that fail to lock"
-    assert figure.caption.startswith("Share of bursts that fail to lock")
-    assert "No failures, hence not plotted: “dense”." in figure.caption
+    assert figure.caption.startswith("Share of bursts with a component beyond")
+    assert "Without failures: “dense”." in figure.caption
     rates = figure_of_locks({"wide": [0.2, 0.5, 0.7]})
     assert rates.panels[0].y.label == "share locked"
-    assert rates.caption.startswith("Share of bursts that lock")
+    assert rates.caption.startswith("Share of bursts with every component within")
 
 
 @pytest.mark.parametrize("rare", [None, object()])

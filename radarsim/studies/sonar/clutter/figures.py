@@ -22,8 +22,8 @@ SWEPT_KEYS = {  # columns of the table `tracking`, and the keys whose values the
     "detection_probability": "sensor.detection_probability",
     "gate_probability": "gate_probability",
 }
-LIFE_CAPTION = term("mean time between ends of confirmed tracks, extrapolated from those within the run")
-ENDS_CAPTION = term("probability, by importance sampling, that the target's first confirmed track has ended")
+LIFE_CAPTION = term("mean time between ends of confirmed tracks, extrapolated")
+ENDS_CAPTION = term("probability (importance sampling) that the target's first track has ended")
 CONFIRMATION_PANELS = 3  # in one row: the time to confirmation over the swept key is in `track_life`
 ZERO_FACTOR = 3.0  # between zero and the smallest positive value on a logarithmic axis
 UPPER_END_STYLE = Style(GREY, None, 4)
@@ -161,9 +161,7 @@ def life_figure(results: Results, tables_by_name: "Mapping[str, pd.DataFrame]") 
         realisations=case_selection.realisations_text(results),
     )
     if not_drawn := [text for text in level_quantities if text]:
-        caption += " " + tr(
-            "Not drawn, as it does not change over the sweep: {quantities}.", quantities=join_names(not_drawn)
-        )
+        caption += " " + tr("Constant over the sweep: {quantities}.", quantities=join_names(not_drawn))
     columns = min(2, len(figure_panels))
     width = panel_layout.WIDE_MM if columns == 1 else PAGE_MM
     return Figure("track_life", tr("Track life and accuracy"), caption, tuple(figure_panels), columns, width, 58)
@@ -201,8 +199,8 @@ def _life_quantities(
             name, rates = tr("share of tracks ended by the last scan"), ended.merge(cases, on="case", how="left")
             life = _LifeQuantity("event_rate", name, "", True, rates, tr(ENDS_CAPTION))
     time, wrong, sigma = (tr("time to confirmation"), tr("share of wrong plots"), tr("$\\sigma$ of $r$ of kept tracks"))
-    time_clause, wrong_clause = tr("mean time to confirmation"), tr("weight of false plots among those used")
-    sigma_clause = tr("root-mean-square error of the range of kept tracks")
+    time_clause, wrong_clause = tr("mean time to confirmation"), tr("weight of false plots used")
+    sigma_clause = tr("range error of kept tracks")
     return (
         life,
         _LifeQuantity("time_to_confirm_s", time, "s", False, tracking, time_clause),
