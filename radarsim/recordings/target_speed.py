@@ -1,4 +1,4 @@
-"""Speeds and jumps in recorded tracks that no target has.
+"""Speeds in recorded tracks that no target has.
 
 Where most rows of a recording say so, a unit is wrong, or the columns are; single rows that no target reaches from the
 rows beside them are none of its positions. A target may fly at orbital speed; jumps are judged by the scatter of the
@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.language.translate import term, tr
-from radarsim.recordings.grouping import rows_by_name
 
 MAX_SPEED_MPS = 10_000.0  # of a target, over half of its track
 MAX_STEP_S = 1e8  # from row to row: years, as of a clock that was set
@@ -19,10 +18,6 @@ MIN_JUMP_SCATTER = 30.0  # median distances of the rows of a track from those be
 MIN_JUMP_LEGS = 5.0  # median distances from row to row
 MIN_ORBIT_MPS, MIN_ORBIT_M = 5000.0, 150e3  # of a target in orbit, from a radar
 MIN_MOVING_SCATTER = 3.0  # of a track's rows, which half of it must cover: shorter legs may be noise
-MAX_JUMP_STEPS = 5.0  # median steps of a track: after a longer gap its number may be another target's
-MIN_ALTERNATING_ROWS, MIN_ALTERNATING_SHARE = 20, 0.9  # of a track
-MAX_ALTERNATING_RATIO = 0.5  # of the distances from the last row but one and from the last
-MAX_JUMP_SHARE = 0.05  # of rows; where more jump, other checks say why
 NEIGHBOURS = 5  # rows of which a row's place is compared with the median
 MIN_ROWS = 5  # of a track
 LIKELY_MPS = (0.5, 1500.0)  # speeds that explain a wrong unit of time
@@ -82,42 +77,6 @@ def unreachable_rows(track: TrackPositions) -> np.ndarray:
     legs = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     usual = max(MIN_JUMP_SCATTER * float(np.median(distances)), MIN_JUMP_LEGS * float(np.median(legs)))
     return np.flatnonzero((distances > MAX_JUMP_MPS * span) & (distances > usual))
-
-
-def jump_notes(names: Sequence[str], t_s: np.ndarray, positions: np.ndarray, is_reachable: np.ndarray) -> list[str]:
-    """A note where positions (n, d) of tracks jump once and for all, as no target does, in rows that single wild ones
-    do not explain: a unit or a zero that changes within the recording."""
-    jumps = []
-    for name, rows in rows_by_name(names).items():
-        reached = rows[is_reachable[rows]]
-        if not name or len(reached) < MIN_ROWS:
-            continue
-        steps, legs = np.diff(t_s[reached]), np.linalg.norm(np.diff(positions[reached], axis=0), axis=1)
-        usual = max(MIN_JUMP_SCATTER * float(np.median(np.abs(np.diff(legs)))), MIN_JUMP_LEGS * float(np.median(legs)))
-        is_jump = (legs > MAX_JUMP_MPS * steps) & (legs > usual) & (steps < MAX_JUMP_STEPS * np.median(steps))
-        for i in np.flatnonzero(is_jump).tolist():
-            before, after = np.linalg.norm(positions[reached[i : i + 2]], axis=1).tolist()
-            jumps.append((name, float(t_s[reached[i + 1]] - t_s.min()), before, after))
-    if not jumps or len(jumps) > MAX_JUMP_SHARE * len(t_s):
-        return []
-    name, time_s, before, after = jumps[0]
-    return [
-        tr("positions jump as no target does (rows: {count}), first in track {track} from {before:.0f} to "
-           "{after:.0f} m of range at {time:g} s: a unit, a zero or the target changes there",
-           count=len(jumps), track=name, before=before, after=after, time=time_s)
-    ]  # fmt: skip
-
-
-def alternation_note(name: str, positions: np.ndarray) -> str | None:
-    """A note that the rows of a track, positions (n, d) in the order of time, alternate between two places: almost each
-    is nearer to the last but one than to the one before it. Errors do not make it so, nor motion."""
-    if len(positions) < MIN_ALTERNATING_ROWS:
-        return None
-    single, double = (np.linalg.norm(positions[2:] - positions[2 - lag : -lag], axis=1) for lag in (1, 2))
-    if (double < MAX_ALTERNATING_RATIO * single).mean() < MIN_ALTERNATING_SHARE:
-        return None
-    return tr("the rows of track {track} alternate between two places, {distance:.0f} m apart (median): two sensors or "
-              "targets have one name", track=name, distance=float(np.median(single)))  # fmt: skip
 
 
 def median_speed(tracks: Sequence[TrackPositions]) -> float:

@@ -37,6 +37,7 @@ from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
 from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
 from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
 from radarsim.recordings.target_speed import impossible_column_speed
+from radarsim.recordings.track_jumps import CourseFault, column_fault
 from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, ErrorLaw
 from radarsim.studies.missed_scans import without_empty_rows
@@ -87,8 +88,9 @@ class UsedRows:
 class Advice:
     """Advice from the likelihood of a config's filters over recorded plots: the best filter; the errors in the numbers
     of the one that takes most columns; the rows used. folding, doppler_scale: where the velocities are folded, or a
-    multiple of the change of the range; impossible_speed: that no target has, m/s; nothing else is then examined.
-    start_errors: outliers at the values of the config, as plots too far off to start a track."""
+    multiple of the change of the range; impossible_speed: that no target has, m/s; course_fault: where positions jump
+    or alternate; nothing else is then examined. start_errors: outliers at the values of the config, as plots too far
+    off to start a track."""
 
     comparison: FilterComparison
     findings: list[Finding]
@@ -96,6 +98,7 @@ class Advice:
     folding: Folding | None = None
     doppler_scale: DopplerScale | None = None
     impossible_speed: float | None = None
+    course_fault: CourseFault | None = None
     start_errors: tuple[OutlierRow, ...] = ()
 
 
@@ -120,6 +123,8 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
     used_rows = UsedRows(rows[0], len(sample), empty=rows[1] - rows[2])
     if speed := impossible_column_speed(stretches):
         return Advice(comparison, [], used_rows, impossible_speed=speed)
+    if course_fault := column_fault(_stretches_by_track(followed)):
+        return Advice(comparison, [], used_rows, course_fault=course_fault)
     fault = detect_case_velocity_fault(case, stretches)
     if fault.folding is not None or fault.scale is not None:
         return Advice(comparison, [], used_rows, fault.folding, fault.scale)
@@ -129,6 +134,11 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
     named_rows = {row for finding in findings for row in finding.rows}
     start_errors = tuple(row for row in start_errors if row not in named_rows)
     return Advice(comparison, findings, used_rows, start_errors=start_errors)
+
+
+def _stretches_by_track(followed: TrackingResult) -> dict[str, list[dict[str, np.ndarray]]]:
+    """The sampled rows of each track by its name, '' of one that has none."""
+    return {name: result.sample.stretches() for name, result in (followed.tracks or {"": followed}).items()}
 
 
 def _with_turn_error(case: Case, likelihood: Likelihood, finding: Finding) -> Finding:

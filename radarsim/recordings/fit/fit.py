@@ -44,6 +44,7 @@ from radarsim.recordings.rounding_guard import LOSS_GAP_PERIODS, gap_message
 from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message
+from radarsim.recordings.track_jumps import column_fault
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
 from radarsim.studies.missed_scans import without_empty_rows
 from radarsim.studies.recording_interface import Likelihood
@@ -199,7 +200,7 @@ def file_likelihoods(
             f"{source}: {constant_columns[0]}: must differ between plots, or σ cannot be estimated; all are the same"
         )
     likelihood = interface.likelihood(case, filter_name, long_tracks)
-    _refuse_impossible_motion(source, case, likelihood, long_tracks)
+    _refuse_impossible_motion(source, case, likelihood, {name or "": tracks[name] for name in names})
     if likelihood is None:
         raise ConfigError(
             no_likelihood_message(
@@ -212,13 +213,16 @@ def file_likelihoods(
 
 
 def _refuse_impossible_motion(
-    source: str | os.PathLike, case: Case, likelihood: Likelihood | None, tracks: Sequence[Mapping[str, np.ndarray]]
+    source: str | os.PathLike, case: Case, likelihood: Likelihood | None, named: Mapping[str, Mapping[str, np.ndarray]]
 ) -> None:
-    """Raise ConfigError if no target moves so fast, or if velocities that a likelihood takes are folded, or a multiple
-    of the change of the range: their σ would mean nothing."""
-    if speed := impossible_column_speed(tracks):
-        with use_language("en"):  # as all faults
+    """Raise ConfigError if no target moves as a track does, by its name, or if velocities that a likelihood takes are
+    folded, or a multiple of the change of the range: their σ would mean nothing."""
+    tracks = list(named.values())
+    with use_language("en"):  # as all faults
+        if speed := impossible_column_speed(tracks):
             raise ConfigError(f"{source}: {speed_message(speed)}")
+        if course_fault := column_fault({name: [columns] for name, columns in named.items()}):
+            raise ConfigError(f"{source}: {course_fault.message()}")
     if likelihood is None or VELOCITY_COLUMN not in likelihood.by_number(np.asarray(likelihood.stated)):
         return
     fault = detect_case_velocity_fault(case, tracks)

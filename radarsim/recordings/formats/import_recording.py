@@ -16,7 +16,7 @@ import numpy as np
 from radarsim.errors import ConfigError
 from radarsim.language.current import use_language
 from radarsim.language.translate import term, tr
-from radarsim.recordings import target_speed
+from radarsim.recordings import target_speed, track_jumps
 from radarsim.recordings.csv_output import column_texts
 from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
@@ -33,6 +33,7 @@ from radarsim.recordings.formats.table import Table
 from radarsim.recordings.grouping import rows_by_name
 from radarsim.recordings.target_speed import FastestLegs, TrackPositions
 from radarsim.recordings.time_spans import MIN_DATED_S
+from radarsim.recordings.track_jumps import CourseFault
 from radarsim.report.atomic_files import OutputFile
 
 MAX_SITE_DISTANCE_M = 100.0  # of two places of a radar; a geoid is that far from the ellipsoid
@@ -150,7 +151,7 @@ class _Import:
         self.has_bearings: bool | None = None  # all of the first batch
         self.site_distance = None if options.only_site is None else SiteDistance(options.only_site)
         self.impossible_speed: float | None = None  # of most targets, m/s
-        self.jump_notes: list[str] = []
+        self.jumps: CourseFault | None = None
         self.disordered_count = 0  # rows that were earlier, unless the newest came first
         self.radars = Counter[str]()
         self.note_counts = Counter[str]()  # by what a note says of these rows
@@ -215,7 +216,10 @@ class _Import:
         self.impossible_speed = target_speed.impossible_speed(tracks)
         if (speed := target_speed.unlikely_speed(tracks)) is not None:
             self.result.notes.append(target_speed.speed_message(speed, is_possible=True))
-        self.jump_notes = target_speed.jump_notes(batch.track, batch.columns["t_s"], positions, is_reachable)
+        reached = np.flatnonzero(is_reachable)
+        names, t = [batch.track[row] for row in reached], batch.columns["t_s"]
+        jumps = track_jumps.recording_jumps(names, t[reached], positions[reached])
+        self.jumps = track_jumps.jumps_fault(jumps, len(t))
         if not is_reachable.all():
             self.skipped[UNREACHABLE_REASON] += int((~is_reachable).sum())
             batch = batch.rows(np.flatnonzero(is_reachable).tolist())
@@ -306,8 +310,8 @@ class _Import:
     def _note_alternation(self, batch: Batch, positions: np.ndarray) -> None:
         """Note the first track of a batch that alternates between two places."""
         for name, rows in rows_by_name(batch.track).items():
-            if name and (note := target_speed.alternation_note(name, positions[rows])):
-                self.result.notes.append(note)
+            if name and (alternation := track_jumps.find_alternation(name, positions[rows])):
+                self.result.notes.append(CourseFault(alternation=alternation).message())
                 return
 
     def _time_zero(self, first: float) -> float:
@@ -452,5 +456,5 @@ class _Import:
         if self.truth is not None:
             result.notes += self.truth.notes()
         # Where a unit changes within the recording, what the velocities miss follows from that.
-        result.notes += self.jump_notes or self.doppler.notes(self.options.towards)
+        result.notes += [self.jumps.message()] if self.jumps else self.doppler.notes(self.options.towards)
         return result

@@ -159,6 +159,8 @@ def advice_statements(followed: TrackingResult, advice: Advice) -> list[Statemen
         statements.append(Statement("advice", folded_doppler.folding_message(advice.folding, followed.case)))
     elif advice.impossible_speed is not None:
         statements.append(Statement("advice", speed_message(advice.impossible_speed)))
+    elif advice.course_fault is not None:
+        statements.append(Statement("advice", advice.course_fault.message()))
     elif advice.doppler_scale is not None:
         statements.append(Statement("advice", doppler_scale_message(advice.doppler_scale)))
     elif not advice.findings:

@@ -1,0 +1,161 @@
+"""Tracks whose positions jump once and for all, or alternate between two places, as those of no single target do.
+
+A unit or a zero that changes within a recording makes the one, two sensors under one name the other. Single wild rows
+are neither: the rows before and after a jump must say it in the median. A jump is larger than any target moves, or it
+changes the range by the factor of a unit; both are judged by the scatter of the same track."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from radarsim.language.translate import tr
+from radarsim.recordings.grouping import rows_by_name
+from radarsim.recordings.target_speed import MAX_JUMP_MPS, MIN_JUMP_LEGS, MIN_ROWS, POSITION_COLUMNS, TrackPositions
+
+MAX_JUMP_MPS2 = 100.0  # of a target that moves on as before: 10 g
+MIN_LASTING_SCATTER = 10.0  # median changes from leg to leg of a track
+MAX_JUMP_STEPS = 5.0  # median steps of a track: after a longer gap its number may be another target's
+MAX_JUMP_SHARE = 0.05  # of rows; where more jump, other checks say why
+SIDE_ROWS, MIN_SIDE_ROWS = 12, 6  # before and after a jump
+MIN_SIDE_SHARE, MAX_SIDE_WIDTH = 0.75, 0.25  # of the rows on a side, which are so near to each other; of the jump
+MIN_LASTING_SHARE = 0.5  # of a jump, by which the rows after it differ from those before
+MAX_TURN_SHARE = 0.2  # of the way on both sides, by which a turn may bend it
+UNIT_FACTORS = np.log([1000.0, 1852.0, 1.852, 1 / 0.3048, 1000 / 0.3048, 1852 / 0.3048, 1000 / 0.9144])
+UNIT_TOLERANCE = 0.02  # of the ratio of the ranges before and after a jump
+MIN_ALTERNATING_ROWS, MIN_ALTERNATING_SHARE = 20, 0.9  # of a track
+MAX_ALTERNATING_RATIO = 0.5  # of the distances from the last row but one and from the last
+
+
+class Jump(NamedTuple):
+    """A jump of a track: the time of the row after it, s, and its ranges before and after, m."""
+
+    track: str
+    t_s: float
+    before_m: float
+    after_m: float
+
+
+class Alternation(NamedTuple):
+    """A track that alternates between two places, and their distance, m."""
+
+    track: str
+    distance_m: float
+
+
+class CourseFault(NamedTuple):
+    """What no course of a single target explains: jumps, or an alternation."""
+
+    jumps: tuple[Jump, ...] = ()
+    alternation: Alternation | None = None
+
+    def message(self) -> str:
+        """What is wrong, and what would explain it."""
+        if self.alternation is not None:
+            track = self.alternation.track and tr(" of track {name}", name=self.alternation.track)
+            return tr("the rows{track} alternate between two places, {distance:.0f} m apart (median): two sensors or "
+                      "targets have one name", track=track, distance=self.alternation.distance_m)  # fmt: skip
+        name, time_s, before, after = self.jumps[0]
+        track = name and tr(" in track {name}", name=name)
+        return tr("positions jump as no target does (rows: {count}), first{track} from {before:.0f} to {after:.0f} m "
+                  "of range at {time:g} s: a unit, a zero or the target changes there",
+                  count=len(self.jumps), track=track, before=before, after=after, time=time_s)  # fmt: skip
+
+
+def find_jumps(name: str, track: TrackPositions) -> list[Jump]:
+    """The jumps of a track that last; none where its times do not rise."""
+    t, positions = track
+    steps = np.diff(t)
+    if len(t) < MIN_ROWS or not (steps > 0).all():
+        return []
+    legs = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    speed_mps = float(np.median(legs / steps))
+    scatter = MIN_LASTING_SCATTER * float(np.median(np.abs(np.diff(legs))))
+    is_large = (legs > scatter) & (legs > MIN_JUMP_LEGS * speed_mps * steps)
+    rows = np.flatnonzero(
+        is_large & (legs > MIN_JUMP_LEGS * np.median(legs)) & (steps < MAX_JUMP_STEPS * np.median(steps))
+    )
+    return [
+        Jump(name, float(t[i + 1]), *np.linalg.norm(positions[i : i + 2], axis=1).tolist())
+        for i in rows.tolist()
+        if _is_impossible(positions, i, float(legs[i]), float(steps[i])) and _lasts(track, i, float(legs[i]), speed_mps)
+    ]
+
+
+def _lasts(track: TrackPositions, i: int, leg: float, speed_mps: float) -> bool:
+    """Whether most rows from i + 1 on, and most before, lie as far from each other as the jump, but for their way: each
+    side is continued to the jump with its median velocity."""
+    places, way_m = [], 0.0
+    for first, last in ((max(0, i + 1 - SIDE_ROWS), i + 1), (i + 1, i + 1 + SIDE_ROWS)):
+        t, positions = (values[first:last] for values in track)
+        if len(t) < MIN_SIDE_ROWS:
+            return False
+        velocity = np.median(np.diff(positions, axis=0) / np.diff(t)[:, None], axis=0)
+        continued = positions - velocity * (t - track.t_s[i])[:, None]
+        places.append(np.median(continued, axis=0))
+        way_m += speed_mps * float(t[-1] - t[0])
+        if (np.linalg.norm(continued - places[-1], axis=1) < MAX_SIDE_WIDTH * leg).mean() < MIN_SIDE_SHARE:
+            return False
+    return float(np.linalg.norm(places[1] - places[0])) > MIN_LASTING_SHARE * leg + MAX_TURN_SHARE * way_m
+
+
+def _is_impossible(positions: np.ndarray, i: int, leg: float, step: float) -> bool:
+    """Whether no target jumps so, or the ranges before and after differ by the factor of a unit."""
+    if leg > min(MAX_JUMP_MPS * step, MAX_JUMP_MPS2 * step**2):
+        return True
+    before, after = np.linalg.norm(positions[i : i + 2], axis=1)
+    with np.errstate(divide="ignore"):
+        return bool((np.abs(np.abs(np.log(after / before)) - UNIT_FACTORS) < UNIT_TOLERANCE).any())
+
+
+def jumps_fault(jumps: Sequence[Jump], rows: int) -> CourseFault | None:
+    """The fault of jumps among rows; None without any, or with so many that something else explains them."""
+    return CourseFault(tuple(jumps)) if 0 < len(jumps) <= MAX_JUMP_SHARE * rows else None
+
+
+def find_alternation(name: str, positions: np.ndarray) -> Alternation | None:
+    """Whether the rows of a track, positions (n, d) in the order of time, alternate between two places: almost each is
+    nearer to the last but one than to the one before it. Errors do not make it so, nor motion."""
+    if len(positions) < MIN_ALTERNATING_ROWS:
+        return None
+    single, double = (np.linalg.norm(positions[2:] - positions[2 - lag : -lag], axis=1) for lag in (1, 2))
+    if (double < MAX_ALTERNATING_RATIO * single).mean() < MIN_ALTERNATING_SHARE:
+        return None
+    return Alternation(name, float(np.median(single)))
+
+
+def recording_jumps(names: Sequence[str], t_s: np.ndarray, positions: np.ndarray) -> list[Jump]:
+    """The jumps of all tracks of a recording, positions (n, d), by the names of its rows; times from the first."""
+    return [
+        jump._replace(t_s=jump.t_s - float(t_s.min()))
+        for name, rows in rows_by_name(names).items()
+        if name
+        for jump in find_jumps(name, TrackPositions(t_s[rows], positions[rows]))
+    ]
+
+
+def column_positions(columns: Mapping[str, np.ndarray]) -> TrackPositions | None:
+    """Times and positions of the rows of a track, by its columns (n,) of plots: x_m, y_m, z_m, or range_m, with
+    bearing_rad where that is measured; None without these. Rows without a position are left out."""
+    names = next((names for names in POSITION_COLUMNS if set(names) <= set(columns)), None)
+    if names is None:
+        return None
+    positions = np.stack([columns[name] for name in names], axis=1)
+    if "range_m" in names and np.isfinite(bearing := columns.get("bearing_rad", np.nan)).all():
+        positions = positions * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+    is_known = np.isfinite(positions).all(axis=1)
+    return TrackPositions(columns["t_s"][is_known], positions[is_known])
+
+
+def column_fault(tracks: Mapping[str, Sequence[Mapping[str, np.ndarray]]]) -> CourseFault | None:
+    """The fault of tracks, by their names, with columns (n,) of plots in one or several stretches."""
+    jumps, rows = [], 0
+    for name, stretches in tracks.items():
+        for columns in stretches:
+            if (track := column_positions(columns)) is None:
+                return None
+            if (alternation := find_alternation(name, track.positions)) and (np.diff(track.t_s) > 0).all():
+                return CourseFault(alternation=alternation)
+            jumps += find_jumps(name, track)
+            rows += len(track.t_s)
+    return jumps_fault(jumps, rows)

@@ -1,0 +1,67 @@
+"""Jumps and alternations of recorded tracks, which end `track`'s advice and are refused by `fit`."""
+
+import numpy as np
+import pytest
+
+from radarsim.api import load_experiments
+from radarsim.errors import ConfigError
+from radarsim.recordings import track as recordings_track
+from radarsim.recordings.fit import advice
+from radarsim.recordings.fit.fit import fit_plots
+from radarsim.recordings.track_jumps import column_fault
+
+N = 60
+
+
+def course(speed_mps=95.0, first_m=30_000.0, seed=1, rows=N):
+    rng = np.random.default_rng(seed)
+    t = 4.0 * np.arange(rows)
+    return t, first_m + speed_mps * t + rng.normal(0, 60, rows), speed_mps + rng.normal(0, 1, rows)
+
+
+def faulty(kind):
+    """Times, ranges and velocities of a recording with a fault."""
+    t, r, v = course(speed_mps=12.0, first_m=8000.0) if kind == "boat" else course()
+    if kind == "sensors":
+        t, r, v = np.sort([*t, *(t + 1)]), np.stack([r, r + 5000], axis=1).ravel(), np.repeat(v, 2)
+    elif kind == "counter":
+        r = r % 32_768
+    else:
+        r = np.where(t < 120, r, r / {"km": 1000, "boat": 1000, "miles": 1852, "feet": 0.3048}[kind])
+    return t, r, v
+
+
+def write_plots(path, t, r, v, track=""):
+    head, cell = (",track", f",{track}") if track else ("", "")
+    rows = (f"{a}{cell},{b:.2f},{c:.3f}" for a, b, c in zip(t, r, v, strict=True))
+    path.write_text("\n".join([f"t_s{head},range_m,velocity_mps", *rows]))
+    return path
+
+
+@pytest.mark.parametrize("track", ["", "7"])
+@pytest.mark.parametrize("kind", ["km", "boat", "miles", "feet", "counter", "sensors"])
+def test_track_and_fit_name_what_no_target_does(tmp_path, kind, track):
+    path = write_plots(tmp_path / "plots.csv", *faulty(kind), track)
+    (experiment,) = load_experiments.load_all(["rls2"], ("radar.scan_period_s=4",))
+    named = {"sensors": f"the rows{' of track 7' * bool(track)} alternate between two places"}.get(
+        kind, f"positions jump as no target does (rows: 1), first{' in track 7' * bool(track)} from"
+    )
+    advised = advice.advise(recordings_track.track_plots(experiment, path))
+    assert advised.findings == []
+    assert advised.course_fault.message().startswith(named)
+    with pytest.raises(ConfigError) as caught:
+        fit_plots(experiment, path)
+    assert caught.value.lines[0].startswith(f"{path}: {named}")
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1])
+@pytest.mark.parametrize("size_m", [600, 6e3, 6e4, 6e6])
+def test_outliers_are_no_jumps(share, size_m):
+    """Nor a target that turns, or irregular times."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        t, r, _ = course(speed_mps=rng.uniform(-100, 250), seed=seed, rows=200)
+        is_seen, is_wild = rng.random(t.size) < 0.8, rng.random(t.size) < share
+        r = np.abs(r + is_wild * rng.choice([-size_m, size_m], t.size) * rng.random(t.size)) + 1
+        t = t + rng.uniform(0, 3.9, t.size) * (seed % 2)
+        assert column_fault({"": [{"t_s": t[is_seen], "range_m": r[is_seen]}]}) is None
