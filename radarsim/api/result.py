@@ -102,7 +102,16 @@ class Result(Displayable):
         >>> sorted(radarsim.run("rls2", realisations=2000).tables)
         ['claims', 'consistency', 'curves', 'gains', 'radar', 'steady']
         """
-        return {name: self._described(with_note_texts(table)) for name, table in self._tables.items()}
+        return {name: self.table(name) for name in self._tables}
+
+    def table(self, name: str) -> "pd.DataFrame":
+        """One of `tables`, which makes a copy of no other.
+
+        >>> import radarsim
+        >>> radarsim.run("rls2", realisations=2000).table("radar").columns[0]
+        'case'
+        """
+        return self._described(with_note_texts(self._tables[name]))
 
     @cached_property
     def _tables(self) -> dict:
@@ -119,12 +128,12 @@ class Result(Displayable):
         >>> bool(first["sigma_lo"] < first["exact_sigma"] < first["sigma_hi"])
         True
         """
-        return self._described(with_note_texts(self._tables["curves"]))
+        return self.table("curves")
 
     @property
     def gains(self) -> "pd.DataFrame":
         """Gains against the baseline filter: a DataFrame with the columns of gains.csv."""
-        return self._described(with_note_texts(self._tables["gains"]))
+        return self.table("gains")
 
     @property
     def config(self) -> str:

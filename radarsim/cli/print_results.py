@@ -82,11 +82,12 @@ def print_last_scan(result: "Result") -> None:
     A case is named by its swept values."""
     from radarsim.report import case_selection
 
-    if 0 < len(result.last_scan) <= MAX_ROWS:
+    last_scan = result.last_scan
+    if 0 < len(last_scan) <= MAX_ROWS:
         names = dict(
             zip((case.name for case in result.cases), case_selection.distinct_case_names(result.cases), strict=True)
         )
-        print_last_scan_rows(result.experiment.stem, result.last_scan, names)
+        print_last_scan_rows(result.experiment.stem, last_scan, names)
 
 
 def print_last_scan_rows(stem: str, last_scan: "pd.DataFrame", names: Mapping[str, str]) -> None:

@@ -239,7 +239,7 @@ def compute_each(
                 line if line.startswith(f"{experiment.stem}: ") else f"{experiment.stem}: {line}"
                 for line in error.lines
             ]
-            documents.append(json_output.result(cast("Result", error.result)))
+            documents += [json_output.result(cast("Result", error.result))] if as_json else []
             continue
         except MeasureError as error:  # all is written
             unmeasured += error.lines
@@ -250,7 +250,7 @@ def compute_each(
             if not (quiet or as_json):
                 print_results.print_share(result, out)
         else:
-            documents.append(json_output.result(result))
+            documents += [json_output.result(result)] if as_json else []
             if not (quiet or as_json):
                 (print_finished or print_results.print_result)(result)
     if as_json:

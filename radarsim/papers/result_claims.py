@@ -66,7 +66,8 @@ def with_stored_classes(claims: "pd.DataFrame", study_name: str, out: Path | Non
     if choices is None or paper_claims is None or not len(claims):
         return claims
     records: Any = claims.to_dict("records")
-    rows = add_classes(records, known_classes([(choices, paper_claims)], out))
+    marks = {row["claim"]: row["declared"] for row in records if row["declared"]}
+    rows = add_classes(records, known_classes([(choices, paper_claims)], out, marks))
     return claims.assign(**{column: [row[column] for row in rows] for column in CLASS_COLUMNS})
 
 
@@ -97,5 +98,5 @@ def claims_judged_only_as_shipped(result: "Result") -> list[str]:
 
 
 def _records(result: "Result") -> list[dict[str, Any]]:
-    records: Any = result.tables["claims"].to_dict("records")
+    records: Any = result.table("claims").to_dict("records")
     return list(records)

@@ -3,7 +3,7 @@
 classes.csv beside this module has the classes of the shipped configs, copied by `make interpretations-pages`; a claim
 judged in a directory of results takes its class from there."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -68,16 +68,20 @@ def shipped_classes() -> tuple[VerdictClass, ...]:
     return tuple(_rows(SHIPPED_CLASSES, set(CLASS_FILE_COLUMNS), VerdictClass.from_row))
 
 
-def known_classes(papers: Iterable[tuple[OpenChoices, PaperClaims]], out: Path | None) -> KnownClasses:
+def known_classes(
+    papers: Iterable[tuple[OpenChoices, PaperClaims]], out: Path | None, marks: Mapping[str, str] | None = None
+) -> KnownClasses:
     """The class over all interpretations of each claim that depends on an open choice of its paper; None where it is
     not known.
 
-    A class from other words, numbers or choices than the claim has now does not count."""
+    A class from other words, numbers or choices than the claim has now does not count. marks: of claims, see
+    `declaration_digest`, where they are at hand."""
+    marks = marks or {}
     classes = {
         (verdict.claim, verdict.declaration_digest): verdict for verdict in (*shipped_classes(), *stored_classes(out))
     }
     return {
-        claim.id: classes.get((claim.id, declaration_digest(choices, claim)))
+        claim.id: classes.get((claim.id, marks.get(claim.id) or declaration_digest(choices, claim)))
         for choices, paper in papers
         for claim in paper.claims
         if choices.leaves_open(claim)

@@ -135,8 +135,9 @@ def _gaussian(tables_by_name: "Mapping[str, pd.DataFrame]", table: "pd.DataFrame
     not_gaussian = set(zip(curves["case"][strays], curves["filter"][strays], strict=True))
     roles = [role for role in ("filter", "baseline") if role in table]
     is_gaussian = np.ones(len(table), bool)
-    for role in roles:
-        is_gaussian &= [pair not in not_gaussian for pair in zip(table["case"], table[role], strict=True)]
+    for role in roles if not_gaussian else ():
+        pairs = zip(table["case"].tolist(), table[role].tolist(), strict=True)
+        is_gaussian &= [pair not in not_gaussian for pair in pairs]
     return is_gaussian
 
 

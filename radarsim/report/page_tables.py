@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from radarsim.language.current import current_language, use_language
 from radarsim.language.translate import term, tr, translate_names
 from radarsim.report import wording
+from radarsim.report.row_notes import note_texts
 from radarsim.report.typeset import cell_text, typeset
 
 if TYPE_CHECKING:
@@ -99,5 +100,5 @@ def page_table(name: str, table: "pd.DataFrame", max_rows: int = MAX_ROWS) -> di
         "rows": [list(map(_column_cell, order, row)) for row in rows.astype(object).itertuples(index=False, name=None)],
         "count": len(table),
         "cut": len(table) > max_rows,
-        "notes": Counter(str(note) for note in table.get("note", ()) if note),
+        "notes": Counter(filter(None, note_texts(table))),
     }

@@ -68,4 +68,12 @@ def with_note_texts(table: "pd.DataFrame") -> "pd.DataFrame":
     """A copy of the table with the texts of its notes, as files have them."""
     if "note" not in table or table["note"].dtype != object:
         return table.copy()
-    return table.assign(note=[str(note) if isinstance(note, RowNote) else note for note in table["note"]])
+    return table.assign(note=note_texts(table))
+
+
+def note_texts(table: "pd.DataFrame") -> list[str]:
+    """The texts of the notes of a table's rows; none where it has no such column."""
+    notes = table["note"].tolist() if "note" in table else []
+    distinct_notes = {id(note): note for note in notes}  # a few objects in thousands of rows
+    texts = {key: str(note) if isinstance(note, RowNote) else note for key, note in distinct_notes.items()}
+    return [texts[id(note)] for note in notes]

@@ -4,6 +4,7 @@ import copy
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import radarsim
@@ -41,6 +42,16 @@ def test_the_same_numbers_with_and_without_a_store(tmp_path):
     one, other = radarsim.run(CONFIG), radarsim.run(CONFIG, out=tmp_path, figures=False, threads=1)
     np.testing.assert_array_equal(one.curves["sigma"], other.curves["sigma"])
     assert (tmp_path / "config" / "curves.csv").exists()
+
+
+def test_a_table_alone_is_a_copy_as_in_all_of_them():
+    result = radarsim.run(CONFIG)
+    for name, table in result.tables.items():
+        pd.testing.assert_frame_equal(result.table(name), table)
+        assert result.table(name).attrs == table.attrs
+    curves = result.table("curves")
+    curves["sigma"] = 0.0
+    assert (result.curves["sigma"] > 0).all()
 
 
 def test_figures_by_the_names_of_their_files():

@@ -15,7 +15,7 @@ from radarsim.config.find_files import SHIPPED
 from radarsim.report import answer_warnings, interval_notes, statistics
 from radarsim.report.drawing.line_points import rough_points
 from radarsim.report.quantities import Quantity
-from radarsim.report.row_notes import concerns, has_note
+from radarsim.report.row_notes import concerns, has_note, note_texts
 from radarsim.report.sentences import MeasuredInterval, Sentence, as_sentence
 from radarsim.report.statistics import MIN_TRUSTED_REALISATIONS
 from radarsim.studies import registry
@@ -59,6 +59,14 @@ def test_figures_get_no_interval_that_a_note_marks():
     assert left[["sigma_lo", "sigma_hi"]].notna().all(axis=1).tolist() == [True, False, True, True, False]
     assert left[["gain_lo", "gain_hi"]].notna().all(axis=1).tolist() == [True, False, False, True, False]
     assert table[columns].notna().all(axis=None)
+
+
+def test_each_row_has_the_text_of_its_own_note():
+    heavy = interval_notes.HEAVY_TAILS
+    notes = np.array([heavy, "", heavy.about("gain"), "of a user study", heavy], dtype=object)
+    texts = [heavy.text, "", f"gain: {heavy.text}", "of a user study", heavy.text]
+    assert note_texts(pd.DataFrame({"note": notes})) == note_texts(pd.DataFrame({"note": texts})) == texts
+    assert note_texts(pd.DataFrame({"n": [1]})) == []
 
 
 def test_no_figure_of_bursts_has_a_band_where_their_table_has_a_note():
