@@ -5,6 +5,7 @@ A column is found by its name, whatever its case and spaces, in English, German 
 positions with names from aviation (`gs`, `alt_baro`, …) are in feet, knots and feet a minute, and speeds of ships in
 knots, like the exports that use them. Ranges and bearings have no such convention: their units must be stated."""
 
+import math
 import shlex
 import types
 from collections.abc import Mapping, Sequence
@@ -12,7 +13,8 @@ from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
-from radarsim.recordings.formats.column_suggestions import name_by_cells, suggest_options
+from radarsim.recordings.formats.cell_numbers import unit_of_cells
+from radarsim.recordings.formats.column_suggestions import cell_number, name_by_cells, suggest_options
 from radarsim.recordings.formats.units import (
     DEGREES,
     FLIGHT_LEVELS,
@@ -233,6 +235,8 @@ class Header:
         name, quantity = self.names[index], QUANTITIES[ours]
         if self.names.count(name) > 1:
             raise ConfigError(f"{self.path}:1: {name}: must be the name of one column; several have it")
+        if not unit and ours not in UNITLESS:
+            unit = unit_of_cells([row[index].strip() for row in self.sample if index < len(row)], quantity.units)
         is_known = unit in quantity.units or ours in UNITLESS
         if unit and not is_known:
             self.unknown_units[ours] = unit
@@ -244,7 +248,11 @@ class Header:
         """Raise ConfigError for missing columns, and for units that must be stated, all at once."""
         required = ("t_s", *EARTH_COLUMNS) if self.reads_positions else ("t_s", "range_m")
         faults = [self._unknown_unit_fault(ours, unit) for ours, unit in self.unknown_units.items()]
-        if missing := [name for name in required if name not in self.columns]:
+        if self.names and not any(math.isnan(cell_number(name)) for name in self.names):
+            must = "must name the columns; the first line has numbers alone, put one above it such as"
+            example = "t_s,track,range_m,bearing_deg,velocity_mps"
+            faults.append(f"{self.path}:1: {must} {example}; got {', '.join(self.names)[:200]}")
+        elif missing := [name for name in required if name not in self.columns]:
             got = ", ".join(self.names)[:200] or "nothing"
             needed = "columns of time, and of latitude and longitude or of range (name them: --column OURS=THEIRS)"
             guesses = self._guesses(missing)

@@ -26,6 +26,22 @@ SHEET_READERS: dict[Format, Callable[[str, io.BufferedReader], Sheet]] = {
 }
 HEAD_BYTES = 4096  # bytes used to detect the format
 GZIP_MAGIC = b"\x1f\x8b"  # how gzip begins
+OTHER_FILES = {  # how files begin that are none, and what helps
+    b"PK": "a workbook of a spreadsheet, or an archive: save the sheet as CSV, or unpack it",
+    b"\xd0\xcf\x11\xe0": "a workbook of an old spreadsheet: save the sheet as CSV",
+    b"SQLite format 3": "a data base: export the table as CSV",
+    b"\x89HDF": "HDF5, or a file of Matlab: export the table as CSV",
+    b"MATLAB": "a file of Matlab: export the table as CSV (writetable)",
+    b"\x93NUMPY": "an array of NumPy: save it as CSV with a header",
+    b"%PDF": "a document: export the table as CSV",
+    b"7z\xbc\xaf": "an archive: unpack it",
+    b"Rar!": "an archive: unpack it",
+    b"BZh": "compressed by bzip2: unpack it",
+    b"\xfd7zXZ": "compressed by xz: unpack it",
+    b"\x28\xb5\x2f\xfd": "compressed by Zstandard: unpack it",
+    b"<": "a page or another file of markup: export the table as CSV, or the track as GPX",
+}
+CELL_BREAK = re.compile(rb"[,;\t|]|(?<=\S)[ ]+(?=\S)")
 
 UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 ENCODING_NAMES = {  # as spreadsheets write them
@@ -44,11 +60,8 @@ def detect_encoding(path: str | os.PathLike, fallback: str) -> str:
         return fallback or "utf-8-sig"
     with open_unzipped(path) as file:
         head = file.peek(HEAD_BYTES)[:HEAD_BYTES]
-        if head[:2] in UTF16_MARKS:
-            return "utf-16"
-        even, odd = head[::2].count(0), head[1::2].count(0)
-        if max(even, odd) > max(10 * min(even, odd), len(head) / 10):  # for digits and commas one byte of two is zero
-            return "utf-16-le" if odd > even else "utf-16-be"
+        if encoding := _wide_encoding(head):
+            return encoding
         decoder = codecs.getincrementaldecoder("utf-8")()
         try:
             while piece := file.read(1 << 20):
@@ -57,6 +70,16 @@ def detect_encoding(path: str | os.PathLike, fallback: str) -> str:
         except UnicodeDecodeError:
             return fallback or _detect_code_page(head)
     return "utf-8-sig"
+
+
+def _wide_encoding(head: bytes) -> str:
+    """UTF-16 by its mark or zeros; '' of another text."""
+    if head[:2] in UTF16_MARKS:
+        return "utf-16"
+    even, odd = head[::2].count(0), head[1::2].count(0)
+    if max(even, odd) > max(10 * min(even, odd), len(head) / 10):  # for digits and commas one byte of two is zero
+        return "utf-16-le" if odd > even else "utf-16-be"
+    return ""
 
 
 def _detect_code_page(head: bytes) -> str:
@@ -117,8 +140,8 @@ def detect_format(path: str, head: bytes) -> Format:
     """Detect the format of a file from its first bytes; raises ConfigError."""
     if not head:
         raise ConfigError(f"{path}: is empty")
-    if head[:2] in UTF16_MARKS:
-        head = head.decode("utf-16", "ignore").encode()
+    if (encoding := _wide_encoding(head)) and is_table(text := head.decode(encoding, "ignore").encode()):
+        head = text
     if ais.SENTENCE_PATTERN.search(head):
         return "ais"
     if nmea.SENTENCE_PATTERN.search(head):
@@ -130,12 +153,27 @@ def detect_format(path: str, head: bytes) -> Format:
         return "gpx"
     if start.startswith((b"{", b"[")):
         return "json"
-    text = b"\0" not in head and sum(byte < 9 or 13 < byte < 32 for byte in head) == 0
-    lines = [line for line in head.splitlines() if line.strip() and not line.startswith(b"#")]
-    if text and lines and any(sign in lines[0] for sign in (b",", b";", b"\t")):
-        names = lines[0].lower()
+    if is_table(head):
+        names = next(line for line in head.splitlines() if line.strip() and not line.startswith(b"#")).lower()
         return "opensky" if b"icao24" in names and b"lat" in names else "csv"
-    if not text and asterix.looks_like(head):
+    if not _is_text(head) and asterix.looks_like(head):
         return "asterix"
+    if other := next((cure for mark, cure in OTHER_FILES.items() if start.startswith(mark)), ""):
+        raise ConfigError(f"{path}: must be a recording in one of {', '.join(FORMATS)}; it is {other}")
+    if (zeros := head.count(0)) and is_table(head.replace(b"\0", b"")):
+        raise ConfigError(f"{path}: must be text; it has bytes of zero, as a log has that was cut off: take them out "
+                          f"(tr -d '\\000'); {zeros} of the first {len(head)}")  # fmt: skip
     raise ConfigError(f"{path}: must be a recording in one of {', '.join(FORMATS)}; its first bytes are of none: "
                       f"{head[:16].hex(' ')}; if it is one: --from FORMAT")  # fmt: skip
+
+
+def _is_text(head: bytes) -> bool:
+    """Whether a file with this beginning has no bytes that texts have not."""
+    return not any(byte < 9 or 13 < byte < 32 for byte in head)
+
+
+def is_table(head: bytes) -> bool:
+    """Whether a file with this beginning is text of lines with several cells, none of a markup language."""
+    lines = [line for line in head.splitlines() if line.strip() and not line.startswith(b"#")]
+    has_cells = any(len(CELL_BREAK.split(line)) > 1 for line in lines)
+    return _is_text(head) and has_cells and not lines[0].lstrip(codecs.BOM_UTF8).lstrip().startswith((b"<", b"%"))

@@ -4,24 +4,30 @@ Readers of other formats (JSON, Parquet, GPX, NMEA 0183) give a `Sheet`, too, wh
 `table.Table` reads all of them alike.
 
 Cells of CSV are separated by commas, semicolons or tabs: by the separator that parts header and rows into equally many
-cells, else by the most frequent in the header. With a separator other than a comma, numbers may have a decimal comma.
+cells, else by the most frequent in the header; without any of these by bars or blanks. With a separator other than a
+comma, numbers may have a decimal comma.
 
 The lines of a BaseStation port (SBS) have no header, or that of their fields; messages without a position are left
 out."""
 
 import csv
 import itertools
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import TextIO
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term
 from radarsim.recordings.formats.columns import QUANTITIES, known_names
-from radarsim.recordings.formats.units import split_unit
+from radarsim.recordings.formats.units import UNITS, cell_unit, is_same_unit, split_unit
 
 DELIMITERS = ",;\t"
+CSV_DELIMITERS = {"|": "|", " ": "\t"}  # of drawn tables, and of blanks, by that of the lines which are made of them
+RULE_PATTERN = re.compile(r"[-+|:=\s]*[-+=|]{2}[-+|:=\s]*")  # between the rows of a drawn table
+SEPARATOR_PATTERN = re.compile(r"\"?sep=(.)\"?[,;]*", re.IGNORECASE)  # a line that states the separator
+MAX_LINES_ABOVE, MIN_KNOWN_NAMES = 20, 2  # lines of text above a header; quantities that it then names
 SAMPLE_LINES = 20  # lines after the header that show the separator, and what the columns hold
 BASESTATION_STARTS = ("MSG,", "STA,", "AIR,", "SEL,", "ID,", "CLK,")
 BASESTATION_HEADER = (  # of the fields of such a port; what is meant by a name that has no unit is fixed
@@ -52,34 +58,37 @@ class Sheet:
 
 
 def read_csv(path: str, file: TextIO, encoding: str) -> Sheet:
-    """Read a CSV file as a sheet; lines of comment may stand before the header, which shows the separator."""
-    skipped_lines, comment, text = 0, "", ""
-    for text in file:
-        if text.strip() and not text.startswith("#"):
-            break
-        skipped_lines, comment, text = skipped_lines + 1, text, ""
-    sample = list(itertools.islice(file, SAMPLE_LINES))
-    delimiter = _find_delimiter(text, sample)
+    """Read a CSV file as a sheet; lines of comment and of text may stand before the header, which shows the separator,
+    and a line of units below it."""
+    head = list(itertools.islice(file, MAX_LINES_ABOVE + SAMPLE_LINES))
+    above, separator = _lines_above_header(head)
+    text, sample = (head[above] if above < len(head) else ""), head[above + 1 :]
+    delimiter = separator or _find_delimiter(text, sample)
     lines = itertools.chain([text], sample, file)
+    comment = head[above - 1].removeprefix("#") if above and head[above - 1].startswith("#") else ""
     if text.startswith(BASESTATION_STARTS):
-        lines, skipped_lines = itertools.chain([",".join(BASESTATION_HEADER) + "\n"], lines), skipped_lines - 1
-    elif _is_header(comment[1:], delimiter) and not _is_header(text, delimiter):
-        lines, skipped_lines = itertools.chain([comment[1:]], lines), skipped_lines - 1
-    cells = csv.reader(lines, strict=True, delimiter=delimiter)
+        lines, above = itertools.chain([",".join(BASESTATION_HEADER) + "\n"], lines), above - 1
+    elif _is_header(comment, delimiter) and not _is_header(text, delimiter):
+        lines, above = itertools.chain([comment], lines), above - 1
+    cells = csv.reader(_cell_lines(lines, delimiter), strict=True, delimiter=CSV_DELIMITERS.get(delimiter, delimiter))
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         try:
             for row in cells:
                 if row:
-                    yield skipped_lines + cells.line_num, row
+                    yield above + cells.line_num, row
         except csv.Error as error:
-            raise ConfigError(f"{path}:{skipped_lines + cells.line_num}: not a CSV row: {error}") from error
+            raise ConfigError(f"{path}:{above + cells.line_num}: not a CSV row: {error}") from error
 
     numbered_rows = rows()
     _, header = next(numbered_rows, (0, []))
     while header and not header[-1].strip():
         header.pop()
-    sample_rows = [row for row in (_split(line, delimiter) for line in sample) if len(row) >= len(header)]
+    split_rows = (_split(line, delimiter) for line in sample[:SAMPLE_LINES])
+    sample_rows = [row for row in split_rows if len(row) >= len(header)]
+    if sample_rows and (named_units := _with_units(header, sample_rows[0])):
+        header, sample_rows = named_units, sample_rows[1:]
+        next(numbered_rows)
     sheet = Sheet(path, header, iter(()), delimiter != ",", encoding, sample_rows)
     sheet.rows = _trim_rows(numbered_rows, len(header))
     if [split_unit(name)[0] for name in header[:5]] == [split_unit(name)[0] for name in BASESTATION_HEADER[:5]]:
@@ -87,10 +96,57 @@ def read_csv(path: str, file: TextIO, encoding: str) -> Sheet:
     return sheet
 
 
+def _lines_above_header(head: list[str]) -> tuple[int, str]:
+    """How many lines stand before the header, empty, of comment or of text; and the separator that one of them states,
+    as spreadsheets write it. Text is taken for a header unless a later line names more quantities."""
+    first, separator = 0, ""
+    while first < len(head) and (not (line := head[first].strip()) or line.startswith(("#", "sep=", '"sep='))):
+        match = SEPARATOR_PATTERN.fullmatch(line)
+        first, separator = first + 1, match[1] if match else separator
+    if first == len(head):
+        return first, separator
+    delimiters = separator or DELIMITERS
+    if not any(_known_count(head[first], delimiter) for delimiter in delimiters):
+        for later, line in enumerate(head[first : first + MAX_LINES_ABOVE], start=first):
+            is_header = any(_known_count(line, delimiter) >= MIN_KNOWN_NAMES for delimiter in delimiters)
+            if is_header and not line.startswith("#"):
+                return later, separator
+    return first, separator
+
+
+def _with_units(header: list[str], cells: list[str]) -> list[str]:
+    """A header with the units in the cells below it, also of names that state another; empty where these are none."""
+    units = [cell_unit(cell.strip().strip("[]()")) for cell in cells]
+    if not any(unit in UNITS for unit in units) or any(unit not in {"", "-", *UNITS} for unit in units):
+        return []
+    names = []
+    for name, unit in itertools.zip_longest(header, units, fillvalue=""):
+        own_unit = split_unit(name)[1]
+        is_stated = own_unit and (own_unit not in UNITS or is_same_unit(unit, own_unit))
+        names.append(f"{name} [{unit}]" if unit in UNITS and not is_stated else name)
+    return names
+
+
+def _cell_lines(lines: Iterable[str], delimiter: str) -> Iterable[str]:
+    """Lines whose cells are parted by one of CSV_DELIMITERS: rules between the rows of a drawn table become empty."""
+    if delimiter not in CSV_DELIMITERS:
+        return lines
+    if delimiter == " ":
+        return ("\t".join(line.split()) + "\n" for line in lines)
+    return ("\n" if RULE_PATTERN.fullmatch(line) else _without_outer_bars(line.strip()) + "\n" for line in lines)
+
+
+def _without_outer_bars(line: str) -> str:
+    """A line without bars on both of its sides, as a table of Markdown has."""
+    return line[1:].removesuffix("|") if line.startswith("|") else line
+
+
 def _find_delimiter(header: str, sample: list[str]) -> str:
     """The separator that parts the header and the lines after it into equally many cells: rather semicolons or tabs,
     since commas may stand in names and numbers, unless commas part off more known names; where none does, the most
     frequent in the header."""
+    if not any(map(header.count, DELIMITERS)):
+        return "|" if "|" in header else " "
     frequent = max(DELIMITERS, key=header.count)
     lines = [line for line in sample if line.strip()]
     for delimiter in ("\t", ";") if frequent == "," and lines else ():
@@ -111,7 +167,8 @@ def _known_count(header: str, delimiter: str) -> int:
 def _split(line: str, delimiter: str) -> list[str]:
     """The cells of a line, without empty ones at its end; none of a line that is no CSV."""
     try:
-        cells = next(csv.reader([line], delimiter=delimiter), [])
+        reader = csv.reader(_cell_lines([line], delimiter), delimiter=CSV_DELIMITERS.get(delimiter, delimiter))
+        cells = next(reader, [])
     except csv.Error:
         return []
     while cells and not cells[-1].strip():

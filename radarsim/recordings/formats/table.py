@@ -6,31 +6,24 @@ without a zone (default UTC), or, where the user says so, day numbers. The time 
 has several. Assumptions are in `notes`."""
 
 import math
-import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats import cell_times, columns, records, table_checks
+from radarsim.recordings.formats.cell_numbers import CellNumbers, is_missing, spoiled_number_cure
 from radarsim.recordings.formats.cell_times import TIME_FORMATS
 from radarsim.recordings.formats.column_suggestions import cell_number
-from radarsim.recordings.formats.columns import EARTH_COLUMNS, Header
+from radarsim.recordings.formats.columns import EARTH_COLUMNS, QUANTITIES, Header
 from radarsim.recordings.formats.sheet import Sheet
-from radarsim.recordings.formats.units import CLOCK_DIGITS, DAYS, DEGREES, KNOT_MPS, TURNS
+from radarsim.recordings.formats.units import CLOCK_DIGITS, DAYS, DEGREES, KNOT_MPS, TIME_UNITS, TURNS
 from radarsim.recordings.row_faults import Faults
 
-LARGEST_NUMBER = 1e15
+COMMENT_MARKS = ("#", "//")
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
 MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * KNOT_MPS, 360.0  # of AIS: what is not below them means missing
 UNKNOWN_POSITION, UNKNOWN_DEGREES = (91.0, 181.0), (999.0, 9999.0, 99999.0)  # of AIS, and of other exports
-MISSING_TEXTS = ("nan", "null", "none", "na", "n/a", "#n/a")
-THOUSANDS_PATTERN = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand or a decimal
-GROUP_SPACES = " \u00a0\u2009\u202f'"
-GROUPED_PATTERN = re.compile(  # 1,234.5, 1.234,5, 1 234,5 and 1,234,567: commas and points of one meaning
-    rf"([-+]?\d{{1,3}}(?:(?:,\d{{3}})+(?=\.)|(?:\.\d{{3}})+(?=,)|(?:[{GROUP_SPACES}]\d{{3}})+|"
-    r"(,|\.)\d{3}(?:\2\d{3})+))(?:[.,](\d+))?"
-)
 MIDNIGHT_S = 3600.0  # a falling time of day has passed midnight if both are as near it; else a file is sorted by track
 STILL_MPS = 1.0  # below it a position may stay the same
 MAX_CELL_VALUES = 10_000  # different cells in a column that may name aircraft
@@ -46,15 +39,16 @@ class Table:
     def __init__(self, sheet: Sheet, assigned: Mapping[str, str] | None = None):
         self.path, self.sheet, self.skipped = sheet.path, sheet, sheet.skipped
         self.line = 0
+        self.cut_row: tuple[int, ...] = ()  # line and number of cells of the last row, if it has too few
         self.records, self.highest_m, self.barometric_count, self.silent_count = 0, 0.0, 0, 0
         self.of_day = False  # known after the first rows
-        self.doubtful = ""  # the first number whose comma may separate thousands
-        self.has_decimal_comma = False  # a comma that cannot has been read
+        self.numbers = CellNumbers(sheet.decimal_comma)
         self.faults = Faults(self.path)
         self.width = len(sheet.header)
         self.header = Header(self.path, sheet.header, assigned or {}, sheet.sample)
         self.columns = self.header.columns
         self.kind = records.POSITIONS if self.header.reads_positions else records.PLOTS
+        self.time_name = sheet.header[self.columns["t_s"].position].strip()
         self.clock = records.UnrolledClock(records.DAY_S, near_s=MIDNIGHT_S)
         self.day_s = math.nan  # of the date read last
         self.unit_s = 1.0  # of times that are too great for seconds
@@ -81,9 +75,9 @@ class Table:
             lines.append(
                 tr("the text is read as {name}, as it is not UTF-8; for another: --encoding NAME", name=encoding)
             )
-        if self.doubtful and not self.has_decimal_comma:
-            value = float(self.doubtful.replace(",", "."))
-            lines.append(tr("commas are decimal: {text} is read as {value:g}", text=self.doubtful, value=value))
+        if (doubtful := self.numbers.doubtful) and not self.numbers.has_decimal_comma:
+            value = float(doubtful.replace(",", "."))
+            lines.append(tr("commas are decimal: {text} is read as {value:g}", text=doubtful, value=value))
         if self.unit_s < 1:
             lines.append(tr("times are so large that they are read in units of {unit:g} s", unit=self.unit_s))
         if "" in self.slashed_dates and len(self.slashed_dates) == 1:
@@ -157,6 +151,10 @@ class Table:
                     yield self._checked_batch(builder.take_batch())
         except ConfigError as error:
             raise ConfigError(*self.faults.lines(), *error.lines) from error
+        if self.cut_row and not self.faults and (self.is_checked or len(builder)):
+            self.skipped[term("lines at the end that are no rows, or cut off")] += 1
+        elif self.cut_row:
+            self._add_width_fault(*self.cut_row)
         if self.faults:
             raise ConfigError(*self.faults.lines())
         if len(builder):
@@ -185,8 +183,13 @@ class Table:
 
     def _add_row(self, cells: list[str], builder: records.BatchBuilder, row_of: RowReader) -> None:
         self.records += 1
+        if self.cut_row:  # it was not the last one
+            self._add_width_fault(*self.cut_row)
+            self.cut_row = ()
         if len(cells) != self.width:
-            self.faults.add(self.line, "", f"must have {self.width} cells as the header", len(cells))
+            self._check_other_line(cells)
+            return
+        if cells[self.columns["t_s"].position].strip() == self.time_name and self._is_second_header(cells):
             return
         row = row_of(cells)
         if self.faults:  # the rest is only read for further ones
@@ -210,6 +213,28 @@ class Table:
         address_index = self.header.identities.get("address")
         address = "" if address_index is None else cells[address_index].strip().lower()
         builder.add(name, address, row, tuple(cells[index].strip() for index in self.text_indices.values()))
+
+    def _check_other_line(self, cells: list[str]) -> None:
+        """Count a comment; any other line that is no row of the table is a fault, unless it is the last."""
+        if cells[0].lstrip().startswith(COMMENT_MARKS):
+            self.skipped[term("lines of comment")] += 1
+        elif len(cells) < self.width:
+            self.cut_row = (self.line, len(cells))
+        else:
+            self._add_width_fault(self.line, len(cells))
+
+    def _add_width_fault(self, line: int, width: int) -> None:
+        self.faults.add(line, "", f"must have {self.width} cells as the header", width)
+
+    def _is_second_header(self, cells: list[str]) -> bool:
+        """Whether a row repeats the header; one with other columns is a fault."""
+        names = zip(cells, self.sheet.header, strict=True)
+        if other_names := [name.strip() for name, own in names if name.strip() != own.strip()]:
+            must = "must be a row of the table, not the header of another: import that from a file of its own"
+            self.faults.add(self.line, "", must, ", ".join(other_names))
+        else:
+            self.skipped[term("headers repeated within the table")] += 1
+        return True
 
     def _position(self, cells: list[str]) -> tuple[float, ...]:
         """POSITION_COLUMNS of a row."""
@@ -275,13 +300,20 @@ class Table:
         column = self.columns["t_s"]
         text = cells[column.position].strip()
         self.is_leap_second = False
-        if not text or text.lower() in MISSING_TEXTS:
+        if not text:
             return math.nan
         try:
             try:
-                t = float(self._with_decimal_point(text)) * column.factor
+                t = self.numbers.number(text) * column.factor
             except ValueError:
-                return self._parse_time(text, cells)
+                if is_missing(text):
+                    return math.nan
+                value = self.numbers.unit_cell(text, TIME_UNITS)
+                if value is None:
+                    return self._parse_time(text, cells)
+                t = value
+            if math.isnan(t):
+                return t
             if column.unit == CLOCK_DIGITS:
                 return self._at_date(cell_times.clock_digits_s(t), cells)
             if (date := cell_times.digits_date_s(text)) is not None:
@@ -310,7 +342,7 @@ class Table:
     def _parse_date(self, text: str, cells: list[str]) -> float:
         """Seconds from 1970 of a date, which a spreadsheet may have as a day number; raises ValueError."""
         try:
-            days = float(self._with_decimal_point(text))
+            days = self.numbers.number(text)
         except ValueError:
             return self._parse_time(text, cells)
         if cell_times.day_numbers_of(days) in ("", cell_times.FRACTIONS_OF_DAY):
@@ -372,30 +404,13 @@ class Table:
         text = cells[column.position].strip() if column else ""
         if self.has_joint_position and name in EARTH_COLUMNS:
             text = text.partition(",")[2 * (name == "longitude_deg")]
-        if not column or not text or text.lower() in MISSING_TEXTS:
+        if not column or not text:
             return math.nan
         try:
-            value = float(self._with_decimal_point(text))
+            return self.numbers.quantity(text, name, column.factor, QUANTITIES[name].units)
         except ValueError:
-            value = math.inf
-        if not abs(value) <= LARGEST_NUMBER:
-            self._add_fault(name, "must be a number", repr(text[:60]))
+            self._add_fault(name, "must be a number", repr(text[:60]), spoiled_number_cure(text))
             return math.nan
-        return value * column.factor
-
-    def _with_decimal_point(self, text: str) -> str:
-        """A number with a decimal point, and without separators of thousands where they can be nothing else."""
-        if "," not in text and " " not in text and "'" not in text and text.count(".") < 2 and text.isascii():
-            return text
-        if match := GROUPED_PATTERN.fullmatch(text):
-            return re.sub(r"[^\d+-]", "", match[1]) + (f".{match[3]}" if match[3] else "")
-        if text.count(",") != 1 or "." in text or (THOUSANDS_PATTERN.fullmatch(text) and not self.sheet.decimal_comma):
-            return text
-        if THOUSANDS_PATTERN.fullmatch(text):
-            self.doubtful = self.doubtful or text
-        else:
-            self.has_decimal_comma = True
-        return text.replace(",", ".")
 
     def _add_fault(self, ours: str, must: str, got: str, cure: str = "") -> None:
         column, always = self.columns[ours], bool(cure)

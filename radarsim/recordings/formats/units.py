@@ -82,6 +82,17 @@ def _stem(text: str) -> str:
     return re.sub(r"\s+", "_", text.replace(".", " ").strip(" /,"))
 
 
+def is_same_unit(first: str, second: str) -> bool:
+    """Whether two names are of the same unit."""
+    tables = (HEIGHTS, SPEEDS, RADIANS, TIME_UNITS)
+    return any(first in units and second in units and units[first] == units[second] for units in tables)
+
+
+def cell_unit(text: str) -> str:
+    """A unit at the end of a cell by our name for it; any other text in lower case."""
+    return _unit(unicodedata.normalize("NFC", text).lower())
+
+
 def _unit(text: str) -> str:
     """A unit by our name for it; any other text as it is."""
     text = text.strip()

@@ -476,11 +476,11 @@ def test_faults_of_tables(tmp_path, text, expected):
 
 
 def test_all_faults_of_a_table_at_once(tmp_path):
-    rows = "".join(f"{k},{'x' if k % 2 else 3},{'-' if k == 7 else 1}\n" for k in range(4000))
+    rows = "".join(f"{k},{'x' if k % 2 else 3},{'y' if k == 7 else 1}\n" for k in range(4000))
     assert refused(tmp_path, f"time,range_m,azimuth [deg]\n{rows}".encode()) == [
         "recording:3:2: range_m: must be a number, got 'x' (and 1999 more, in lines 5, 7, 9, …); if this is not "
         "range_m, name the column: --column range_m=THEIRS",
-        "recording:9:3: azimuth [deg]: must be a number, got '-'",
+        "recording:9:3: azimuth [deg]: must be a number, got 'y'",
     ]
 
 
