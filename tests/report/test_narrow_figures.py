@@ -1,4 +1,4 @@
-"""No figure of any width has words cut, or one over the other."""
+"""No figure of any width has words cut, or one over the other; one that cannot be had at a width is wider."""
 
 import io
 from dataclasses import replace
@@ -14,8 +14,9 @@ from radarsim.papers.forest_plot import forest_plot
 from radarsim.report.drawing import canvas as drawing_canvas
 from radarsim.report.drawing.crowded_panels import with_names_at_ends
 from radarsim.report.drawing.legend_placement import plan_legends
-from radarsim.report.drawing.model import COLUMN_MM, MAX_PANEL_LINES, PAGE_MM, Axis, Figure, Line, Note, Panel
+from radarsim.report.drawing.model import COLUMN_MM, MAX_PANEL_LINES, PAGE_MM, Axis, Figure, Heat, Line, Note, Panel
 from radarsim.report.drawing.style import MM, PNG_DPI
+from radarsim.report.drawing.word_overlaps import overlapping_words
 from tests.report.test_claims_page import row
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
@@ -36,19 +37,18 @@ def cut_edges(pixels):
 
 
 def faults_of_widths(figures):
-    """Figures that are cut at a width, or cannot be had at it though they would be no taller than a page."""
+    """Figures that at a width, or as they are, are cut, have words that meet, or another width than they say."""
     faults = []
     for name, figure in figures.items():
-        for width in WIDTHS_MM:
-            pixels, width_mm = picture(drawing_canvas.save(figure, ("png",), width)["png"])
-            is_widened = round(width_mm) != width and height_mm(figure, width) <= drawing_canvas.A4_HEIGHT_MM
-            if (edges := cut_edges(pixels)) or is_widened:
-                faults.append(f"{name} at {width:g} mm: {width_mm:.0f} mm, cut: {edges}")
+        for width in (None, *WIDTHS_MM):
+            drawn_figure, canvas = drawing_canvas.render_at(figure, width)
+            words = overlapping_words(canvas)
+            png = io.BytesIO()
+            canvas.savefig(png, format="png", dpi=PNG_DPI)
+            pixels, width_mm = picture(png.getvalue())
+            if (edges := cut_edges(pixels)) or words or round(width_mm) != round(drawn_figure.width_mm):
+                faults.append(f"{name} at {width} mm: {width_mm:.0f} mm, cut: {edges}, meet: {words}")
     return faults
-
-
-def height_mm(figure, width):
-    return drawing_canvas.render(drawing_canvas.at_width(figure, width)).get_figheight() / MM
 
 
 def claim_figure():
@@ -117,6 +117,21 @@ def crowded_panels(figure):
         for panel, lines, ends in zip(plan.panels, named, plan.at_ends, strict=True)
         if len(lines) > MAX_PANEL_LINES and not ends
     ]
+
+
+def test_words_that_meet_are_found():
+    x = np.arange(3.0)
+    notes = Note(1.0, 1.0, "one"), Note(1.0, 1.0, "two"), Note(2.0, 0.0, "far", "nw")
+    panel = Panel(Axis("x"), Axis("y"), (Line(x, x), *notes))
+    assert overlapping_words(drawing_canvas.render(Figure("f", "F", "A flight.", (panel,)))) == [("one", "two")]
+
+
+def test_a_map_too_narrow_for_its_numbers_has_fewer_columns():
+    values = 0.9123 + 0.001 * np.arange(36.0).reshape(6, 6)
+    panel = Panel(Axis("x"), Axis("y"), (Heat(np.arange(6) / 16 + 0.0625, np.arange(6.0), values, "share"),))
+    figure = Figure("f", "F", "Maps.", (panel,) * 3, 2, PAGE_MM)
+    columns = {width: drawing_canvas.render_at(figure, width)[0].columns for width in (None, 120.0)}
+    assert columns == {None: 2, 120.0: 1}
 
 
 @pytest.mark.parametrize("width", WIDTHS_MM)

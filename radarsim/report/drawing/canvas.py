@@ -40,6 +40,7 @@ from radarsim.report.drawing.style import (
     wrap,
     wrap_label,
 )
+from radarsim.report.drawing.word_overlaps import overlapping_words
 from radarsim.report.math_text import plain_text, with_formulas
 from radarsim.report.wording import with_unbroken_units
 
@@ -76,7 +77,7 @@ def save(
     At another width its letters keep their size; a width at which they would be cut is increased. Title, caption and
     made_by (sources and versions) are in each file's metadata."""
     with _no_garbage_collection():
-        figure, canvas = _render_at(figure, width_mm)
+        figure, canvas = render_at(figure, width_mm)
         with _cache_ticks(canvas):
             return {kind: _encode(canvas, kind, figure, made_by) for kind in formats}
 
@@ -89,7 +90,7 @@ def draw(
     The width of the figure that is returned is that of the drawing."""
     kinds = list(formats)
     with _no_garbage_collection():
-        figure, canvas = _render_at(figure, width_mm)
+        figure, canvas = render_at(figure, width_mm)
         with _cache_ticks(canvas):
             encoded = {kind: _encode(canvas, kind, figure, made_by) for kind in dict.fromkeys((*kinds, "svg"))}
     panels = [panel for panel in figure.panels if panel.marks]
@@ -99,24 +100,33 @@ def draw(
     return DrawnFigure(figure, files, encoded["svg"], tuple(values), headline_height_pt(canvas))
 
 
-def _render_at(figure: Figure, width_mm: float | None) -> tuple[Figure, Canvas]:
-    """The figure at a width, or at the next larger one at which nothing is cut, and its drawing."""
+def render_at(figure: Figure, width_mm: float | None) -> tuple[Figure, Canvas]:
+    """The figure at a width, or at the next larger one at which nothing is cut and no words meet, and its drawing.
+
+    A figure has fewer columns rather than a larger width."""
     narrow = at_width(figure, width_mm)
+    panel_count = sum(bool(panel.marks) for panel in figure.panels)
     while narrow.width_mm < figure.width_mm:
-        canvas = render(narrow)
-        if _is_whole(canvas, sum(bool(panel.marks) for panel in figure.panels)):
-            return narrow, canvas
+        for columns in range(narrow.columns, 0, -1):
+            fewer_columns = at_width(replace(figure, columns=columns), narrow.width_mm)
+            if -(-panel_count // columns) * fewer_columns.panel_height_mm > A4_HEIGHT_MM:
+                break
+            canvas = render(fewer_columns)
+            if _is_whole(canvas, panel_count):
+                return fewer_columns, canvas
         narrow = at_width(figure, min(narrow.width_mm + WIDTH_STEP_MM, figure.width_mm))
     return narrow, render(narrow)
 
 
 def _is_whole(canvas: Canvas, panel_count: int) -> bool:
-    """Whether all that is drawn lies within the figure, its panels have room, and it is no taller than a page."""
+    """Whether all that is drawn lies within the figure, no words meet, its panels have room, and it is no taller than
+    a page."""
     box, page = canvas.get_tightbbox(), canvas.bbox_inches
     if page.height > A4_HEIGHT_MM * MM:
         return False
     is_inside = min(box.x0, box.y0, page.x1 - box.x1, page.y1 - box.y1) > -ROUNDING_INCHES
-    return is_inside and all(axes.bbox.width / canvas.dpi > LEAST_PANEL_MM * MM for axes in canvas.axes[:panel_count])
+    has_room = all(axes.bbox.width / canvas.dpi > LEAST_PANEL_MM * MM for axes in canvas.axes[:panel_count])
+    return is_inside and has_room and not overlapping_words(canvas)
 
 
 def draw_on(figure: Figure, axes: Any, label: str = "") -> Canvas:
