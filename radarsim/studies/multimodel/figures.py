@@ -48,6 +48,7 @@ SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
 POINT_SIZES_PT = (7.0, 5.8, 4.6, 3.4)  # of points that may coincide, each drawn on those before it
+SAME_FLIGHT = 1e-3  # of its extent: a difference that is less than the width of a line
 STAGE_SPREAD = 0.5  # width over which a stage's points are spread; stages are one apart
 MAX_LOOKS = 8  # filters with distinct colours, dashes and markers
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
@@ -139,18 +140,19 @@ def _value(result: CaseResult, key: str, value: object) -> str:
 
 def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
     """Ground track, height, speed and acceleration (the paper's figures 1 to 4), a line for each distinct flight."""
-    flights: dict[bytes, CaseResult] = {}
-    for result in results:
-        flights.setdefault(np.ascontiguousarray(result.axes.truth).tobytes(), result)
+    flights: list[CaseResult[FlightAxes]] = []
+    for result in sorted(results, key=lambda result: -len(result.axes.t_s)):
+        if not any(_is_same_flight(result.axes, flight.axes) for flight in flights):
+            flights.append(result)
     lines: list[list[Line]] = [[], [], [], []]
-    for n, result in enumerate(flights.values()):
+    for n, result in enumerate(flights):
         x, t = result.axes.truth, np.asarray(result.axes.t_s, dtype=float)
         label, style = _title(result, results) if len(flights) > 1 else "", Style(n, n)
         speed, acceleration = (np.linalg.norm(x[:, i::3], axis=1) for i in (1, 2))
         lines[0].append(Line(x[:, 6] / 1e3, x[:, 0] / 1e3, label, style))
         for panel_index, values in ((1, x[:, 3] / 1e3), (2, speed), (3, acceleration)):
             lines[panel_index].append(Line(t, values, label, style))
-    stage_lines = _stage_lines(list(flights.values()))
+    stage_lines = _stage_lines(flights)
     axes = (
         (Axis(tr("east $z$, km")), Axis(tr("north $x$, km")), tr("1  ground track"), ()),
         (panel_layout.time_axis(), Axis(tr("height $y$, km"), limits=(0, None)), tr("2  height"), stage_lines),
@@ -173,6 +175,18 @@ def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
         "the stages."
     )
     return _with_paper_number(_figure_of_panels("trajectory", tr("Flight"), caption, flight_panels, 56), results, "1–4")
+
+
+def _is_same_flight(axes: "FlightAxes", other_axes: "FlightAxes") -> bool:
+    """Whether two cases have one flight, however often a plot comes: positions that no drawing tells apart."""
+    (t, positions), (other_t, other_positions) = (
+        (np.asarray(a.t_s, dtype=float), a.truth[:, ::3]) for a in (axes, other_axes)
+    )
+    shared = (t >= other_t[0]) & (t <= other_t[-1])
+    if shared.sum() < 2 or abs(t[-1] - other_t[-1]) > np.diff(t).max() + np.diff(other_t).max():
+        return False
+    between = np.column_stack([np.interp(t[shared], other_t, column) for column in other_positions.T])
+    return bool(np.abs(positions[shared] - between).max() < SAME_FLIGHT * np.ptp(positions, axis=0).max())
 
 
 def _landmarks(tracks: Sequence[Line]) -> list[Line | Note]:

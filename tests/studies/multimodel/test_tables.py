@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,9 +18,9 @@ from radarsim.papers.study_claims import claims_of
 from radarsim.papers.verdict_rule import CONFIRMED
 from radarsim.report import typeset
 from radarsim.report.drawing import canvas as drawing_canvas
-from radarsim.report.drawing.model import Note
+from radarsim.report.drawing.model import Line, Note
 from radarsim.report.statistics import Estimate
-from radarsim.studies.multimodel import STUDY, answer, stage_ranking
+from radarsim.studies.multimodel import STUDY, answer, figures, stage_ranking
 from tests.answers import answer_texts
 from tests.tolerances import assert_rounded, rounding
 
@@ -100,6 +101,17 @@ def test_figures_are_described(result):
         tops = [(mark.text, mark.x) for mark in panel.marks if isinstance(mark, Note) and mark.place == "top"]
         end = float(result.cases[0].axes.t_s[-1])
         assert tops == [("start", 10), ("ballistic", 72.5), ("manoeuvre", 147.5), ("after", (170 + end) / 2)]
+
+
+def test_one_flight_is_drawn_once_however_often_a_plot_comes(result):
+    case = result.cases[0]
+    rows = slice(1, None, 3)
+    axes = replace(case.axes, t_s=case.axes.t_s[rows], truth=case.axes.truth[rows], stage=case.axes.stage[rows])
+    thinned = replace(case, axes=axes)
+    other = replace(thinned, axes=replace(axes, truth=1.1 * axes.truth))
+    for cases, counts in (((thinned, case), [len(case.axes.t_s)]), ((case, other), [len(case.axes.t_s), len(axes.t_s)])):
+        marks = figures.trajectory(cases).panels[0].marks
+        assert [len(mark.x) for mark in marks if isinstance(mark, Line) and mark.style.dash is not None] == counts
 
 
 @pytest.mark.slow
