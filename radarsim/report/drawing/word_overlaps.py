@@ -4,21 +4,23 @@ from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Tick
 from matplotlib.figure import Figure as Canvas
 from matplotlib.text import Text
 
+TITLES = "_left_title", "_right_title"  # of a panel; not public
 MIN_OVERLAP_PT = 0.5, 1.2  # side by side, one above the other: boxes are larger than the letters in them
 
 
 def overlapping_words(canvas: Canvas) -> list[tuple[str, str]]:
-    """Pairs of words of a laid-out drawing that lie one over the other; a legend counts by its first name."""
+    """Pairs of words of a laid-out drawing that lie one over the other; a legend counts as one word."""
     canvas.get_tightbbox()  # puts the labels of axes in their places
     texts = list(_drawn_texts(canvas))
     legends = [legend for legend in (*canvas.legends, *(axes.get_legend() for axes in canvas.axes)) if legend]
     # Text's own method: that of an annotation counts what it points at.
     extents = [Text.get_window_extent(text) for text in texts] + [legend.get_window_extent() for legend in legends]
     boxes = np.array([(box.x0, box.y0, box.x1, box.y1) for box in extents]).reshape(-1, 4)
-    words = [*(text.get_text() for text in texts), *(legend.get_texts()[0].get_text() for legend in legends)]
+    words = [*(text.get_text() for text in texts), *("legend" for _ in legends)]
     low, high = boxes[:, :2], boxes[:, 2:]
     shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
     is_over = (shared > np.array(MIN_OVERLAP_PT) * canvas.dpi / 72).all(axis=-1)
@@ -30,7 +32,7 @@ def _drawn_texts(canvas: Canvas) -> Iterator[Text]:
     texts = [*canvas.texts]
     for axes in canvas.axes:
         texts += _axis_texts(axes) if axes.axison else []
-        texts += [*axes.texts, axes.title, axes._left_title, axes._right_title]  # type: ignore[attr-defined]
+        texts += [*axes.texts, *(getattr(axes, name, axes.title) for name in TITLES)]
     return (text for text in texts if text.get_visible() and text.get_text().strip())
 
 
@@ -38,7 +40,7 @@ def _axis_texts(axes: Axes) -> list[Text]:
     """The labels of a panel's axes and of those of their ticks that are within them."""
     texts: list[Text] = []
     for side in (axes.xaxis, axes.yaxis):
-        ticks = side._update_ticks()  # type: ignore[attr-defined]
+        ticks: list[Tick] = getattr(side, "_update_ticks", list)()  # not public: a version without it counts no ticks
         texts += [label for tick in ticks for label in (tick.label1, tick.label2)]
         texts += [side.label, side.offsetText]
     return texts

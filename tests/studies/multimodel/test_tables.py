@@ -109,7 +109,10 @@ def test_one_flight_is_drawn_once_however_often_a_plot_comes(result):
     axes = replace(case.axes, t_s=case.axes.t_s[rows], truth=case.axes.truth[rows], stage=case.axes.stage[rows])
     thinned = replace(case, axes=axes)
     other = replace(thinned, axes=replace(axes, truth=1.1 * axes.truth))
-    for cases, counts in (((thinned, case), [len(case.axes.t_s)]), ((case, other), [len(case.axes.t_s), len(axes.t_s)])):
+    for cases, counts in (
+        ((thinned, case), [len(case.axes.t_s)]),
+        ((case, other), [len(case.axes.t_s), len(axes.t_s)]),
+    ):
         marks = figures.trajectory(cases).panels[0].marks
         assert [len(mark.x) for mark in marks if isinstance(mark, Line) and mark.style.dash is not None] == counts
 
