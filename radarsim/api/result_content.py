@@ -16,6 +16,7 @@ from radarsim.report import (
     caption_remarks,
     coinciding_lines,
     compared_value,
+    exact_marks,
     gain_sentences,
     interval_notes,
     sentences,
@@ -114,17 +115,28 @@ MAX_BASELINE_SENTENCES = 6  # on baselines after the first
 class Answer(NamedTuple):
     """The answer of an experiment: its sentences, and warnings on the intervals that they rest on.
 
-    main_count: how many of the sentences, which come first, `radarsim judge` prints; sources: what each rests
-    on, as `Sentence.sources`."""
+    marked_texts: the sentences with a mark behind each exact value (`report.exact_marks`); main_count: how many of
+    them, which come first, `radarsim judge` prints; sources: what each rests on, as `Sentence.sources`."""
 
-    texts: tuple[str, ...]
+    marked_texts: tuple[str, ...]
     warnings: tuple[str, ...]
     main_count: int
     sources: tuple[tuple[str, ...], ...]
 
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The sentences as readers see them."""
+        return tuple(map(exact_marks.without_marks, self.marked_texts))
+
 
 def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
-    """The answer of an experiment: on user filters, of its study, and gains against further baselines."""
+    """The answer of an experiment: on user filters, of its study, gains against further baselines, and last how
+    exact values are told from simulated ones."""
+    with exact_marks.marking():
+        return _marked_answer(results, tables_by_name)
+
+
+def _marked_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.DataFrame"]) -> Answer:
     study_tables = with_first_baseline(user_filters_rows.without_user_filters(tables_by_name, results), results)
     further_baselines = [gain for result in results for gain in result.further_baselines]
     names = config_names(results)
@@ -143,14 +155,14 @@ def make_answer(results: Sequence[CaseResult], tables_by_name: Mapping[str, "pd.
         ),
     ]
     answer = [*main, *details, *_short_sentences(of_study, names)]
-    texts = [sentence.text for sentence in answer]
-    sources = [sentence.sources for sentence in answer]
-    if further_baselines:
-        texts.append(tr("Further gains are in gains.csv."))
-        sources.append(("gains",))
     warnings = [
         translate_names(line, names) for line in answer_warnings.answer_warnings(results, tables_by_name, answer)
     ]
+    if further_baselines:
+        answer.append(Sentence(tr("Further gains are in gains.csv.")))
+    if convention := exact_marks.convention(sentence.text for sentence in answer):
+        answer.append(Sentence(convention))
+    texts, sources = [sentence.text for sentence in answer], [sentence.sources for sentence in answer]
     return Answer(tuple(texts), tuple(warnings), len(main), tuple(sources))
 
 

@@ -94,7 +94,7 @@ def write_files(
             name: sources_behind_figure(name, case_study.drawn_from(), tables_by_name) for name in figures_by_name
         }
         figures_by_name = headlines.with_headlines(
-            *(figures_by_name, answer.texts, answer.sources, sources, swept_cases(results), swept_keys(results)),
+            *(figures_by_name, answer.marked_texts, answer.sources, sources, swept_cases(results), swept_keys(results)),
             case_study.user_filter_components() or RADIAL,
         )
         question = question_text(experiment)

@@ -12,7 +12,7 @@ import numpy as np
 
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
-from radarsim.report import sentences, statistics, tables, wording
+from radarsim.report import exact_marks, sentences, statistics, tables, wording
 from radarsim.report.quantities import GAIN, SIGMA, Quantity
 from radarsim.report.statistics import Estimate
 
@@ -55,11 +55,11 @@ class ComparedValue:
         return replace(self, estimate=Estimate(function(self.value), low, high))
 
     def text(self, unit: str = "", form: str = ".4g") -> str:
-        """12.3 m [12, 12.6], or 12.3 m (exact)."""
+        """12.3 m [12.0, 12.6]; an exact value without an interval."""
         if not self.is_exact:
             return wording.estimate(self.estimate, unit, form)
         value = numeral(format(self.value, form)).replace("inf", "∞")
-        return tr("{value} (exact)", value=" ".join(filter(None, (value, unit))))
+        return exact_marks.exact_text(" ".join(filter(None, (value, unit))))
 
     def choice_remark(self) -> str:
         """In brackets, for how many measured values its interval holds; empty where it was not chosen, or has none."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
-from radarsim.report import wording
+from radarsim.report import exact_marks, wording
 from radarsim.report.compared_value import ComparedValue
 
 SINGLE = 1e-3  # per cent: width of the interval of a gain that is nought but for rounding to single precision
@@ -33,20 +33,17 @@ def comparison_text(gain: ComparedValue) -> str:
     """A gain as a comparison of σ: lower, higher, or not significantly either."""
     rounded = gain.mapped(lambda percent: round(percent, 1) + 0.0)
     if gain.is_exact and abs(gain.value) < MIN_EXACT_GAIN:
-        return tr("less than 0.1 % lower or higher (exact)")
+        return exact_marks.exact_text(tr("less than 0.1 % lower or higher"))
     if not any(rounded.estimate):
         return tr("less than 0.1 % lower or higher")
     if not gain.is_exact and gain.estimate.lo <= 0 <= gain.estimate.hi:
-        return tr("not significantly lower or higher (gain {gain})", gain=rounded.text("%", ".1f"))
+        return tr("not significantly lower or higher (gain {gain})", gain=gain.text("%", ".1f"))
     if gain.value < -FACTOR_LOSS:
         ratio = gain.mapped(lambda percent: 1 - percent / 100)
-        if gain.is_exact:  # in brackets after the whole clause, as other languages end it with a noun
-            factor = tr("higher by a factor of {factor}", factor=numeral(f"{ratio.value:.3g}"))
-            return tr("{value} (exact)", value=factor)
         return tr("higher by a factor of {factor}", factor=ratio.text(form=".3g"))
     if gain.value < 0:
-        return tr("{percent} higher", percent=rounded.mapped(lambda percent: 0.0 - percent).text("%", ".1f"))
-    return tr("{percent} lower", percent=rounded.text("%", ".1f"))
+        return tr("{percent} higher", percent=gain.mapped(lambda percent: 0.0 - percent).text("%", ".1f"))
+    return tr("{percent} lower", percent=gain.text("%", ".1f"))
 
 
 def percent_text(gain: ComparedValue, n: float) -> str:
@@ -57,7 +54,7 @@ def percent_text(gain: ComparedValue, n: float) -> str:
 def number_text(gain: ComparedValue) -> str:
     """A gain in per cent with its interval to a thousandth, its ends outward; 0 % of equal filters."""
     if is_equal(gain):
-        return tr("0 % (exact)") if gain.is_exact else "0 %"
+        return exact_marks.exact_text("0 %") if gain.is_exact else "0 %"
     if gain.is_exact:
         return gain.text("%", ".3g")
     value, low, high = map(float, gain.estimate)

@@ -9,15 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import Term, inflect, tr
+from radarsim.language.translate import Term, inflect
 from radarsim.report import wording
 from radarsim.report.drawing.model import Bars, Figure, Heat, Line, Mark
+from radarsim.report.exact_marks import MARK, without_marks
 from radarsim.report.math_text import plain_text
 from radarsim.report.quantities import Component
 
 DIGITS = r"[−-]?\d[\d\u202f\u00a0]*(?:[.,]\d+)*"
 POWER = r"(?:·10(?P<power>[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+))?"
-AFTER_VALUE = rf"{POWER}(?P<unit>[ \u00a0][^\s\[(]+)?(?:[ \u00a0]\w+)?[ \u00a0]"  # unit, "lower"
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 ROUNDING = 1e-9
 MAX_LETTERS = 200  # of a headline
@@ -54,10 +54,10 @@ def with_headlines(
             is_on_one_case = any(case in text.partition(":")[0] for case in single_cases)
             is_elsewhere = is_on_one_case or any(key in text for key in foreign_keys)
             is_on_other_component = is_of_component and first_component(text, components) != component
-            if is_elsewhere or is_on_other_component or len(text) > MAX_LETTERS:
+            if is_elsewhere or is_on_other_component or len(without_marks(text)) > MAX_LETTERS:
                 continue
             if _are_sources(sources, sources_by_figure[name]) and is_drawn(text, values):
-                return text
+                return without_marks(text)
         return plain_text(figure.title)
 
     return {name: emphasised(figure, headline(name, figure)) for name, figure in figures_by_name.items()}
@@ -203,8 +203,7 @@ def _is_among(value: tuple[float, float, str], column: DrawnColumn) -> bool:
 
 def quoted_values(sentence: str) -> list[tuple[float, float, str]]:
     """The values that a sentence quotes, each with the step of its last digit and its unit."""
-    exact = re.escape(tr("{value} (exact)", value="").strip())
-    marked = re.compile(rf"(?P<digits>{DIGITS}){AFTER_VALUE}(?:\[|{exact})")
+    marked = re.compile(rf"(?P<digits>{DIGITS}){POWER}(?P<unit>[ \u00a0][^\s\[({MARK}]+)?(?:[ \u00a0]\[|{MARK})")
     return [(*_parsed(match), (match["unit"] or "").strip()) for match in marked.finditer(sentence)]
 
 

@@ -5,10 +5,11 @@ import textwrap
 from collections.abc import Sequence
 
 from radarsim.report import wording
+from radarsim.report.exact_marks import MARK
 
 LINE_LETTERS, MAX_LINES = 80, 3  # of a sentence on a terminal
 ORDINARY_WORD = re.compile(r"(?:[^\W\d_]{2,}|[а-яё])[ ,]")  # at the beginning; other words are names of filters
-SENTENCE_END = re.compile(r"(?<=[\w%)\]]\.) (?=[A-ZА-ЯЁ])")
+SENTENCE_END = re.compile(rf"(?<=[\w%)\]{MARK}]\.) (?=[A-ZА-ЯЁ])")
 MAX_VISIBLE_LETTERS = 200  # of an answer above its figure
 
 

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from radarsim.language.numerals import numeral, power_of_ten
 from radarsim.language.translate import term, tr
@@ -20,6 +20,7 @@ SPACE_BEFORE_UNIT = re.compile(  # the space between a number and its unit, in a
 SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
 MAX_PLAIN_DIGITS = 6  # digits before the point that are still written out
 MAX_SHARE_DIGITS = 12  # digits of a share near one
+MAX_MORE_DECIMALS = 3  # of a value with its interval, where fewer do not tell them apart
 NEARLY_ONE = 1e-3  # under one, from which more digits are written
 
 
@@ -56,13 +57,57 @@ def interval(low: str, high: str) -> str:
 
 
 def estimate(values: Iterable[float], unit: str = "", form: str = ".4g") -> str:
-    """A value with its unit and its 95 % interval, from the value and the two ends: 12.3 m [12, 12.6]; without an
-    interval where the ends are not known."""
+    """A value with its unit and its 95 % interval, from the value and the two ends; without an interval where the ends
+    are not known.
+
+    All three have as many decimals: so many that the largest has the digits of `form`, and the interval's width one;
+    more where an end would look like 0, or a number a little under 1 like 1.
+
+    >>> estimate((12.34, 12.0, 12.61), "m", ".3g"), estimate((6.983, 1.48, 12.8), "%", "+.3g")
+    ('12.3 m [12.0, 12.6]', '+7.0 % [+1.5, +12.8]')
+    """
     numbers = tuple(values)
-    value, low, high = (_text_unless_one(value, format(value, form)).replace("inf", "∞") for value in numbers)
     if all(math.isnan(end) for end in numbers[1:]):
-        return " ".join(filter(None, (value, unit)))
-    return f"{' '.join(filter(None, (value, unit)))} {interval(low, high)}"
+        texts = [_text_unless_one(numbers[0], format(numbers[0], form))]
+    else:
+        texts = [numeral(text) for text in _aligned(numbers, form)]
+    value, *ends = (text.replace("inf", "∞") for text in texts)
+    with_unit_text = " ".join(filter(None, (value, unit)))
+    return f"{with_unit_text} {interval(*ends)}" if len(ends) else with_unit_text
+
+
+def _aligned(numbers: tuple[float, ...], form: str) -> list[str]:
+    """A value and its ends with equally many decimals; very small and large ones each with a power of ten."""
+    flags, digits, kind = re.fullmatch(r"([+,]*)\.(\d+)([fg])", form).groups()  # type: ignore[union-attr]
+    exponent = max((math.floor(math.log10(abs(n))) for n in numbers if n and math.isfinite(n)), default=0)
+    if kind == "g" and not -4 <= exponent < MAX_PLAIN_DIGITS:
+        mantissa = f"{flags.replace(',', '')}.{int(digits) - 1}e"
+        return [format(number, mantissa if math.isfinite(number) and number else "g") for number in numbers]
+    decimals = int(digits) if kind == "f" else max(int(digits) - 1 - exponent, 0)
+    if kind == "g" and 0 < numbers[2] - numbers[1] < math.inf:  # one digit of the interval's width at least
+        width_decimals = -math.floor(math.log10(numbers[2] - numbers[1]))
+        decimals = max(decimals, min(width_decimals, decimals + MAX_MORE_DECIMALS))
+    for more in range(MAX_MORE_DECIMALS + 1):
+        texts = [_fixed(number, f"{flags}.{decimals + more}f") for number in numbers]
+        if not _are_blurred(numbers, texts):
+            return texts
+    return [_fixed(number, f"{flags}.{decimals}f") for number in numbers]
+
+
+def _are_blurred(numbers: Sequence[float], texts: Sequence[str]) -> bool:
+    """Whether rounding makes the ends equal, an end nought, or a number a little under one one."""
+    read = [float(text.replace(",", "")) for text in texts]
+    return (
+        (read[1] == read[2] and numbers[1] != numbers[2])
+        or any(number and not shown for number, shown in zip(numbers[1:], read[1:], strict=True))
+        or any(0 < 1 - number < NEARLY_ONE and shown == 1 for number, shown in zip(numbers, read, strict=True))
+    )
+
+
+def _fixed(number: float, form: str) -> str:
+    """A number in a fixed format, without a minus before nought; 0 alone where nothing was counted."""
+    text = format(number, form) if number else "0"
+    return text if float(text.replace(",", "")) else text.removeprefix("-")
 
 
 def _text_unless_one(value: float, text: str) -> str:

@@ -141,7 +141,7 @@ def best_values_sentence(
 ) -> Sentence:
     """The best values of each filter, by its worst σ of a quantity."""
     text = tr(
-        "{subject}, best {symbol}, by the worst σ of the {quantity} {since}: {filters}.",
+        "{subject}, best {symbol}, by the largest RMS {quantity} error {since}: {filters}.",
         subject=subject,
         symbol=key.symbol,
         quantity=quantity,
@@ -151,25 +151,29 @@ def best_values_sentence(
     return Sentence(text)
 
 
+def _error_text(error: ComparedValue, unit: str) -> str:
+    """An exact error; one of a simulation rounded, as it is the largest of many."""
+    if error.is_exact:
+        return error.text(unit)
+    return tr("about {value}", value=f"{wording.number(error.value, 3)} {unit}".rstrip())
+
+
 def _best_values(key: NoiseKey, unit: str, worst: WorstByValue) -> str:
     """The value with the least worst σ; those together that differ by no more than their noise."""
     ranked, equal = sorted(worst), equally_good(worst)
     best = min(ranked, key=lambda value: worst[value].sigma.value)
-    least = worst[best].sigma.value
     if len(equal) == 1:
         return tr(
-            "{variance} (σ {sigma:.4g} {unit}, at {t_s:g} s)",
+            "{variance} (RMS error {sigma}, at {t_s:g} s)",
             variance=key.value_text(best),
-            sigma=least,
-            unit=unit,
+            sigma=_error_text(worst[best].sigma, unit),
             t_s=worst[best].t_s,
         )
     return tr(
-        "{variances} do equally well (σ {low:.4g} to {high:.4g} {unit})",
+        "{variances} do equally well (RMS error {low} to {high})",
         variances=_value_range(key, equal, ranked),
-        low=least,
-        high=max(worst[value].sigma.value for value in equal),
-        unit=unit,
+        low=_error_text(worst[best].sigma, ""),
+        high=_error_text(max((worst[value].sigma for value in equal), key=lambda sigma: sigma.value), unit),
     )
 
 

@@ -166,7 +166,7 @@ class ClutteredStudy(StepStudy):
             ]
             if texts:
                 text = tr(
-                    "Tracks kept for {t:g} s: {filters}; σ refers to these.",
+                    "Tracks kept for {t:g} s: {filters}; RMS errors refer to these.",
                     t=float(result.axes.t_s[-1]),
                     filters=join_names(texts),
                 )

@@ -94,7 +94,7 @@ def test_figures_answer_and_last_scan(both):
     assert "over filter r+Vr," in both._figures_by_name["gain_r"].caption
     (further,) = [line for line in both.answer if line.startswith("config, gain in r against r at 110 s: r+Vr ")]
     row = both.gains[(both.gains["baseline"] == "r") & (both.gains["filter"] == "slow") & (both.gains["k"] == 12)]
-    assert f"“slow” {row[row.component == 'r'].iloc[0]['exact_percent']:.3g} % (exact)" in further
+    assert f"“slow” {row[row.component == 'r'].iloc[0]['exact_percent']:.3g} %" in further
     assert len(both.last_scan) == 9
     assert set(both.last_scan["baseline"].dropna()) == {"r+Vr"}
 

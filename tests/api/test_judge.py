@@ -473,7 +473,7 @@ def test_below_the_floor_it_is_said_why(estimates):
     assert re.search(r"“mine” is 7\d\.?\d* % \[[^]]*\] below it;", found)
     perfect = radarsim.judge("rls2", truth).answer[0]
     assert perfect.startswith(
-        "“mine” is better than r+Vr, the config's best in r at 140 s: gain 100 % [100, 100]; its σ is 0 "
+        "“mine” is better than r+Vr, the config's best in r at 140 s: gain 100 % [100, 100]; its RMS error is 0 "
     )
     assert found.endswith("Only a biased estimator, or one with extra information, can lie below it.")
 

@@ -320,12 +320,12 @@ def test_a_filter_is_judged_against_the_tuned_one_too():
     first, second = result.answer[:2]
     assert first.startswith(f"{lead}gain {gain} % [")
     assert f", and worse than “r+Vr, tuned”: gain {gain_tuned} % [−" in first
-    assert f"], whose σ is {found.all.tuned:.4g} m (exact), but worse than r+Vr in ar" in first
+    assert f"], whose RMS error is {found.all.tuned:.4g} m, but worse than r+Vr in ar" in first
     assert f" there: gain {gain_ar} % [" in first
     exact = last.loc["r+Vr", "exact_sigma"]
     sigma = exact * last.loc["mine", "sigma"] / last.loc["r+Vr", "sigma"]
-    assert second.startswith(f"{lead}its σ is {sigma:.4g} m [")
-    assert second.endswith(f"], that of r+Vr {exact:.4g} m (exact).")
+    assert second.startswith(f"{lead}its RMS error is {sigma:.4g} m [")
+    assert second.endswith(f"], that of r+Vr {exact:.4g} m.")
     assert last.loc["r+Vr, tuned", "exact_sigma"] == found.all.tuned
     plain = radarsim.run("rls2", overrides=["target=turn"], realisations=3000).curves
     own = result.curves[result.curves["filter"].isin(["r", "r+Vr"])]
@@ -356,7 +356,7 @@ def test_both_rivals_stand_beside_the_floor():
     assert own
     assert float(own[1]) < 100 * (250.0 / least - 1) < float(own[2])  # σ of a plot's range is 250 m
     assert tuned == pytest.approx(least)  # the target moves as the model says: the tuned filter is at the floor
-    assert floor.endswith(f"r+Vr {100 * (exact / least - 1):.3g} % (exact) and “r+Vr, tuned” 0 % (exact).")
+    assert floor.endswith(f"r+Vr {100 * (exact / least - 1):.3g} % and “r+Vr, tuned” 0 %.")
 
 
 @pytest.mark.slow

@@ -38,7 +38,7 @@ def test_numbers_are_written_as_the_language_writes_them():
         assert numeral("-12,345.5") == "−12\N{NARROW NO-BREAK SPACE}345,5"
         assert [numeral(text) for text in ("4,000", "-1,234.5")] == ["4000", "−1234,5"]  # four digits are not split
         assert wording.number(2.5e-7) == "2,5·10⁻⁷"
-        assert wording.estimate((12.3, 12.0, 12.6), "м") == "12,3 м [12; 12,6]"
+        assert wording.estimate((12.3, 12.0, 12.6), "м") == "12,30 м [12,00; 12,60]"
         assert tr("{config}: valid", config="1.5") == "1.5: ошибок нет"  # a name of the user's stays as it is
 
 

@@ -15,6 +15,7 @@ import pandas as pd
 from radarsim.api import result_content
 from radarsim.language.translate import quote_name, tr, translate_names
 from radarsim.report import case_selection, key_labels
+from radarsim.report.exact_marks import MARK
 from radarsim.report.quantities import RADIAL
 from radarsim.studies.multimodel.tables import stage_gain, stage_names
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
@@ -22,7 +23,7 @@ from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 NUMBER = r"[−+-]?(?:\d[\d,\u202f\u00a0]*(?:\.\d+)?|∞)(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
 UNIT = r"(?:[ \u00a0](?:%|°|k?m/s²|k?m/s|k?m|s|к?м/с²|к?м/с|к?м|с|Hz\S*|Гц\S*|rad\S*|рад\S*|m²|м²))?"
 MEASURED = re.compile(rf"(?P<value>{NUMBER}){UNIT} \[(?P<low>{NUMBER}), (?P<high>{NUMBER})\]")
-EXACT = re.compile(rf"(?P<value>{NUMBER}){UNIT}(?: (?:lower|higher))? \((?:exact|точно)\)")
+EXACT = re.compile(rf"(?P<value>{NUMBER}){UNIT}{MARK}")
 FOR_ALL = re.compile(r"95[ \u00a0]% (?:for (?:all|both)|сразу для)")
 RUSSIAN_COMMA = re.compile(r"(?<=\d),(?=\d)")
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")

@@ -1,5 +1,7 @@
 """Answers are whole and short in every language, and a config draws no more figures than a page holds."""
 
+import re
+
 import pytest
 
 from radarsim.api import result_content
@@ -17,13 +19,37 @@ def unclosed(answer):
     return [text for text in answer if any(text.count(a) != text.count(b) for a, b in ("[]", "()"))]
 
 
+def unequal_decimals(answer):
+    """Values that have other decimals than the ends of their interval; of shares none and all have none."""
+    number = r"[−+]?((?:\d|(?<=\d)[\u202f\u00a0](?=\d))+)(?:[.,](\d+))?(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
+    estimate = re.compile(rf"(?<![\d.,]){number}(?: [^\s\[]+)? \[{number}[,;] {number}\]")
+    found = []
+    for text in answer:
+        for match in estimate.finditer(text):
+            integers, decimals = match.groups()[::2], match.groups()[1::2]
+            counted = {d for i, d in zip(integers, decimals, strict=True) if d or i not in ("0", "100")}
+            found += [match[0]] if len({len(d or "") for d in counted}) > 1 else []
+    return found
+
+
+def test_unequal_decimals_are_seen():
+    assert unequal_decimals(["12.3 m [12, 12.6]", "7,0 % [1,5; 12,80]", "2.5 [2.1, 3]"]) != []
+    assert (
+        unequal_decimals(
+            ["12.3 m [12.0, 12.6]", "7,0 % [1,5; 12,8]", "100 % [99.62, 100]", "6.5·10⁻⁵ [5.4·10⁻⁵, 7.9·10⁻⁵]"]
+        )
+        == []
+    )
+
+
 def check_answer(config, n):
     result = run(config, realisations=n)
     for code in current.language_codes():
         with current.use_language(code):
             texts = result_content.make_answer(result.cases, result._tables).texts
         assert unclosed(texts) == [], code
-        assert code != "en" or [text for text in texts if not page_sentences.is_short(text)] == []
+        assert unequal_decimals(texts) == [], code
+        assert [text for text in texts if not page_sentences.is_short(text)] == [], code
     return result
 
 

@@ -13,6 +13,7 @@ from radarsim.language.current import language_codes, use_language
 from radarsim.report import headlines
 from radarsim.report.case_selection import swept_cases, swept_keys
 from radarsim.report.drawing.model import Axis, Figure, Heat, Line, Panel, Style
+from radarsim.report.exact_marks import MARK, without_marks
 from radarsim.report.math_text import plain_text
 from radarsim.report.page_links import sources_behind_figure
 from radarsim.report.quantities import RADIAL
@@ -52,38 +53,38 @@ GAIN, SIGMA, SHARE = (
 @pytest.mark.parametrize(
     ("figure", "sentence", "is_about"),
     [
-        (GAIN, "Range: σ is 18.3 % (exact) lower than with range alone.", True),
+        (GAIN, f"Range: σ is 18.3 %{MARK} lower than with range alone.", True),
         (GAIN, "Range: σ is 5.8 % [3.0, 7.1] higher than with range alone.", True),
         (GAIN, "Range: σ is 17.3 % [3.0, 27.1] lower than with range alone.", False),
-        (GAIN, "Least σ 18.3 m (exact).", False),
-        (SIGMA, "Range: σ is 18.3 % (exact) lower than with range alone.", False),
-        (SIGMA, "Least σ 18.3 m (exact), largest 1234 m [1230, 1240].", True),
-        (SIGMA, "Least σ 18.3 m (exact), largest 5678 m [5600, 5700].", False),
+        (GAIN, f"Least σ 18.3 m{MARK}.", False),
+        (SIGMA, f"Range: σ is 18.3 %{MARK} lower than with range alone.", False),
+        (SIGMA, f"Least σ 18.3 m{MARK}, largest 1234 m [1230, 1240].", True),
+        (SIGMA, f"Least σ 18.3 m{MARK}, largest 5678 m [5600, 5700].", False),
         (SHARE, "Locked in 97.00 % [95.1, 98.2] of the bursts.", True),
         (SHARE, "Locked in 3.00 % [1.8, 4.9] of the bursts.", False),
         (SHARE, "Locked in 100 % [99.1, 100] of the bursts.", False),  # of whatever
         (figure_of("share not locked", 0.03, scale="log"), "Locked in 97.00 % [95.1, 98.2] of the bursts.", True),
         (SIGMA, "A sentence without values at 18.3 m.", False),
-        (figure_of("σ of $V_r$, m/s", 0.1, 0.97), "Velocity: σ is 97.0 % (exact) higher.", False),  # no share
-        (GAIN, "Range: at worst higher by a factor of 18.3 (exact), at 90 s.", False),  # no gain
+        (figure_of("σ of $V_r$, m/s", 0.1, 0.97), f"Velocity: σ is 97.0 %{MARK} higher.", False),  # no share
+        (GAIN, f"Range: at worst higher by a factor of 18.3{MARK}, at 90 s.", False),  # no gain
     ],
 )
 def test_a_sentence_is_about_a_figure_that_draws_its_values(figure, sentence, is_about):
     (headline,) = headlines.with_headlines({"f": figure}, [sentence], [()], {"f": ()}).values()
-    assert headline.headline == (sentence if is_about else "The title")
+    assert headline.headline == (without_marks(sentence) if is_about else "The title")
 
 
 def test_a_headline_is_of_the_tables_and_of_all_cases_of_its_figure():
-    sentence = "a = 1 m/s²: σ is 18.3 m (exact)."
+    sentence = f"a = 1 m/s²: σ is 18.3 m{MARK}."
     found = headlines.with_headlines({"f": SIGMA}, [sentence], [("curves",)], {"f": ("curves",)})
-    assert found["f"].headline == sentence
-    assert (
-        headlines.with_headlines({"f": SIGMA}, [sentence], [("folds",)], {"f": ("curves",)})["f"].headline != sentence
-    )
+    assert found["f"].headline == without_marks(sentence)
+    assert headlines.with_headlines({"f": SIGMA}, [sentence], [("folds",)], {"f": ("curves",)})[
+        "f"
+    ].headline != without_marks(sentence)
     drawn = {"f": ("folds.right",)}
     for column, is_drawn in (("folds.right", True), ("folds.lost", False), ("folds", True)):
         named = headlines.with_headlines({"f": SIGMA}, [sentence], [(column,)], drawn)
-        assert (named["f"].headline == sentence) == is_drawn
+        assert (named["f"].headline == without_marks(sentence)) == is_drawn
     other_key = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, swept_keys=["a"])
     assert other_key["f"].headline == "The title"
     one_of_two = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, ["a = 1 m/s²"])
@@ -92,16 +93,16 @@ def test_a_headline_is_of_the_tables_and_of_all_cases_of_its_figure():
 
 SENTENCES = {
     "en": (
-        "Range: σ is 18.3 % (exact) lower than with range alone.",
-        "Radial velocity: σ is 18.3 % (exact) lower than with range alone.",
-        "“range only”: σ of the radial velocity is 18.3 % (exact) lower.",
-        "Gain over r there: 18.3 % (exact).",
+        f"Range: σ is 18.3 %{MARK} lower than with range alone.",
+        f"Radial velocity: σ is 18.3 %{MARK} lower than with range alone.",
+        f"“range only”: σ of the radial velocity is 18.3 %{MARK} lower.",
+        f"Gain over r there: 18.3 %{MARK}.",
     ),
     "ru": (
-        "Дальность: СКО на 18,3 % (точно) меньше.",
-        "СКО радиальной скорости на 18,3 % (точно) меньше, чем по одной дальности.",
-        "«дальность»: СКО радиальной скорости на 18,3 % (точно) меньше.",
-        "Выигрыш там же: 18,3 % (точно).",
+        f"Дальность: СКО на 18,3 %{MARK} меньше.",
+        f"СКО радиальной скорости на 18,3 %{MARK} меньше, чем по одной дальности.",
+        f"«дальность»: СКО радиальной скорости на 18,3 %{MARK} меньше.",
+        f"Выигрыш там же: 18,3 %{MARK}.",
     ),
 }
 
@@ -113,7 +114,7 @@ def test_a_headline_is_of_the_component_of_its_figure(code):
             figures = {f"gain_{part.name}": GAIN for part in RADIAL}
             sources = dict.fromkeys(figures, ("gains.gain",))
             named = headlines.with_headlines(figures, [sentence], [()], sources, components=RADIAL)
-            of_answer = {name for name, figure in named.items() if figure.headline == sentence}
+            of_answer = {name for name, figure in named.items() if figure.headline == without_marks(sentence)}
             assert of_answer == ({f"gain_{component}"} if component else set())
 
 
@@ -122,11 +123,11 @@ def test_a_headline_is_of_the_column_and_of_all_tables_of_its_figure():
         name: sources_behind_figure(name, {"cost": ("stages", "operations")}, TABLES) for name in ("sigma_r", "cost")
     }
     figures = {"sigma_r": SIGMA, "cost": SIGMA}
-    sentence = "Range: 18.3 m (exact)."
+    sentence = f"Range: 18.3 m{MARK}."
 
     def headline_figures(*of_sentence):
         named = headlines.with_headlines(figures, [sentence], [of_sentence], sources, components=RADIAL)
-        return {name for name, figure in named.items() if figure.headline == sentence}
+        return {name for name, figure in named.items() if figure.headline == without_marks(sentence)}
 
     assert headline_figures("curves.sigma") == {"sigma_r"}
     assert headline_figures("curves.bias") == headline_figures("stages.sigma") == set()
@@ -155,7 +156,7 @@ def check_words_of_figures(result):
             sources = {name: sources_behind_figure(name, declared, tables) for name in figures}
             keys = swept_cases(result.cases), swept_keys(result.cases)
             components = study(result.experiment.study).user_filter_components() or RADIAL
-            named = headlines.with_headlines(figures, answer.texts, answer.sources, sources, *keys, components)
+            named = headlines.with_headlines(figures, answer.marked_texts, answer.sources, sources, *keys, components)
             captions = {name: plain_text(figure.caption) for name, figure in figures.items()}
             long = {name: len(text.split()) for name, text in captions.items()}
             assert {name: count for name, count in long.items() if count > MAX_CAPTION_WORDS} == {}

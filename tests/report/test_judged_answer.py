@@ -30,8 +30,8 @@ def test_an_equal_filter_has_the_exact_number_and_no_other():
     answer = judged(twin).answer
     first, floor = answer[0], floor_sentence(answer)
     assert re.search(r"“mine” is equal to r\+Vr, .*, identical in all 1,000 realisations: .* fewer than 0\.3 % ", first)
-    assert first.endswith("; the σ of both is 154.7 m (exact).")
-    assert floor.endswith(": above it is r+Vr 5.18 % (exact), and “mine” as far.")
+    assert first.endswith("; the RMS error of both is 154.7 m.")
+    assert floor.endswith(": above it is r+Vr 5.18 %, and “mine” as far.")
 
 
 def test_sigma_and_gain_of_one_sentence_agree():
@@ -39,8 +39,8 @@ def test_sigma_and_gain_of_one_sentence_agree():
     result = judged(lambda plots: plots["range_m"])
     gain = result.gains.query("baseline == 'r+Vr' and component == 'r'").iloc[-1]["gain_percent"]
     exact = result.curves.query("filter == 'r+Vr' and component == 'r'").iloc[-1]["exact_sigma"]
-    assert f"its σ is {exact * (1 - gain / 100):.4g} m [" in result.answer[0]
-    assert f"that of r+Vr {exact:.4g} m (exact)." in result.answer[0]
+    assert f"its RMS error is {exact * (1 - gain / 100):.4g} m [" in result.answer[0]
+    assert f"that of r+Vr {exact:.4g} m." in result.answer[0]
 
     def failing(plots):
         x = twin(plots)
@@ -51,11 +51,12 @@ def test_sigma_and_gain_of_one_sentence_agree():
     twin_truth = radarsim.plots("rls2", n=1000).truth[..., 0]
     result = judged(failing)
     found = re.search(
-        r"its σ is (\S+) m \[.*\], that of r\+Vr in the same realisations (\S+) m\.", " ".join(result.answer[:3])
+        r"its RMS error is (\S+) m \[.*\], that of r\+Vr in the same realisations about (\S+) m\.",
+        " ".join(result.answer[:3]),
     )
     assert found
-    assert found[1] == found[2]
-    assert "m; above it is r+Vr 5.18 % (exact). “mine”, which has an estimate in other" in floor_sentence(result.answer)
+    assert float(found[1]) == float(found[2])
+    assert "m; above it is r+Vr 5.18 %. “mine”, which has an estimate in other" in floor_sentence(result.answer)
 
 
 def test_a_loss_in_another_component_is_in_the_first_sentence():

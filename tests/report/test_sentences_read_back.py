@@ -9,6 +9,7 @@ from radarsim.api.configs import load
 from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.language import current
+from radarsim.report.exact_marks import MARK, marking
 from tests.report.sentence_reader import derived_columns, names_of, read_sentence
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
@@ -36,8 +37,10 @@ def faults_of(result):
     faults, count, derived = [], 0, list(derived_columns(result._tables, result.cases))
     for code in current.language_codes():
         with current.use_language(code):
-            texts, names = result_content.make_answer(result.cases, result._tables).texts, names_of(result.cases, code)
-            figures = result_content.case_figures(result.cases, result._tables, result.experiment).values()
+            names = names_of(result.cases, code)
+            texts = result_content.make_answer(result.cases, result._tables).marked_texts
+            with marking():
+                figures = result_content.case_figures(result.cases, result._tables, result.experiment).values()
         for text in (*texts, *(figure.caption for figure in figures)):
             reading = read_sentence(text, result._tables, code, derived, names)
             faults += [f"{code}: {text}: {fault}" for fault in reading.faults]
@@ -52,10 +55,10 @@ def test_the_reader_notices_what_contradicts_a_table():
     (fault,) = read_sentence(quoted, exact).faults
     assert "known exactly, 30.97" in fault
     assert read_sentence(quoted, measured).read == ["33.8 % [31.1, 36.7]"]
-    assert read_sentence("at worst 31.0 % (exact) higher", exact).read == ["31.0 % (exact)"]
-    assert read_sentence("31,0 % (точно)", exact, "ru").read == ["31.0 % (точно)"]
+    assert read_sentence(f"at worst 31.0 %{MARK} higher", exact).read == [f"31.0 %{MARK}"]
+    assert read_sentence(f"31,0 %{MARK}", exact, "ru").read == [f"31.0 %{MARK}"]
     assert read_sentence("33,8 % [31,1; 36,7]", measured, "ru").read == ["33.8 % [31.1, 36.7]"]
-    assert read_sentence("at worst 32.0 % (exact) higher", exact).faults
+    assert read_sentence(f"at worst 32.0 %{MARK} higher", exact).faults
     assert read_sentence("33.8 % [29.0, 38.0]", measured).faults
     assert read_sentence("33.8 % [29.0, 38.0] (95 % for all 14 together)", measured).read
 

@@ -144,7 +144,7 @@ def test_the_chirps_questions_and_recorded_plots(radarsim, tmp_path):
     assert "radar.sigma_range_m: " in said
     assert "chirp" in json.loads(radarsim("schema").stdout)["$defs"]
     russian = radarsim("run", "chirp", "-n", 100, "--no-figures", "--out", tmp_path, "--language", "ru").stdout
-    assert "СКО дальности через" in russian
+    assert "СКО ошибки дальности через" in russian
 
 
 @pytest.mark.slow

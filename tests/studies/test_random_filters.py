@@ -260,7 +260,7 @@ class Learned:
 def test_a_filter_that_has_learned_the_judged_realisations_is_said_in_the_first_sentence():
     result = judged(Learned(), realisations=300, overrides={"target": "turn"})
     assert result.answer[0].startswith(
-        "“mine” seems to have been trained on these realisations: on other noise its σ is "
+        "“mine” seems to have been trained on these realisations: on other noise its RMS error is "
     )
     assert 'purpose="training"' in result.warnings[0]
     sound = judged(Learned(purpose="training"), realisations=300, overrides={"target": "turn"})

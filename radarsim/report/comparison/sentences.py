@@ -84,7 +84,12 @@ def pairing_lines(comparison: "pd.DataFrame") -> list[str]:
     kinds = comparison.loc[comparison["quantity"] == "sigma", "pairing"].tolist()
     counts = {meaning: kinds.count(kind) for kind, meaning in MEANING.items()}
     return [
-        tr("{count:,} of {total:,} differences of σ: {words}", count=count, total=len(kinds), words=tr(meaning))
+        tr(
+            "{count:,} of {total:,} differences of RMS errors: {words}",
+            count=count,
+            total=len(kinds),
+            words=tr(meaning),
+        )
         for meaning, count in counts.items()
         if count
     ]

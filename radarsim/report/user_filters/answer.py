@@ -187,8 +187,8 @@ def _training_clause(result: CaseResult, name: str, verdict: Sentence) -> Senten
     if ratio is None:
         return verdict
     text = tr(
-        "{name} seems to have been trained on these realisations: on other noise its σ is {ratio} times as large; "
-        "here ",
+        "{name} seems to have been trained on these realisations: on other noise its RMS error is {ratio} times as "
+        "large; here ",
         name=quote_name(name),
         ratio=numeral(f"{ratio:.3g}").replace("inf", "∞"),
     )
@@ -267,7 +267,7 @@ def _against_tuned(comparison: RivalComparison, rival: str) -> Sentence:
         text = tr(", and equal to {best}, {gain}", **fields)
     else:
         text = tr(", and cannot be distinguished from {best}: gain {gain}", **fields)
-    text += tr(", whose σ is {sigma}", sigma=rival_sigma.text(comparison.unit))
+    text += tr(", whose RMS error is {sigma}", sigma=rival_sigma.text(comparison.unit))
     return Sentence(text, (*gain.intervals, *rival_sigma.intervals))
 
 
@@ -275,14 +275,14 @@ def _sigma_clause(comparison: RivalComparison) -> Sentence:
     """σ of the user filter and of the config's best one, of the same realisations."""
     own, best, unit = comparison.own_sigma, comparison.best_sigma, comparison.unit
     if comparison.is_equal and comparison.has_same_realisations:
-        return Sentence(tr("the σ of both is {sigma}.", sigma=best.text(unit)), best.intervals)
+        return Sentence(tr("the RMS error of both is {sigma}.", sigma=best.text(unit)), best.intervals)
     fields = {"best": quote_name(comparison.best), "sigma": own.text(unit)}
     if comparison.has_same_realisations:
-        text = tr("its σ is {sigma}, that of {best} {rival}.", rival=best.text(unit), **fields)
+        text = tr("its RMS error is {sigma}, that of {best} {rival}.", rival=best.text(unit), **fields)
         return Sentence(text, (*own.intervals, *best.intervals))
     of_both = own.value / (1 - comparison.gain_against(comparison.best).value / 100)
     rival = f"{wording.number(of_both)} {unit}".rstrip()
-    text = tr("its σ is {sigma}, that of {best} in the same realisations {rival}.", rival=rival, **fields)
+    text = tr("its RMS error is {sigma}, that of {best} in the same realisations about {rival}.", rival=rival, **fields)
     return Sentence(text, own.intervals)
 
 

@@ -170,9 +170,9 @@ def _least_error_of_all(
     equal = [name for name in same_kind if is_equal(_largest_sigma(worst_rows[name][0]), best_value)]
     since_texts = {wording.since(*scans[result.name]) for result in combining}
     text = plural(
-        "Smallest worst-case σ of the range {since}: {best}, {least}; {kind}, {other}, reaches {most} "
+        "Smallest worst-case RMS range error {since}: {best}, {least}; {kind}, {other}, reaches {most} "
         "({where}){scans}.",
-        "Smallest worst-case σ of the range {since}, over {count} cases: {best}, {least}; {kind}, {other}, reaches "
+        "Smallest worst-case RMS range error {since}, over {count} cases: {best}, {least}; {kind}, {other}, reaches "
         "{most} ({where}){scans}.",
         len(combining),
         since=since_texts.pop() if len(since_texts) == 1 else tr("after the start of the track"),
@@ -199,7 +199,7 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
         + _scans_remark([row])
         for _, row in worst.iterrows()
     ]
-    subject = tr("largest σ of the range {since}", since=wording.since(*counted))
+    subject = tr("largest RMS range error {since}", since=wording.since(*counted))
     clauses = ["; ".join(errors)]
     axes = result.axes
     best_order, best_combination = (
@@ -256,7 +256,7 @@ def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -
     ties = sum(case.clause.text == worst[best_name].clause.text for case in comparisons[best_name]) - 1
     also = ", " + plural("as in {count} other case", "as in {count} other cases", ties) if ties else ""
     text = tr(
-        "{filter}: σ of the velocity is within {percent:g} % of that with unfolded velocity in {good} of {count} "
+        "{filter}: the RMS velocity error is within {percent:g} % of that with unfolded velocity in {good} of {count} "
         "cases at the last scan{undecided}; worst case, {worst}{also}.",
         undecided=", " + tr("undecided in {count}", count=undecided) if undecided else "",
         filter=quote_name(best_name),
@@ -301,7 +301,7 @@ def _as_good_clause(result: Result, name: str, tables_by_name: TablesByName, loo
         return []
     if since := _first_good_scan(gains):
         text = tr(
-            "σ of the velocity is within {percent:g} % of that with unfolded velocity from scan {k} on",
+            "the RMS velocity error is within {percent:g} % of that with unfolded velocity from scan {k} on",
             percent=AS_GOOD_PERCENT,
             k=since,
         )
@@ -328,13 +328,13 @@ def _excess_clause(final: "pd.Series[Any]", looks: int) -> Sentence:
     fields = {"k": final["k"], "chosen": above.choice_remark()}
     if above.estimate.lo > AS_GOOD_PERCENT:
         text = tr(
-            "σ of the velocity is still {above} above that of unfolded velocity at scan {k}, the last{chosen}",
+            "the RMS velocity error is still {above} above that of unfolded velocity at scan {k}, the last{chosen}",
             above=above.text("%", ".3g"),
             **fields,
         )
     else:
         text = tr(
-            "σ of the velocity differs by {above} from that of unfolded velocity at scan {k}, the last{chosen}: "
+            "the RMS velocity error differs by {above} from that of unfolded velocity at scan {k}, the last{chosen}: "
             "perhaps within {percent:g} %",
             above=above.text("%", "+.3g"),
             percent=AS_GOOD_PERCENT,

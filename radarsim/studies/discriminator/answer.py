@@ -120,20 +120,20 @@ def _first_estimator(result: CaseResult, row: "pd.Series[Any]", name: str) -> Se
     fields |= {name: wording.estimate((end[i] / bound[i] for end in sigma), form=".3f") for name, i in ratios.items()}
     if result.spec.rare is not None:
         text = plural(
-            "{estimator} ({count} window): σ of the locked bursts over the bound (forecast included) is {least} to "
-            "{most}, from {plain:,} bursts without importance sampling.",
-            "{estimator} ({count} windows): σ of the locked bursts over the bound (forecast included) is {least} to "
-            "{most}, from {plain:,} bursts without importance sampling.",
+            "{estimator} ({count} window): RMS error of the locked bursts over the bound (forecast included) is "
+            "{least} to {most}, from {plain:,} bursts without importance sampling.",
+            "{estimator} ({count} windows): RMS error of the locked bursts over the bound (forecast included) is "
+            "{least} to {most}, from {plain:,} bursts without importance sampling.",
             k,
             plain=int(plain_bursts),
             **fields,
         )
         return Sentence(text)
     text = plural(
-        "{estimator} ({count} window): locked in {lock} of {bursts:,} bursts; σ of the locked ones over the bound "
-        "(forecast included) is {least} to {most}.",
-        "{estimator} ({count} windows): locked in {lock} of {bursts:,} bursts; σ of the locked ones over the bound "
-        "(forecast included) is {least} to {most}.",
+        "{estimator} ({count} window): locked in {lock} of {bursts:,} bursts; RMS error of the locked ones over the "
+        "bound (forecast included) is {least} to {most}.",
+        "{estimator} ({count} windows): locked in {lock} of {bursts:,} bursts; RMS error of the locked ones over the "
+        "bound (forecast included) is {least} to {most}.",
         k,
         **fields,
     )

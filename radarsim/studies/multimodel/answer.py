@@ -97,14 +97,14 @@ def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") 
     }
     if not closest["above"]:
         text = tr(
-            "Least σ of the height in every stage: {filter}; next is {second}, at most {more} above it ({where}; "
+            "Least RMS height error in every stage: {filter}; next is {second}, at most {more} above it ({where}; "
             "{together}).",
             **fields,
         )
         return [Sentence(text, sentences.intervals("stages", "sigma", second))]
     text = tr(
-        "Smallest worst excess of σ of the height over the best filter of {every} ({together}): {filter}, {percent} "
-        "({closest_where}, where {best} is best); next is {second}, {more} ({where}).",
+        "Smallest worst excess of the RMS height error over the best filter of {every} ({together}): {filter}, "
+        "{percent} ({closest_where}, where {best} is best); next is {second}, {more} ({where}).",
         every=tr("each stage of every case") if len(results) > 1 else tr("each stage"),
         percent=above[0],
         closest_where=_stage_label(results, closest),
@@ -134,9 +134,9 @@ def _least_sigma(result: CaseResult, stages: "pd.DataFrame", component: str, qua
     remark = compared_value.row_value(best.iloc[0]).chosen_among(looks).choice_remark()
     fields = {"quantity": quantity, "stages": "; ".join(clauses)}
     text = (
-        tr("Least σ of {quantity} by stage{chosen}: {stages}.", chosen=remark, **fields)
+        tr("Least RMS error of {quantity} by stage{chosen}: {stages}.", chosen=remark, **fields)
         if looks > 1
-        else tr("σ of {quantity} by stage: {stages}.", **fields)
+        else tr("RMS error of {quantity} by stage: {stages}.", **fields)
     )
     return Sentence(case_selection.after_swept_values(result, text), sentences.intervals("stages", "sigma", best))
 
@@ -151,4 +151,4 @@ def _least_sigma_clause(result: CaseResult, rows: "pd.DataFrame", best: "pd.Seri
 
 def _three_digits(value: ComparedValue, unit: str) -> str:
     """A value with its interval, to three digits."""
-    return wording.estimate((float(f"{end:.3g}") for end in value.estimate), unit, ",.10g")
+    return wording.estimate(value.estimate, unit, ",.3g")

@@ -80,7 +80,7 @@ def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName)
         for row in worst.to_dict("records")
     ]
     text = tr(
-        "Largest σ of the range at the last scan over that of ideal bursts, in {count} cases ({together}): {found}.",
+        "Largest RMS range error at the last scan over that of ideal bursts, in {count} cases ({together}): {found}.",
         count=len(results),
         together=compared_value.simultaneity_text(len(results)),
         found="; ".join(ratios),
@@ -134,7 +134,7 @@ def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters:
     if not compared_value.are_distinguished(*values):
         return []
     text = tr(
-        "σ of the range at the last scan is {near} times that of ideal bursts with {best}, and {far} times with "
+        "the RMS range error at the last scan is {near} times that of ideal bursts with {best}, and {far} times with "
         "{worst}{chosen}",
         best=quote_name(nearest["filter"]),
         near=_ratio(nearest, looks=len(filters)),
@@ -163,9 +163,11 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
     ratios = tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
     final = ratios.iloc[-1]
     if final[RATIO.ends[1]] <= MAX_RATIO_OF_IDEAL:
-        ratio = tr("σ of the range at the last scan is as with ideal bursts, {ratio} times", ratio=_ratio(final, ".4g"))
+        ratio = tr(
+            "the RMS range error at the last scan is as with ideal bursts, {ratio} times", ratio=_ratio(final, ".4g")
+        )
     else:
-        ratio = tr("σ of the range at the last scan is {ratio} times that of ideal bursts", ratio=_ratio(final))
+        ratio = tr("the RMS range error at the last scan is {ratio} times that of ideal bursts", ratio=_ratio(final))
     return Sentence(f"{locked}; {ratio}", (*least.intervals, *_ratio_intervals(final)))
 
 

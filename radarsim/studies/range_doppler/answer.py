@@ -97,7 +97,7 @@ def _worst_errors(rows: "pd.DataFrame", filter_name: str) -> Sentence:
     worst, sigma = compared_value.extreme(rows, SIGMA)
     most_biased, bias = compared_value.largest_bias(rows)
     text = tr(
-        "worst σ of the range {sigma} at {t_s:g} s, largest bias {bias} at {bias_t_s:g} s{chosen}",
+        "largest RMS range error {sigma} at {t_s:g} s, largest bias {bias} at {bias_t_s:g} s{chosen}",
         sigma=sigma.text(tr("m")),
         t_s=worst["t_s"],
         bias=bias.text(tr("m")),

@@ -95,10 +95,10 @@ def _gain_sentence(
             "base": baseline,
         }
         if _is_range_alone(results):
-            text = tr("{quantity}: at {t_s:g} s, the last scan, σ is {gain} {base}", **fields)
+            text = tr("{quantity}: at {t_s:g} s, the last scan, the RMS error is {gain} {base}", **fields)
         else:
             text = tr(
-                "{quantity}: at {t_s:g} s, the last scan, σ with filter {filter} is {gain} {base}",
+                "{quantity}: at {t_s:g} s, the last scan, the RMS error with filter {filter} is {gain} {base}",
                 filter=quote_name(shown["filter"]),
                 **fields,
             )
@@ -114,7 +114,7 @@ def _equality(results: Sequence[Result], gains: "pd.DataFrame", quantity: str) -
     """That filters have the same σ at every scan."""
     value = compared_value.row_value(gains.iloc[0], GAIN)
     text = tr(
-        "{quantity}: σ is equal to that {base} at every scan ({known}).",
+        "{quantity}: the RMS error is equal to that {base} at every scan ({known}).",
         quantity=_capitalised(quantity),
         base=_with_baseline(results),
         known=tr("exact") if value.is_exact else gain_sentences.unseen_text(min(result.count for result in results)),
@@ -166,11 +166,12 @@ def _range_of_gains(
     }
     if not compared_value.are_distinguished(lowest[1], highest[1]):
         text = tr(
-            "{quantity}: {when} σ is {least} ({low}) to {most} ({high}), not significantly different, {base}{remark}",
+            "{quantity}: {when} the RMS error is {least} ({low}) to {most} ({high}), not significantly different, "
+            "{base}{remark}",
             **fields,
         )
     else:
-        text = tr("{quantity}: {when} σ is {least} ({low}) to {most} ({high}) {base}{remark}", **fields)
+        text = tr("{quantity}: {when} the RMS error is {least} ({low}) to {most} ({high}) {base}{remark}", **fields)
     return Sentence(text, (*lowest[1].intervals, *highest[1].intervals))
 
 
@@ -287,7 +288,7 @@ def _sigma_sentence(result: Result, curves: "pd.DataFrame") -> Sentence:
     row = tables.select_rows(curves, case=result.name, component="r").iloc[-1]
     sigma = compared_value.row_value(row)
     text = tr(
-        "{case}, {filter}: σ of the range at {t_s:g} s is {sigma}.",
+        "{case}, {filter}: the RMS range error at {t_s:g} s is {sigma}.",
         case=key_labels.plain_case_label(result),
         filter=quote_name(row["filter"]),
         t_s=row["t_s"],

@@ -7,7 +7,16 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import list_filters, quote_name, shorten_names, tr
-from radarsim.report import case_selection, compared_value, key_labels, sentences, statistics, tables, wording
+from radarsim.report import (
+    case_selection,
+    compared_value,
+    exact_marks,
+    key_labels,
+    sentences,
+    statistics,
+    tables,
+    wording,
+)
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.studies.counted_scans import CountedScans
@@ -72,16 +81,16 @@ def _bias_of_conversion(
     result = next(result for result in results if result.name == worst["case"])
     ratio = float(worst["formula_m"] / worst["sigma_range_m"])
     text = tr(
-        "Bias of a converted plot along the line of sight: with the plain conversion up to {bias} (exact), {ratio} σ "
+        "Bias of a converted plot along the line of sight: with the plain conversion up to {bias}, {ratio} σ "
         "of the range ({case})",
-        bias=f"{wording.number(float(worst['formula_m']), 3)} {tr('m')}",
-        ratio=wording.number(ratio, 3),
+        bias=exact_marks.exact_text(f"{wording.number(float(worst['formula_m']), 3)} {tr('m')}"),
+        ratio=exact_marks.exact_text(wording.number(ratio, 3)),
         case=key_labels.without_markup(
             key_labels.swept_description(result, without=["frame"]) or key_labels.config_device(result)
         ),
     )
     if any(tables_by_name["conversion"]["frame"] == "cartesian_unbiased"):
-        text += "; " + tr("with the unbiased one none (exact)")
+        text += "; " + tr("with the unbiased one none")
     return [Sentence(f"{text}.", sentences.intervals("conversion", "bias_m", worst))]
 
 
@@ -106,11 +115,11 @@ def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd
         "most": _filters_and_sigma(highest, values[1]) + remarks[1],
     }
     if order.nunique() == 1:
-        text = tr("σ of the {quantity} after {t_s:g} s: {least}.", **fields)
+        text = tr("RMS {quantity} error after {t_s:g} s: {least}.", **fields)
     elif _is_surely_less(lowest.iloc[0], highest.iloc[0], tables_by_name, looks=order.nunique()):
-        text = tr("σ of the {quantity} after {t_s:g} s: least with {least}, largest with {most}.", **fields)
+        text = tr("RMS {quantity} error after {t_s:g} s: least with {least}, largest with {most}.", **fields)
     else:
-        text = tr("σ of the {quantity} after {t_s:g} s: {least}, and {most}, not distinguished.", **fields)
+        text = tr("RMS {quantity} error after {t_s:g} s: {least}, and {most}, not distinguished.", **fields)
     intervals = [interval for value in values for interval in value.intervals]
     return Sentence(case_selection.after_swept_values(result, text), tuple(intervals))
 
@@ -158,8 +167,7 @@ def _most_optimistic(
     )
     swept = key_labels.without_markup(key_labels.swept_description(result))
     text = tr(
-        "Most optimistic {since}: {filter}; the true σ is {ratio} times the filter's own estimate ({quantity}, scan "
-        "{k}).",
+        "Most optimistic {since}: {filter}; the RMS error is {ratio} times the filter's own σ ({quantity}, scan {k}).",
         since=wording.since(*scans[worst["case"]]),
         filter=f"{equal} ({swept})" if swept else equal,
         ratio=ratio.text(form=".2f"),

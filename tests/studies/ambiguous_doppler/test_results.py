@@ -97,7 +97,7 @@ def test_orders_and_their_sentence():
     curves = curves[curves["k"] >= curves["case"].map({name: counted.k for name, counted in scans.items()})]
     largest = curves.assign(exact=curves["exact_sigma"].fillna(curves["sigma"])).groupby("filter")["exact"].max()
     singles = largest[["order 0", "order 1", "order 2", "order 2 range only"]]
-    text = "Smallest worst-case σ of the range after the start of the track, over 3 cases: "
+    text = "Smallest worst-case RMS range error after the start of the track, over 3 cases: "
     assert first.startswith(f"{text}{quote_name(largest.idxmin())}, ")
     assert f"the best single model order, {quote_name(singles.idxmin())}, reaches " in first
     assert {"orders", "sigma_r"} <= set(result.figures)
@@ -112,8 +112,8 @@ def test_answer_counts_radars_with_folded_velocity_as_good():
         ~is_good & (gains["excess_over_oracle_percent_lo"] <= 5) & (gains["excess_over_oracle_percent"] < 100)
     )
     assert first.startswith(
-        f"“memory”: σ of the velocity is within 5 % of that with unfolded velocity in {is_good.sum()} of 4 cases at "
-        f"the last scan, undecided in {is_undecided.sum()}"
+        f"“memory”: the RMS velocity error is within 5 % of that with unfolded velocity in {is_good.sum()} of 4 cases "
+        f"at the last scan, undecided in {is_undecided.sum()}"
     )
     worst = gains.loc[gains["excess_over_oracle_percent"].idxmax(), "case"]
     assert f"worst case, {worst.replace('ambiguous_rls', 'RLS ')}: " in " ".join(result.answer[:2])
@@ -134,17 +134,17 @@ def test_worst_case_is_said_to_tie(result):
     [
         (
             (4.9, -3.7, 6.1),
-            "σ of the velocity differs by +4.9 % [−3.7, +6.1] from that of unfolded velocity at scan 15, the last: "
-            "perhaps within 5 %;",
+            "the RMS velocity error differs by +4.90 % [−3.70, +6.10] from that of unfolded velocity at scan 15, the "
+            "last: perhaps within 5 %;",
         ),
         (
             (5.3, 4.1, 6.2),
-            "σ of the velocity differs by +5.3 % [+4.1, +6.2] from that of unfolded velocity at scan 15, the last: "
-            "perhaps within 5 %;",
+            "the RMS velocity error differs by +5.30 % [+4.10, +6.20] from that of unfolded velocity at scan 15, the "
+            "last: perhaps within 5 %;",
         ),
         (
             (6.2, 5.1, 7.4),
-            "σ of the velocity is still 6.2 % [5.1, 7.4] above that of unfolded velocity at scan 15, the last;",
+            "the RMS velocity error is still 6.20 % [5.10, 7.40] above that of unfolded velocity at scan 15, the last;",
         ),
     ],
 )

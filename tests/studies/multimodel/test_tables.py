@@ -142,14 +142,14 @@ def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     above = 100 * (wide.div(wide.min(axis=1), axis=0) - 1)
     (best, smallest), (second, more) = above.max().sort_values().iloc[:2].items()
     stage, looks = above[best].idxmax(), wide.size
-    assert first.startswith("Smallest worst excess of σ of the height over the best filter of each stage ")
-    assert f" (95 % for all {looks} together): {best}, {smallest:.3g} % [" in first
-    assert f"] ({stage}, where {wide.loc[stage].idxmin()} is best); next is {second}, {more:.3g} % [" in first
+    assert first.startswith("Smallest worst excess of the RMS height error over the best filter of each stage ")
+    assert f" (95 % for all {looks} together): {best}, {smallest:#.3g} % [" in first
+    assert f"] ({stage}, where {wide.loc[stage].idxmin()} is best); next is {second}, {more:#.3g} % [" in first
     assert first.endswith(f"] ({above[second].idxmax()}).")
     gain = stage_ranking.paired_gain(result.cases[0], stage, best, wide.loc[stage].idxmin())
     low, high = (float(end) for end in re.search(r"together\): .*? % \[(.*?), (.*?)\]", first).groups())
     assert low < -gain.hi < -gain.lo < high  # paired on the same noise, and wider, as it was chosen
-    assert height.startswith(f"Least σ of the height by stage (95 % for all {wide.shape[1]} together): start: ")
+    assert height.startswith(f"Least RMS error of the height by stage (95 % for all {wide.shape[1]} together): start: ")
 
 
 def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
@@ -166,11 +166,13 @@ def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
     case = SimpleNamespace(name="one", swept_values=(), spec=SimpleNamespace(device=""))
     assert stage_ranking.least_filters(case, stages, stages.iloc[0]) == ("a = “same”", "“near”")
     sentence, *_ = answer_texts(answer, [case], {"stages": stages})
-    assert sentence.startswith("Least σ of the height by stage (95 % for all 3 together): start: a = “same”, 10 m [")
+    assert sentence.startswith(
+        "Least RMS error of the height by stage (95 % for all 3 together): start: a = “same”, 10 m ["
+    )
     assert sentence.endswith("] (not distinguished from “near”).")
 
     sentence, *_ = answer_texts(answer, [case], {"stages": stages[:2]})
-    assert sentence == "σ of the height by stage: start: a = “same”, 10 m [1, 99]."  # nothing is least
+    assert sentence == "RMS error of the height by stage: start: a = “same”, 10.0 m [1.0, 99.0]."  # nothing is least
 
 
 def test_answer_on_several_cases_is_one_sentence(monkeypatch):
@@ -191,15 +193,18 @@ def test_answer_on_several_cases_is_one_sentence(monkeypatch):
     monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
     (sentence,) = answer_texts(answer, cases, {"stages": stages})
     assert sentence == (
-        "Smallest worst excess of σ of the height over the best filter of each stage of every case (95 % for all 4 "
-        "together): a, 10 % [8.73, 11.3] (one, start, where b is best); next is b, 100 % [98.7, 101] (two, start)."
+        "Smallest worst excess of the RMS height error over the best filter of each stage of every case (95 % for all "
+        "4 together): a, 10.0 % [8.7, 11.3] (one, start, where b is best); next is b, 100 % [99, 101] (two, start)."
     )
     single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})
-    assert [line.rpartition("start: ")[2] for line in single_answer] == ["b, 10 m [1, 99].", "b, 20 m [1, 99]."]
+    assert [line.rpartition("start: ")[2] for line in single_answer] == [
+        "b, 10.0 m [1.0, 99.0].",
+        "b, 20.0 m [1.0, 99.0].",
+    ]
     vy_stages = pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)
     sentence, *_ = answer_texts(answer, cases[1:], {"stages": vy_stages})
     assert sentence == (
-        "Least σ of the height in every stage: a; next is b, at most 100 % [98.9, 101] above it (start; 95 % for "
+        "Least RMS height error in every stage: a; next is b, at most 100 % [99, 101] above it (start; 95 % for "
         "both together)."
     )
 

@@ -86,7 +86,7 @@ def test_the_worst_is_named_by_exact_values():
         exact_bias=[-1.8, 2.1],
     )
     clause = answer._worst_errors(rows, "r")
-    assert clause.text.endswith("worst σ of the range 5.1 m (exact) at 20 s, largest bias 2.1 m (exact) at 20 s")
+    assert clause.text.endswith("largest RMS range error 5.1 m at 20 s, largest bias 2.1 m at 20 s")
 
 
 def test_no_best_where_nothing_is_compared(paper):
@@ -200,7 +200,7 @@ def test_answer_tells_the_last_gain_of_each_component(paper):
     made = made_of(paper[1:2])
     told = answer_texts(answer, paper[1:2], made)
     assert len(told) == 3
-    assert "at 140 s, the last scan, σ is 18.3 % (exact) lower" in told[0]
+    assert "at 140 s, the last scan, the RMS error is 18.3 % lower" in told[0]
     assert "than with range alone" in told[0]
     assert "at best" not in told[0]  # once settled, it stays what it is
     assert "RLS 1" in answer_texts(answer, paper, made_of(paper))[2]
@@ -269,7 +269,7 @@ def greatest_loss(made):
     rows = made["gains"][made["gains"]["component"] == "r"]
     row = rows.loc[rows["exact_percent"].idxmin()]
     assert row["exact_percent"] < -10
-    return f"at worst {-row['exact_percent']:.1f} % (exact) higher, at {row['t_s']:g} s"
+    return f"at worst {-row['exact_percent']:.1f} % higher, at {row['t_s']:g} s"
 
 
 def test_answer_tells_the_greatest_loss(expected_radar):
@@ -295,8 +295,8 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
 
 def test_answer_tells_the_best_variance(swept):
     told = answer_texts(answer, swept, made_of(swept))[0]  # before the gains: it is what is asked
-    assert told.startswith("RLS 2, best D_M, by the steady σ of the range, settled in under 10 scan periods: ")
-    assert ": r 10⁻³ (σ 189.1 m, settled after 90 s); r+Vr 10⁻³ (σ 154." in told
+    assert told.startswith("RLS 2, best D_M, by the steady RMS range error, settled in under 10 scan periods: ")
+    assert ": r 10⁻³ (RMS error 189.1 m, settled after 90 s); r+Vr 10⁻³ (RMS error 154." in told
 
 
 def test_a_target_that_breaks_the_model(expected_radar):
@@ -307,7 +307,7 @@ def test_a_target_that_breaks_the_model(expected_radar):
     rows = made["curves"][(made["curves"]["component"] == "r") & (made["curves"]["filter"] == "r")]
     worst = rows.loc[rows["exact_sigma"].idxmax()]
     told = answer_texts(answer, results, made)[-1]
-    assert f"r: worst σ of the range {worst['exact_sigma']:.4g} m (exact)" in told
+    assert f"r: largest RMS range error {worst['exact_sigma']:.4g} m" in told
     assert f"at {worst['t_s']:g} s, largest bias " in told
 
 
@@ -315,7 +315,7 @@ def test_answer_of_a_single_filter(expected_radar):
     one = {"name": "only", "observes": ["range"], "manoeuvre_variance": 1e-3}
     results = [expected_radar("rls2", filters=[one])]
     (sentence,) = answer_texts(answer, results, made_of(results))
-    assert "“only”: σ of the range at 140 s is 189.3 m" in sentence
+    assert "“only”: the RMS range error at 140 s is 189.3 m" in sentence
 
 
 # ---- a world less tidy ----------------------------------------------------------------------------------------------
@@ -333,9 +333,11 @@ def test_answer_compares_at_a_common_time(expected_radar):
     ]
     made, told = made_of(results), told_of(results)[0]
     rows = made["gains"][(made["gains"]["component"] == "r") & (made["gains"]["t_s"] == 72)]
-    assert "at 72 s, the last time that all have in common, σ is " in told  # 76 s is the end of the shortest
+    assert (
+        "at 72 s, the last time that all have in common, the RMS error is " in told
+    )  # 76 s is the end of the shortest
     for gain in (rows["exact_percent"].min(), rows["exact_percent"].max()):
-        assert f"{gain:.1f} % (exact)" in told
+        assert f"{gain:.1f} %" in told
 
 
 def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, radar_config):
@@ -345,17 +347,17 @@ def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, r
     source = {**radar_config("rls2", target=BRAKING), "sweep": {"manoeuvre_variance": values}}
     results = [expected_case(case) for case in load(source).cases]
     worst = np.array([result.axes.exact_sigma[:, 5:, 0].max(axis=1) for result in results])
-    told = next(one for one in told_of(results) if ", best D_M, by the worst σ of the range" in one)
+    told = next(one for one in told_of(results) if ", best D_M, by the largest RMS range error" in one)
     for f, name in enumerate(("r", "r+Vr")):
         best = values[int(worst[:, f].argmin())]
         equal = [value for value, sigma in zip(values, worst[:, f], strict=True) if sigma < 1.01 * worst[:, f].min()]
         texts = [key_labels.format_value(value, powers=True) for value in equal]
         if name == "r+Vr":
             assert equal == [best]
-            assert f"{name} {texts[0]} (σ {worst[:, f].min():.4g} m, at " in told
+            assert f"{name} {texts[0]} (RMS error {worst[:, f].min():.4g} m, at " in told
         else:
             ends = " to ".join(f"{sigma:.4g}" for sigma in sorted(worst[worst[:, f] < 1.01 * worst[:, f].min(), f]))
-            assert f"{name} {texts[0]} and {texts[1]} do equally well (σ {ends} m)" in told
+            assert f"{name} {texts[0]} and {texts[1]} do equally well (RMS error {ends} m)" in told
     assert not any("further cases break the model" in one for one in told_of(results))
 
 

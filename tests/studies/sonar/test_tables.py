@@ -42,16 +42,14 @@ def test_each_config_has_its_figures_and_they_draw(results):
 
 def test_filters_of_equal_accuracy_are_named_together(results):
     """Without process noise the Kalman filter is growing memory; and what is asked is answered first."""
-    first, *_, optimistic = results["sonar_fluctuating"].answer
+    first, *_, optimistic, _ = results["sonar_fluctuating"].answer
     assert "least with “growing” and “kalman”, " in first
-    start = (
-        "Most optimistic from the manoeuvre on (120 s): “growing” and “kalman” (target = sonar turning); the true σ is "
-    )
-    assert optimistic.startswith(start)
+    start = "Most optimistic from the manoeuvre on (120 s): “growing” and “kalman” (target = sonar turning); the RMS "
+    assert optimistic.startswith(f"{start}error is ")
     first, second, *_ = results["sonar_correlated"].answer
     assert first.startswith("Most optimistic from the first scan on: “naive” (ρ = 0.9")
     curves = results["sonar_correlated"].tables["curves"]
-    assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.2f} (exact) times" in first
+    assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.2f} times" in first
     assert "least with “augmented” and “differenced”, " in second
 
 
@@ -61,8 +59,8 @@ def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several
     worst = plain.loc[plain["formula_m"].abs().idxmax()]
     told = results["sonar_conversion"].answer[0]
     bias, ratio = worst["formula_m"], worst["formula_m"] / worst["sigma_range_m"]
-    words = f"conversion up to {bias:.3g} m (exact), {ratio:.3g} σ of the range (σ_β = 8°); with".replace("-", "−")
-    assert f"{words} the unbiased one none (exact)." in told
+    words = f"conversion up to {bias:.3g} m, {ratio:.3g} σ of the range (σ_β = 8°); with".replace("-", "−")
+    assert f"{words} the unbiased one none." in told
     half_width = (plain["bias_m_hi"] - plain["bias_m_lo"]) / 2
     assert ((plain["bias_m"] - plain["formula_m"]).abs() < 2 * half_width).all()  # so that it may be called exact
     assert conversion_figure(table[table["across_m"] == table["across_m"].max()]) is None

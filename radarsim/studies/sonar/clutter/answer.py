@@ -104,8 +104,7 @@ def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None", run_s: fl
 
 def _estimate(row: "pd.Series[Any]", column: str, unit: str = "") -> str:
     """The value of a column with its interval, to three digits."""
-    values = (float(f"{row[key]:.3g}") for key in (column, f"{column}_lo", f"{column}_hi"))
-    return wording.estimate(values, unit, ",.10g")
+    return wording.estimate((row[key] for key in (column, f"{column}_lo", f"{column}_hi")), unit, ",.3g")
 
 
 def _false_tracks_sought(rows: "pd.DataFrame") -> Sentence:

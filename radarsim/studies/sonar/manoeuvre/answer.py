@@ -107,8 +107,8 @@ def _sigma_of_uses(
     uses = tables.select_rows(uses, case=first["case"], filter=first["filter"])
     uses = uses[uses["k"] == uses["k"].max()]
     text = tr(
-        "Measured σ of quantities derived from the track over σ from its covariance ({filter}, {t_s:g} s, {case}): "
-        "{ratios}.",
+        "RMS errors of quantities derived from the track over their σ from its covariance ({filter}, {t_s:g} s, "
+        "{case}): {ratios}.",
         filter=quote_name(first["filter"]),
         t_s=uses.iloc[0]["t_s"],
         case=next(key_labels.plain_case_label(result) for result in results if result.name == first["case"]),

@@ -180,7 +180,9 @@ def test_words(result, tables):
     assert STUDY.question(result.experiment).startswith("How soon and how surely is a manoeuvre detected")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
-        sentence.startswith("Measured σ of quantities derived from the track over σ from its covariance (“growing”, ")
+        sentence.startswith(
+            "RMS errors of quantities derived from the track over their σ from its covariance (“growing”, "
+        )
         for sentence in told
     )
     assert all(sentence.endswith(".") for sentence in told)
