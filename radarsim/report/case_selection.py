@@ -27,9 +27,14 @@ FEW_FILTERS = 3  # distinguished by dash, while shades distinguish the cases
 
 
 def after_swept_values(result: CaseResult, sentence: str) -> str:
-    """A sentence on a case, preceded by its swept values where there are several."""
+    """A sentence on a case, preceded by its swept values where there are several.
+
+    What a list is of (`RMS error: least with a; largest with b`) belongs to each of its parts, with these values."""
     where = without_markup(swept_description(result))
-    return f"{where}: {sentence}" if where else sentence
+    if not where or ": " not in sentence:
+        return f"{where}: {sentence}" if where else sentence
+    first = sentence[0].lower() if sentence[1].islower() else sentence[0]
+    return f"{where}, {first}{sentence[1:]}"
 
 
 def select_reported(results: Sequence[CaseResult], max_cases: int = 3) -> tuple[list[CaseResult], list[str]]:

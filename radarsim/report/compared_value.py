@@ -73,11 +73,9 @@ def simultaneity_text(count: int) -> str:
     return tr("95 % for both together") if count == 2 else tr("95 % for all {count} together", count=count)
 
 
-def choice_remarks(values: Sequence[ComparedValue]) -> list[str]:
-    """Remarks behind values that are alike in how they were chosen: behind the last one that has an interval."""
-    remarks = [value.choice_remark() for value in values]
-    last = max((i for i, remark in enumerate(remarks) if remark), default=-1)
-    return [remark if i == last else "" for i, remark in enumerate(remarks)]
+def choice_remark(values: Sequence[ComparedValue]) -> str:
+    """The remark on values of one sentence that are alike in how they were chosen; empty if none has an interval."""
+    return next(filter(None, (value.choice_remark() for value in values)), "")
 
 
 def row_value(row: Row, quantity: Quantity = SIGMA) -> ComparedValue:

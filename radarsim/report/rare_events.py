@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from radarsim.language.translate import tr
-from radarsim.report import statistics, tables
+from radarsim.report import statistics, tables, wording
 from radarsim.report.row_notes import RowNote, notes_where
 from radarsim.report.statistics import MIN_EVENTS
 
@@ -146,9 +146,7 @@ def rate_table(parts: "Sequence[dict[str, Any]]") -> "pd.DataFrame | None":
 def rate_fields(row: "pd.Series") -> dict[str, Any]:
     """The fields of a sentence on a row of rare.csv: rate with interval, number of events, and effective ones."""
     return {
-        "rate": row["event_rate"],
-        "low": row["event_rate_lo"],
-        "high": row["event_rate_hi"],
+        "rate": wording.estimate((row[f"event_rate{end}"] for end in ("", "_lo", "_hi")), form=".3g"),
         "events": row["events"],
         "n_eff": row["n_eff"],
     }

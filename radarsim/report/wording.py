@@ -20,6 +20,7 @@ SPACE_BEFORE_UNIT = re.compile(  # the space between a number and its unit, in a
 SPACES = "\N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}"  # which a language may put into numbers
 MAX_PLAIN_DIGITS = 6  # digits before the point that are still written out
 MAX_SHARE_DIGITS = 12  # digits of a share near one
+MIN_PLAIN_EXPONENT = -3  # of ten, from which a value with its interval is still written out
 MAX_MORE_DECIMALS = 3  # of a value with its interval, where fewer do not tell them apart
 NEARLY_ONE = 1e-3  # under one, from which more digits are written
 
@@ -80,13 +81,15 @@ def _aligned(numbers: tuple[float, ...], form: str) -> list[str]:
     """A value and its ends with equally many decimals; very small and large ones each with a power of ten."""
     flags, digits, kind = re.fullmatch(r"([+,]*)\.(\d+)([fg])", form).groups()  # type: ignore[union-attr]
     exponent = max((math.floor(math.log10(abs(n))) for n in numbers if n and math.isfinite(n)), default=0)
-    if kind == "g" and not -4 <= exponent < MAX_PLAIN_DIGITS:
+    if kind == "g" and not MIN_PLAIN_EXPONENT <= exponent < MAX_PLAIN_DIGITS:
         mantissa = f"{flags.replace(',', '')}.{int(digits) - 1}e"
         return [format(number, mantissa if math.isfinite(number) and number else "g") for number in numbers]
-    decimals = int(digits) if kind == "f" else max(int(digits) - 1 - exponent, 0)
+    decimals = int(digits) if kind == "f" else int(digits) - 1 - exponent
     if kind == "g" and 0 < numbers[2] - numbers[1] < math.inf:  # one digit of the interval's width at least
         width_decimals = -math.floor(math.log10(numbers[2] - numbers[1]))
         decimals = max(decimals, min(width_decimals, decimals + MAX_MORE_DECIMALS))
+    if decimals < 0:
+        numbers, decimals = tuple(round(n, decimals) if math.isfinite(n) else n for n in numbers), 0
     for more in range(MAX_MORE_DECIMALS + 1):
         texts = [_fixed(number, f"{flags}.{decimals + more}f") for number in numbers]
         if not _are_blurred(numbers, texts):

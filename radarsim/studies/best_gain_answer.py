@@ -60,7 +60,7 @@ def gain_sentences(
     t_s: float = 0.0,
 ) -> list[Sentence]:
     """How much each of the others gains over the baseline in σ of a quantity; measure: over scans as, or at t_s, s."""
-    what = tr(MEASURE_TEXTS[measure], component=tr("RMS {quantity} error", quantity=quantity), t_s=t_s)
+    what = tr(MEASURE_TEXTS[measure], component=tr("RMS error of the {quantity}", quantity=quantity), t_s=t_s)
     return [
         Sentence(
             tr(

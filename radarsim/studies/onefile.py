@@ -348,7 +348,7 @@ class OneFile(Study):
             for row, sigma in zip(last, sigmas, strict=True)
         ]
         text = tr(
-            "RMS {quantity} error after {t:g} s: {filters}.",
+            "RMS error of the {quantity} after {t:g} s: {filters}.",
             quantity=self._term(leading.words or leading.name),
             t=float(result.axes.t_s[-1]),
             filters=join_names(texts),

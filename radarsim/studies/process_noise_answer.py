@@ -141,7 +141,7 @@ def best_values_sentence(
 ) -> Sentence:
     """The best values of each filter, by its worst σ of a quantity."""
     text = tr(
-        "{subject}, best {symbol}, by the largest RMS {quantity} error {since}: {filters}.",
+        "{subject}, best {symbol}, by the largest RMS error of the {quantity} {since}: {filters}.",
         subject=subject,
         symbol=key.symbol,
         quantity=quantity,

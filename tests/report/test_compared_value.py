@@ -133,6 +133,5 @@ def test_values_that_noise_orders_are_not_distinguished():
 def test_a_remark_stands_once_behind_the_last_value_with_an_interval():
     measured, exact = (ComparedValue(Estimate(5.0, 4.0, 6.0), is_exact).chosen_among(4) for is_exact in (False, True))
     remark = " (95 % for all 4 together)"
-    assert compared_value.choice_remarks([measured, measured]) == ["", remark]
-    assert compared_value.choice_remarks([measured, exact]) == [remark, ""]
-    assert compared_value.choice_remarks([exact, exact]) == ["", ""]
+    assert compared_value.choice_remark([exact, measured]) == compared_value.choice_remark([measured]) == remark
+    assert compared_value.choice_remark([exact, exact]) == ""

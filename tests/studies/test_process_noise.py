@@ -60,7 +60,9 @@ def test_a_sweep_of_process_noise_says_the_best_of_each_filter_and_the_gain_then
         filters = [filter_keys | {key: value} for filter_keys in config["filters"]]
         alone[value] = worst_sigmas(config | {"filters": filters})
     best, gain = radarsim.run(config | {"sweep": {key: values}}).answer[:2]
-    assert best.startswith(f"mine, best {symbol}, by the largest RMS range error from the manoeuvre on (30 s): r ")
+    assert best.startswith(
+        f"mine, best {symbol}, by the largest RMS error of the range from the manoeuvre on (30 s): r "
+    )
     for filter_name in ("r", "r+Vr"):
         sigmas = [alone[value][filter_name] for value in values]
         named = re.escape(f"{filter_name} {texts[int(np.argmin(sigmas))]} (RMS error ")
@@ -68,7 +70,7 @@ def test_a_sweep_of_process_noise_says_the_best_of_each_filter_and_the_gain_then
     at_best = 100 * (1 - min(s["r+Vr"] for s in alone.values()) / min(s["r"] for s in alone.values()))
     low, high = map(float, re.search(r"% \((−?[\d.]+) … (−?[\d.]+)\) with each at its best", gain).groups())
     assert low < at_best < high
-    assert gain.startswith("mine, gain in RMS range error at worst, r+Vr over r (95 % intervals): ")
+    assert gain.startswith("mine, gain in RMS error of the range at worst, r+Vr over r (95 % intervals): ")
     assert f"with one {symbol} for both" in gain
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, plural, quote_name, tr
+from radarsim.language.translate import join_names, list_filters, plural, quote_name, tr
 from radarsim.report import case_selection, compared_value, key_labels, rare_events, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue, is_equal
 from radarsim.report.sentences import Sentence
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 TablesByName = Mapping[str, "pd.DataFrame"]
 AS_GOOD_PERCENT = 5.0  # above the oracle's σ
+MAX_LISTED_ERRORS = 3  # of filters in a sentence; of more the least and the greatest
 LOST_PERCENT = 100.0  # above the oracle's σ, from which a σ is rather a share of lost tracks
 
 
@@ -47,7 +48,9 @@ def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
     names = join_names(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
     if any(f.folds for case in experiment.cases for f in case.spec.filters):
-        return tr("How much does ambiguous Doppler help {radars}, and from which scan on?", radars=names)
+        if any(case.spec.rare is not None for case in experiment.cases):
+            return tr("How often is an ambiguity of the velocity wrong for {radars}?", radars=names)
+        return tr("From which scan on is ambiguous Doppler as good as unfolded velocity for {radars}?", radars=names)
     return tr(
         "Which model order suits the target of {radars}, and how should several orders be combined?", radars=names
     )
@@ -99,10 +102,11 @@ def _case_sentences(result: Result, tables_by_name: TablesByName, scans: Mapping
     spans = wording.list_numbers(numeral(f"{span:g}") for span in result.spec.radar.spans_mps)
     for name in _reported_filters(result):
         subject = f"{key_labels.plain_case_label(result)}, D = {spans} {tr('m/s')}, {quote_name(name)}"
-        clauses = [
-            *_as_good_clause(result, name, tables_by_name),
-            *(_wrong_folds_sought(result, name, tables_by_name) or _right_folds(result, name, tables_by_name)),
-        ]
+        clauses = _as_good_clause(result, name, tables_by_name)
+        if sought := _wrong_folds_sought(result, name, tables_by_name):
+            clauses += sought
+        elif not (clauses and remedy_answer.is_lost(result, name, tables_by_name)):
+            clauses += _right_folds(result, name, tables_by_name)
         if clauses:
             sentence = sentences.join("; ", clauses)
             case_sentences.append(sentence.with_text(f"{subject}: {sentence.text}."))
@@ -194,14 +198,13 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
     worst = _largest_errors(result, tables_by_name, counted)
     if not len(worst):
         return []
-    errors = [
-        tr("{filter}, {sigma} at scan {k}", filter=quote_name(row["filter"]), sigma=_sigma_m(row), k=row["k"])
-        + _scans_remark([row])
-        for _, row in worst.iterrows()
-    ]
-    subject = tr("largest RMS range error {since}", since=wording.since(*counted))
-    clauses = ["; ".join(errors)]
-    axes = result.axes
+    ranked = [row for _, row in worst.sort_values("decides", kind="stable").iterrows()]
+    clauses, axes = [], result.axes
+    if len(ranked) > MAX_LISTED_ERRORS:
+        clauses = [tr("least with {error}", error=_error_text(ranked[0], ranked[1:]))]
+        clauses.append(tr("greatest with {error}", error=_error_text(ranked[-1])))
+    else:
+        clauses = [_error_text(row) for _, row in worst.iterrows()]
     best_order, best_combination = (
         float(np.min(np.max(sigma[axes.combines, counted.k - 1 :, 0], axis=1)))
         for sigma in (axes.best_order, axes.best_combination)
@@ -217,9 +220,20 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
         )
     elif np.isfinite(best_order):
         clauses.append(tr("with the trajectory known, the best order of each scan gives {best:.4g} m", best=best_order))
+    subject = tr("largest RMS range error {since}", since=wording.since(*counted))
     text = f"{key_labels.plain_case_label(result)}, {subject}: {'; '.join(clauses)}."
     intervals = [interval for _, row in worst.iterrows() for interval in _largest_sigma(row).intervals]
     return [Sentence(text, tuple(intervals))]
+
+
+def _error_text(row: "pd.Series[Any]", others: "Sequence[pd.Series[Any]]" = ()) -> str:
+    """A filter's largest error with its scan, and the others that cannot be distinguished from it."""
+    text = tr("{filter}, {sigma} at scan {k}", filter=quote_name(row["filter"]), sigma=_sigma_m(row), k=row["k"])
+    text += _scans_remark([row])
+    close = [
+        o["filter"] for o in others if not compared_value.are_distinguished(_largest_sigma(o), _largest_sigma(row))
+    ]
+    return text + " " + tr("(not distinguished from {others})", others=list_filters(close, 2)) if close else text
 
 
 class _CaseComparison(NamedTuple):
@@ -233,8 +247,8 @@ class _CaseComparison(NamedTuple):
     is_undecided: bool  # whether its interval at the last scan holds the limit
 
 
-def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """Of several cases: in how many the filter that unfolds best is as good as unfolded velocity; and the worst."""
+def _case_comparisons(results: Sequence[Result], tables_by_name: TablesByName) -> dict[str, list[_CaseComparison]]:
+    """How each reported filter compares with its oracle in each of several cases, by filter."""
     comparisons: dict[str, list[_CaseComparison]] = {}
     for result in results if len(results) > 1 else ():
         for name in _reported_filters(result):
@@ -247,6 +261,12 @@ def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -
                 is_undecided = bool(np.isinf(since) and not low > AS_GOOD_PERCENT and above <= LOST_PERCENT)
                 case = _CaseComparison(since, above, text, clause, deciding, is_undecided)
                 comparisons.setdefault(name, []).append(case)
+    return comparisons
+
+
+def _as_good_in_cases(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
+    """Of several cases: in how many the filter that unfolds best is as good as unfolded velocity; and the worst."""
+    comparisons = _case_comparisons(results, tables_by_name)
     if not comparisons:
         return []
     good = {name: sum(np.isfinite(case.since_scan) for case in cases) for name, cases in comparisons.items()}
@@ -381,7 +401,7 @@ def _wrong_folds_sought(result: Result, name: str, tables_by_name: TablesByName)
         )
         return [Sentence(text, sentences.intervals("rare", "event_rate", row))]
     text = tr(
-        "an ambiguity is wrong at scan {k} in {rate:.3g} [{low:.3g}, {high:.3g}] of realisations (importance sampling; "
+        "an ambiguity is wrong at scan {k} in {rate} of realisations (importance sampling; "
         "{events:,} events, effective sample size {n_eff:,.0f})",
         k=row["k"],
         **rare_events.rate_fields(row),

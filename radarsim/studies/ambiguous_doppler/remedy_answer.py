@@ -55,7 +55,7 @@ class Trial(NamedTuple):
 def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: TablesByName) -> list[Sentence]:
     """What helps the first filter, of those of results, that is lost or worse than the range alone."""
     for result, name in filters:
-        if not (_is_lost(result, name, tables_by_name) or _is_worse(result, name, tables_by_name)):
+        if not (is_lost(result, name, tables_by_name) or _is_worse(result, name, tables_by_name)):
             continue
         count = min(max(result.count, TRIAL_REALISATIONS), MAX_TRIAL_REALISATIONS)
         tried = list(islice(cures(result.spec, name, dict(result.swept_values), count), MAX_NAMED))
@@ -87,10 +87,10 @@ def _trial_text(trial: Trial) -> str:
     if math.isnan(trial.gain):
         return tr("then {share} % are lost", share=share)
     gain = numeral(f"{trial.gain:.0f}")
-    return tr("then {share} % are lost, the gain in range is {gain} %", share=share, gain=gain)
+    return tr("then {share} % are lost, the gain over range alone is {gain} % in range", share=share, gain=gain)
 
 
-def _is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:
+def is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:
     """Whether most of its velocities are off by more than half a span at the last scan."""
     folds = tables.select_rows(tables_by_name["folds"], case=result.name, filter=name)
     return bool(len(folds) and folds.iloc[-1][BEYOND_SHARE] > LOST_SHARE)

@@ -184,7 +184,7 @@ def _rate_of_losses(rates: "pd.DataFrame") -> Sentence:
         )
         return Sentence(text, sentences.intervals("rare", "event_rate", row))
     text = tr(
-        "{estimator}: lock is lost in {rate:.3g} [{low:.3g}, {high:.3g}] of the bursts (importance sampling; "
+        "{estimator}: lock is lost in {rate} of the bursts (importance sampling; "
         "{events:,} events, effective sample size {n_eff:,.0f}).",
         estimator=quote_name(row["filter"]),
         **rare_events.rate_fields(row),

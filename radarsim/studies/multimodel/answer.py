@@ -105,7 +105,7 @@ def _closest_to_the_best(results: Sequence[CaseResult], stages: "pd.DataFrame") 
     text = tr(
         "Smallest worst excess of the RMS height error over the best filter of {every} ({together}): {filter}, "
         "{percent} ({closest_where}, where {best} is best); next is {second}, {more} ({where}).",
-        every=tr("each stage of every case") if len(results) > 1 else tr("each stage"),
+        every=tr("each stage"),
         percent=above[0],
         closest_where=_stage_label(results, closest),
         best=quote_name(best_by_stage.loc[(closest["case"], closest["stage"])]),

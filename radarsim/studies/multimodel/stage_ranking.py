@@ -14,7 +14,7 @@ from radarsim.studies.multimodel.tables import stage_gain, stage_names
 if TYPE_CHECKING:
     import pandas as pd
 
-MAX_CLOSE_NAMES = 3  # of filters that cannot be distinguished from the best
+MAX_CLOSE_NAMES = 2  # of filters that cannot be distinguished from the best
 
 
 def least_filters(result: CaseResult, rows: "pd.DataFrame", best: "pd.Series[Any]") -> tuple[str, str]:

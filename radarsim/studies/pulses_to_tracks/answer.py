@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 TablesByName = Mapping[str, "pd.DataFrame"]
+RATIO_DECIMALS = 3
 RATIO = Quantity("over_ideal", term("σ over that of the idealisation"), "idealisations", "paired_over_ideal")
 MAX_RATIO_OF_IDEAL = 1.05  # σ over its idealisation's, up to which the idealisation holds
 
@@ -172,7 +173,8 @@ def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) ->
 
 
 def _ratio(row: "Mapping[Any, Any] | pd.Series[Any]", form: str = ".3g", looks: int = 1) -> str:
-    return compared_value.row_value(row, RATIO).chosen_among(looks).text(form=form)
+    ratio = compared_value.row_value(row, RATIO).chosen_among(looks)
+    return ratio.mapped(lambda value: round(value, RATIO_DECIMALS)).text(form=form)
 
 
 def _ratio_intervals(rows: "pd.DataFrame | pd.Series[Any]") -> tuple[sentences.MeasuredInterval, ...]:

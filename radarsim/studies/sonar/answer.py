@@ -41,7 +41,8 @@ def question(specs: Sequence[Keys]) -> str:
         )
     if _has_correlated_errors(specs):
         return tr("What does it cost to ignore that the errors of neighbouring plots are correlated?")
-    if any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs):
+    misses_plots = any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs)
+    if misses_plots and not any(spec.sensor.further for spec in specs):
         return tr("What does a missed plot cost?")
     names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
     return tr("How accurate are smoothed range and bearing ({filters})?", filters=list_filters(names))
@@ -107,19 +108,21 @@ def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd
     values = [
         compared_value.sigma_value(rows.iloc[0], tables_by_name).chosen_among(looks) for rows in (lowest, highest)
     ]
-    remarks = compared_value.choice_remarks(values)
     fields = {
         "quantity": COMPONENTS_BY_NAME[component].words,
         "t_s": final["t_s"].iloc[0],
-        "least": _filters_and_sigma(lowest, values[0]) + remarks[0],
-        "most": _filters_and_sigma(highest, values[1]) + remarks[1],
+        "chosen": compared_value.choice_remark(values),
+        "least": _filters_and_sigma(lowest, values[0]),
+        "most": _filters_and_sigma(highest, values[1]),
     }
     if order.nunique() == 1:
-        text = tr("RMS {quantity} error after {t_s:g} s: {least}.", **fields)
+        text = tr("RMS error of the {quantity} after {t_s:g} s{chosen}: {least}.", **fields)
     elif _is_surely_less(lowest.iloc[0], highest.iloc[0], tables_by_name, looks=order.nunique()):
-        text = tr("RMS {quantity} error after {t_s:g} s: least with {least}, largest with {most}.", **fields)
+        text = tr(
+            "RMS error of the {quantity} after {t_s:g} s{chosen}: least with {least}; largest with {most}.", **fields
+        )
     else:
-        text = tr("RMS {quantity} error after {t_s:g} s: {least}, and {most}, not distinguished.", **fields)
+        text = tr("RMS error of the {quantity} after {t_s:g} s{chosen}: {least}; {most}; not distinguished.", **fields)
     intervals = [interval for value in values for interval in value.intervals]
     return Sentence(case_selection.after_swept_values(result, text), tuple(intervals))
 

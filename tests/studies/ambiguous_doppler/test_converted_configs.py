@@ -175,8 +175,8 @@ def test_a_loss_names_what_turns_it_into_a_gain():
     assert "with --out cured" in first
     assert any("σ of the velocity 14.4 m/s, of the acceleration 0.48 m/s²" in line for line in result.answer)
     setting = "filters.1.manoeuvre_variance=0.1"
-    assert f"--set {setting}; then 0 % are lost, the gain in range is " in first
-    gain = float(first.partition("the gain in range is ")[2].split()[0])
+    assert f"--set {setting}; then 0 % are lost, the gain over range alone is " in first
+    gain = float(first.partition("the gain over range alone is ")[2].split()[0])
     gains = radarsim.run(BOAT, overrides=[setting]).gains
     row = gains[(gains["filter"] == "r+Vr") & (gains["component"] == "r")].iloc[-1]
     assert row["gain_percent"] == pytest.approx(gain, abs=3)

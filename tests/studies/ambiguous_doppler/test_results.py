@@ -73,7 +73,9 @@ def test_gains_beside_the_oracle(result):
 def test_answer_names_the_scan_from_which_folded_velocity_is_as_good(result):
     experiment = load("ambiguous_rls4")
     folded = registry.study("ambiguous_doppler")
-    assert folded.question(experiment) == "How much does ambiguous Doppler help RLS 4, and from which scan on?"
+    assert (
+        folded.question(experiment) == "From which scan on is ambiguous Doppler as good as unfolded velocity for RLS 4?"
+    )
     sentence, _ = answer_texts(folded, result.cases, result.tables)
     assert sentence.startswith("RLS 4, D = 15 m/s, “memory”: ")
     assert "all folds are right in" in sentence

@@ -193,8 +193,8 @@ def test_answer_on_several_cases_is_one_sentence(monkeypatch):
     monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
     (sentence,) = answer_texts(answer, cases, {"stages": stages})
     assert sentence == (
-        "Smallest worst excess of the RMS height error over the best filter of each stage of every case (95 % for all "
-        "4 together): a, 10.0 % [8.7, 11.3] (one, start, where b is best); next is b, 100 % [99, 101] (two, start)."
+        "Smallest worst excess of the RMS height error over the best filter of each stage (95 % for all 4 "
+        "together): a, 10.0 % [8.7, 11.3] (one, start, where b is best); next is b, 100 % [99, 101] (two, start)."
     )
     single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})
     assert [line.rpartition("start: ")[2] for line in single_answer] == [

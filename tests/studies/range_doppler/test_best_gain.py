@@ -90,7 +90,7 @@ def test_gain_in_a_turn_is_that_between_the_two_best():
     sentence = gain_sentence(result)
     at_best = 100 * (1 - min(sigma[2].values()) / min(sigma[1].values()))
     alike = [100 * (1 - sigma[2][v] / sigma[1][v]) for v in TRIED]
-    assert sentence.startswith("mine, gain in RMS range error at worst, r+Vr over r: ")
+    assert sentence.startswith("mine, gain in RMS error of the range at worst, r+Vr over r: ")
     low, high, *of_both = numbers(sentence)  # of r 10⁻¹ and 1 do equally well
     assert 60.75 < low <= at_best + 0.06
     assert at_best - 0.06 <= high < 60.95
@@ -123,7 +123,7 @@ def test_gain_in_the_long_run_is_that_between_the_best_that_settle():
     finally:
         SIGMA[1] = 0.8
     sentence = gain_sentence(result)
-    assert "RMS range error once settled" in sentence
+    assert "RMS error of the range once settled" in sentence
     assert numbers(sentence) == pytest.approx([at_best, min(alike), max(alike)], abs=0.06)
 
 
@@ -135,7 +135,7 @@ def test_gain_between_filters_that_were_optimised(over, words):
         config(BOAT, scans=61), overrides=[f"manoeuvre_variance={{minimise: sigma_r, over: {over}, from_k: 25}}"]
     )
     sentence = gain_sentence(result)
-    assert f"RMS range error {words}" in sentence
+    assert f"RMS error of the range {words}" in sentence
     best = numbers(sentence)[0]
     (case,) = result.cases
     exact = case.axes.exact_sigma[:, 24:, 0]

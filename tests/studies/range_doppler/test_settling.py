@@ -66,9 +66,8 @@ def test_the_best_variance_for_a_turn_with_missed_plots_is_no_matter_of_the_seed
     sentences = {radarsim.run(BOAT, seed=seed, out=tmp_path / str(seed), figures=False).answer[0] for seed in (1, 2)}
     (sentence,) = sentences
     assert (
-        "mine, best D_M, by the largest RMS range error from the manoeuvre on (60 s): r 10⁻¹ (RMS error 18.71 m, "
-        "at 85 s); "
-        "r+Vr 10⁻¹ (RMS error 6.5" in sentence
+        "mine, best D_M, by the largest RMS error of the range from the manoeuvre on (60 s): r 10⁻¹ (RMS error "
+        "18.71 m, at 85 s); r+Vr 10⁻¹ (RMS error 6.5" in sentence
     )
 
 

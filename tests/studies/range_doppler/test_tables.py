@@ -347,7 +347,7 @@ def test_answer_names_the_best_variance_on_a_manoeuvring_target(expected_case, r
     source = {**radar_config("rls2", target=BRAKING), "sweep": {"manoeuvre_variance": values}}
     results = [expected_case(case) for case in load(source).cases]
     worst = np.array([result.axes.exact_sigma[:, 5:, 0].max(axis=1) for result in results])
-    told = next(one for one in told_of(results) if ", best D_M, by the largest RMS range error" in one)
+    told = next(one for one in told_of(results) if ", best D_M, by the largest RMS error of the range" in one)
     for f, name in enumerate(("r", "r+Vr")):
         best = values[int(worst[:, f].argmin())]
         equal = [value for value, sigma in zip(values, worst[:, f], strict=True) if sigma < 1.01 * worst[:, f].min()]

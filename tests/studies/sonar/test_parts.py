@@ -96,4 +96,4 @@ def test_cases_of_all_parts_in_one_run(tmp_path):
     assert {"sigma_r", "plots", "modes", "confirmation"} <= set(result.figures)
     assert result.question.startswith("How soon and how surely is a track confirmed")
     assert result.answer[0].startswith("“nearest” confirms")
-    assert any("RMS range error after 145 s" in sentence for sentence in result.answer)
+    assert any("RMS error of the range after 145 s" in sentence for sentence in result.answer)

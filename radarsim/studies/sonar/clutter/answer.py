@@ -125,7 +125,7 @@ def _ended_tracks_sought(rows: "pd.DataFrame") -> Sentence:
     """How rarely the target's track ends by importance sampling, and from how many events, by tracker."""
     trackers = (
         tr(
-            "{filter} {rate:.3g} [{low:.3g}, {high:.3g}] ({events:,} events, effective sample size {n_eff:,.0f})",
+            "{filter} {rate} ({events:,} events, effective sample size {n_eff:,.0f})",
             filter=quote_name(row["filter"]),
             **rare_events.rate_fields(row),
         )

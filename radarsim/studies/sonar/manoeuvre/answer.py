@@ -73,22 +73,21 @@ def _detection_sentence(result: CaseResult[ManoeuvreAxes], detections: "pd.DataF
     extremes = ranked[::-1][:: len(ranked) - 1 or 1]
     looks = sum(np.isnan(row.get(ALARM.exact_column, np.nan)) for row in ranked)
     values = [compared_value.row_value(row, ALARM).chosen_among(looks) for row in extremes]
-    remarks = compared_value.choice_remarks(values)
     texts = [
-        f"{quote_name(row['filter'])}, {value.text(form='.3g')}{remark}"
-        for row, value, remark in zip(extremes, values, remarks, strict=True)
+        f"{quote_name(row['filter'])}, {value.text(form='.3g')}" for row, value in zip(extremes, values, strict=True)
     ]
+    fields = {"usual": USUAL_FALSE_ALARM_RATE, "chosen": compared_value.choice_remark(values)}
     if len(texts) == 1 or not compared_value.are_distinguished(*values):
         text = tr(
-            "detection probability at the end of the manoeuvre, for P_FA ≈ {usual:g} per test: {one}.",
-            usual=USUAL_FALSE_ALARM_RATE,
+            "detection probability at the end of the manoeuvre, P_FA ≈ {usual:g} per test{chosen}: {one}.",
+            **fields,
             one="; ".join(texts),
         )
     else:
         text = tr(
-            "detection probability at the end of the manoeuvre, for P_FA ≈ {usual:g} per test: highest with {most}, "
-            "lowest with {least}.",
-            usual=USUAL_FALSE_ALARM_RATE,
+            "detection probability at the end of the manoeuvre, P_FA ≈ {usual:g} per test{chosen}: highest with "
+            "{most}; lowest with {least}.",
+            **fields,
             most=texts[0],
             least=texts[-1],
         )

@@ -38,6 +38,10 @@ def result():
     return radarsim.run(config())
 
 
+def estimate_text(row, column, unit=""):
+    return wording.estimate((row[column], row[f"{column}_lo"], row[f"{column}_hi"]), unit, ",.3g")
+
+
 def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
     rows, run_s = result.tables["tracking"], result.cases[0].axes.t_s[-1]
     by_case = {}
@@ -49,12 +53,12 @@ def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
         sentence = " ".join(of_case)
         for row in case_rows.to_dict("records"):
             assert f"{quote_name(row['filter'])} confirms " in sentence
-            assert f", keeps a track for {float(format(row['life_s'], '.3g')):,g} s [" in sentence
+            assert f", keeps a track for {estimate_text(row, 'life_s', 's')}" in sentence
             assert (
                 "] (extrapolated)"
                 in sentence.partition(f"{quote_name(row['filter'])} confirms ")[2].partition("false tracks")[0]
             ) == (row["life_s"] > run_s)
-            assert f" {float(format(row['false_tracks_per_hour'], '.3g')):,.10g} [" in sentence
+            assert f" {estimate_text(row, 'false_tracks_per_hour')}" in sentence
 
 
 def test_a_tracker_that_confirms_nothing_keeps_no_track(result):
