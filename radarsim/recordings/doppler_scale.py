@@ -30,6 +30,7 @@ MIN_WILD_MISSES, MAX_WILD_SHARE = 10.0, 0.2  # of an interval, in median misses;
 FOREIGN_CAUSE = term("they are no radial velocities: a column may be swapped")
 MIN_FOLDABLE, MAX_FOLDABLE = -1.05, 1 / 3  # multiples that folds may leave
 MAX_DRIFT_CHANGE = 0.2  # of such a multiple, relative, where a drift is allowed for
+MIN_WAVELENGTH_M, MAX_WAVELENGTH_M = 0.003, 0.5  # of radars whose Doppler frequencies may stand for speeds
 FOOT_M, KNOT_MPS, KMH_MPS, MPH_MPS = 0.3048, 1852 / 3600, 1 / 3.6, 1609.344 / 3600
 CAUSES = {  # multiples, and what leaves them
     1 / KNOT_MPS: term("they are in knots (--column velocity_kn=NAME)"),
@@ -52,9 +53,10 @@ CAUSES = {  # multiples, and what leaves them
     1e6: term("the times are in µs"),
     1e9: term("the times are in ns"),
     1e-3: term("the times are in a unit a thousand times larger, or the ranges in m, not in km"),
-    1 / 60: term("the times are in minutes"),
-    1 / 3600: term("the times are in hours"),
-    1 / 86400: term("the times are in days"),
+    60.0: term("the times are minutes and seconds, read as hours and minutes (--column t_mmss=NAME)"),
+    1 / 60: term("the times are in minutes (--column t_min=NAME)"),
+    1 / 3600: term("the times are in hours (--column t_h=NAME)"),
+    1 / 86400: term("the times are in days (--column t_days=NAME)"),
 }
 
 
@@ -217,12 +219,19 @@ def doppler_scale_message(scale: DopplerScale) -> str:
                   "--doppler-towards, or without it if it was given")  # fmt: skip
     is_opposite = scale.multiple < 0 and scale.causes
     sign = tr("; and the sign is opposite: --doppler-towards") if is_opposite else ""
-    cause = tr(" or ").join(map(tr, scale.causes)) or tr(
-        "their unit, or that of ranges or times, is another, or a column is swapped"
-    )
+    cause = tr(" or ").join(map(tr, scale.causes)) or _unknown_cause(scale.multiple)
     return tr(
         "the Doppler speeds miss the change of the range by a factor of {multiple}: {cause}{sign}",
         multiple=significant_digits(abs(scale.multiple), "#.3g"),
         cause=cause,
         sign=sign,
     )
+
+
+def _unknown_cause(multiple: float) -> str:
+    """What may leave a multiple that no unit leaves; a large one may be of frequencies, at a wavelength."""
+    wavelength_m = 2 / abs(multiple)
+    if not MIN_WAVELENGTH_M < wavelength_m < MAX_WAVELENGTH_M:
+        return tr("their unit, or that of ranges or times, is another, or a column is swapped")
+    return tr("their unit, or that of ranges or times, is another (as Hz, at a wavelength of {length:.3g} m), or a "
+              "column is swapped", length=wavelength_m)  # fmt: skip

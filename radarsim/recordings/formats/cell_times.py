@@ -1,5 +1,6 @@
 """Times and dates as cells of a table have them."""
 
+import datetime
 import re
 
 import numpy as np
@@ -30,8 +31,9 @@ MONTHS = (  # of each month the names that a cell may have, or the beginning of
 )
 LEAP_SECOND_PATTERN = re.compile(r"(?<!\d)\d\d:\d\d:60(?!\d)")
 FIRST_DATED_S, LAST_DATED_S = 6.3e8, 4.2e9  # since 1970: recordings of 1990 to 2100
+SPREADSHEET = "a spreadsheet"
 DAY_NUMBERS = (  # the first and last number of days of recordings, and that of 1970; of a spreadsheet to 2041
-    ("a spreadsheet", 25569.0, 51544.0, 25569.0),
+    (SPREADSHEET, 25569.0, 51544.0, 25569.0),
     ("modified Julian days", 51544.0, 88069.0, 40587.0),
     ("Matlab", 719529.0, 770000.0, 719529.0),
     ("Julian days", 2440587.5, 2491000.0, 2440587.5),
@@ -40,6 +42,43 @@ FRACTIONS_OF_DAY = "fractions of a day"
 DATE_DIGITS_PATTERN = re.compile(r"(?:19|20)\d{2}[01]\d[0-3]\d[0-2]\d[0-5]\d[0-5]\d(?:\.\d*)?")  # 20261128120006.25
 MIN_CLOCK_ROWS, MIN_CLOCK_SECONDS = 20, 5  # different times, and seconds in them, that show what clock digits are
 MAX_DAY_STEP = 1.2e-3  # of day numbers from row to row: 100 s; of seconds it would be a kilohertz
+
+
+DAYS_TO_1904 = 1462.0  # by which days of a spreadsheet that count from 1904 are fewer
+TENTHS_PATTERN = re.compile(r"[0-5]?\d:[0-5]\d[.,]\d+")  # minutes and seconds, as a spreadsheet shows them
+MINUTES_PATTERN = re.compile(r"(\d{1,3}):([0-5]?\d(?:[.,]\d+)?)")
+TICKS_S, TICKS_1970 = 1e-7, (621_355_968e9, 116_444_736e9)  # of .NET and of Windows, at 1970
+FIRST_TICKS, FIRST_TICKS_S = 1.2e17, 9.4e8  # of 2000: ns of 1970 would be of one year then
+ZONE_HOURS = {  # names that mean one zone only
+    **dict.fromkeys(("z", "utc", "ut", "gmt", "wet", "zulu"), 0), **dict.fromkeys(("cet", "mez", "west"), 1),
+    **dict.fromkeys(("cest", "mesz", "eet"), 2), **dict.fromkeys(("msk", "мск", "eest"), 3),
+    **dict.fromkeys(("jst", "kst"), 9), "edt": -4, "pdt": -7, "mdt": -6, "pst": -8,
+}  # fmt: skip
+AMBIGUOUS_ZONES = ("est", "cst", "cdt", "ist", "bst", "mst", "ast", "sst")
+ZONE_PATTERN = re.compile(r"(.*?\d:\d.*?)\s*(?:\(?([^\W\d_]{1,5})\)?)?\s*([+-]\d{1,2}(?::?[0-5]\d)?)?")
+
+
+def split_zone(text: str) -> tuple[str, float] | None:
+    """A time without the zone after it, and what that is ahead of UTC, s; None of a text without a zone. Raises
+    ValueError for a name that several zones have."""
+    match = ZONE_PATTERN.fullmatch(text)
+    if match is None or not (match[2] or match[3]):
+        return None
+    name = (match[2] or "z").lower()
+    if name in AMBIGUOUS_ZONES:
+        raise ValueError(text)
+    if name not in ZONE_HOURS or (match[3] and ZONE_HOURS[name]):
+        return None
+    digits = re.sub(r"\D", "", match[3] or "0")
+    hours, minutes = (int(digits), 0) if len(digits) < 3 else (int(digits[:-2]), int(digits[-2:]))
+    ahead_s = 3600.0 * hours + 60.0 * minutes
+    return match[1], ahead_s * (-1 if match[3] and match[3][0] == "-" else 1) + 3600.0 * ZONE_HOURS[name]
+
+
+def minute_clock_s(text: str) -> float | None:
+    """Seconds after the full hour of minutes and seconds, as 12:30.5; None of another text."""
+    match = MINUTES_PATTERN.fullmatch(text)
+    return None if match is None else 60.0 * int(match[1]) + float(match[2].replace(",", "."))
 
 
 def second_of_day(match: re.Match[str]) -> float:
@@ -130,10 +169,19 @@ def day_number_s(days: float) -> float:
     return (days - origin) * DAY_S
 
 
+def day_text(seconds: float) -> str:
+    """The day of a time from 1970, 2026-11-28."""
+    return f"{datetime.datetime.fromtimestamp(seconds, datetime.UTC):%Y-%m-%d}"
+
+
 def scaled_time(t: float) -> tuple[float, float] | None:
-    """A time in s, and the unit of the number: s, or ms, µs or ns of 1970, by the year that they give; None for a
-    number that is too large for seconds, and gives no such year."""
+    """A time in s, and the unit of the number: s, or ms, µs or ns of 1970, or tenths of µs of 1 or 1601, by the year
+    that they give; None for a number that is too large for seconds, and gives no such year."""
     if abs(t) < LAST_DATED_S:
         return t, 1.0
+    if t >= FIRST_TICKS:
+        for origin in TICKS_1970:
+            if FIRST_TICKS_S <= (ticks_s := (t - origin) * TICKS_S) < LAST_DATED_S:
+                return ticks_s, TICKS_S
     unit = next((unit for unit in (1e-3, 1e-6, 1e-9) if FIRST_DATED_S <= t * unit < LAST_DATED_S), None)
     return None if unit is None else (t * unit, unit)

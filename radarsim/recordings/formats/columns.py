@@ -27,6 +27,7 @@ from radarsim.recordings.formats.units import (
     split_unit,
 )
 
+FREQUENCY_UNITS = ("hz", "khz", "гц", "кгц")
 MAX_NAMED_UNITS = 4  # in a fault, beside the first
 
 
@@ -276,6 +277,9 @@ class Header:
 
     def _unknown_unit_fault(self, ours: str, unit: str) -> str:
         name, units = self.columns[ours].name, ", ".join(QUANTITIES[ours].units)
+        if ours == "velocity_mps" and unit in FREQUENCY_UNITS:
+            cure = "half the wavelength times a Doppler frequency is the speed: make such a column"
+            return f"{self.path}:1: {name}: must be a speed, in one of {units}; got {unit!r}; {cure}"
         cure = f"--column {name_by_cells(ours, self._cells(ours))}={shlex.quote(name)}"
         return f"{self.path}:1: {name}: the unit must be one of {units}; got {unit!r}; it is stated by {cure}"
 

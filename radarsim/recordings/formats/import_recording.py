@@ -435,8 +435,9 @@ class _Import:
         lost = sum(counts.values())
         if self.options.allow_loss or lost <= MAX_LOSS * (self.result.rows + lost):
             return None
-        return (f"{self.reader.path}: {lost} of {self.result.rows + lost} rows would be left out: "
-                f"{', '.join(skip_counts(counts))}; --allow-loss imports the others")  # fmt: skip
+        reasons = f"{', '.join(skip_counts(counts))}{self.later_rows.cause()}"
+        return (f"{self.reader.path}: {lost} of {self.result.rows + lost} rows would be left out: {reasons}; "
+                "--allow-loss imports the others")  # fmt: skip
 
     def finish(self) -> ImportResult:
         """The result, with notes for the user."""

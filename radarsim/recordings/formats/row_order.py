@@ -18,6 +18,7 @@ from radarsim.recordings.time_spans import HOUR_S, MIN_DATED_S, ROLLOVER_S, WEEK
 
 MAX_AGE_S = 2 * DAY_S  # of a file, from the last time in it to when it was written
 MAX_STEP_INTERVALS, MAX_STEP_S = 3.0, 300.0  # from the row before a clock is set back to that after it
+MIN_LOST_TIMES, MAX_LOST_TIMES = 5, 1000  # of rows with the time of another, that show what their times lack
 LEAP_DAYS = ((1, 1), (7, 1))  # months and days before which leap seconds are
 ZONE_STEP_HOURS, ZONE_TOLERANCE = 0.5, 0.01  # by which time zones differ; of that
 LEAP_SECOND_TOLERANCE_S, MAX_LEAP_SECOND_STEP_S = 0.2, 60.0  # of the second; of rows from midnight
@@ -74,6 +75,7 @@ class LaterRows:
     def __init__(self, skipped: Counter[str], is_sorted: bool):
         self.skipped, self.is_sorted = skipped, is_sorted
         self.lost = 0  # rows left out, not counting those that say what the one before says
+        self.lost_times: list[float] = []  # of the first of these, at most MAX_LOST_TIMES
         self.last_times: dict[str, float] = {}
         self.last_rows: dict[str, int] = {}  # of the batch, by track
         self.previous: tuple[Batch, dict[str, int]] | None = None  # the batch before
@@ -104,6 +106,16 @@ class LaterRows:
         else:
             self.skipped[SAME_TIME_REASON] += 1
             self.lost += 1
+            if len(self.lost_times) < MAX_LOST_TIMES:
+                self.lost_times.append(float(batch.columns["t_s"][i]))
+
+    def cause(self) -> str:
+        """Why rows have equal times, in English: that their times lack seconds, or parts of them; '' if they do not."""
+        times = np.array(self.lost_times)
+        for unit_s, unit, missing in ((60.0, "minutes", "seconds"), (1.0, "seconds", "decimals")):
+            if len(times) >= MIN_LOST_TIMES and (times % unit_s == 0).all():
+                return f"; times are whole {unit}: their {missing} may be missing, or two sensors have one name"
+        return ""
 
 
 def _row_values(batch: Batch, i: int) -> tuple[str, ...]:

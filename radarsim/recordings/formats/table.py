@@ -6,6 +6,7 @@ without a zone (default UTC), or, where the user says so, day numbers. The time 
 has several. Assumptions are in `notes`."""
 
 import math
+import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
@@ -17,8 +18,18 @@ from radarsim.recordings.formats.cell_times import TIME_FORMATS
 from radarsim.recordings.formats.column_suggestions import cell_number
 from radarsim.recordings.formats.columns import EARTH_COLUMNS, QUANTITIES, Header
 from radarsim.recordings.formats.sheet import Sheet
-from radarsim.recordings.formats.units import CLOCK_DIGITS, DAYS, DEGREES, KNOT_MPS, TIME_UNITS, TURNS
+from radarsim.recordings.formats.units import (
+    CLOCK_DIGITS,
+    DAYS,
+    DAYS_1904,
+    DEGREES,
+    KNOT_MPS,
+    MINUTE_CLOCK,
+    TIME_UNITS,
+    TURNS,
+)
 from radarsim.recordings.row_faults import Faults
+from radarsim.recordings.time_spans import HOUR_S
 
 COMMENT_MARKS = ("#", "//")
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
@@ -50,6 +61,7 @@ class Table:
         self.kind = records.POSITIONS if self.header.reads_positions else records.PLOTS
         self.time_name = sheet.header[self.columns["t_s"].position].strip()
         self.clock = records.UnrolledClock(records.DAY_S, near_s=MIDNIGHT_S)
+        self.minute_clock = records.UnrolledClock(HOUR_S)
         self.day_s = math.nan  # of the date read last
         self.unit_s = 1.0  # of times that are too great for seconds
         self.is_leap_second = False  # of the row
@@ -165,7 +177,7 @@ class Table:
         if not self.is_checked:
             self.is_checked = True
             time = self.columns["t_s"]
-            if time.unit not in (DAYS, CLOCK_DIGITS) and not self.has_clock_times:
+            if time.unit not in (DAYS, DAYS_1904, CLOCK_DIGITS) and not self.has_clock_times:
                 first_cell = next((row[time.position] for row in self.sheet.sample), f"{batch.columns['t_s'][0]:.15g}")
                 table_checks.refuse_clock_digits(batch, self.path, time.name, first_cell)
                 table_checks.refuse_day_numbers(batch, self.path, time.name, "date" in self.columns, first_cell)
@@ -318,13 +330,22 @@ class Table:
                 return self._at_date(cell_times.clock_digits_s(t), cells)
             if (date := cell_times.digits_date_s(text)) is not None:
                 return date
-            if column.unit == DAYS:
-                is_time_of_day = 0 <= t < 1
-                return self._at_date(t * records.DAY_S, cells) if is_time_of_day else cell_times.day_number_s(t)
+            if column.unit in (DAYS, DAYS_1904):
+                is_time_of_day, shift = 0 <= t < 1, cell_times.DAYS_TO_1904 * (column.unit == DAYS_1904)
+                return self._at_date(t * records.DAY_S, cells) if is_time_of_day else cell_times.day_number_s(t + shift)
             return self._at_date(t, cells) if 0 <= t < records.DAY_S else self._scale_time(t)
         except ValueError:
-            self._add_fault("t_s", f"must be a time in s, {TIME_FORMATS}", repr(text[:60]))
+            self._add_fault("t_s", f"must be a time in s, {TIME_FORMATS}", repr(text[:60]), self._time_cure(text))
             return math.nan
+
+    def _time_cure(self, text: str) -> str:
+        """What helps with the cell of a time that cannot be read; '' where that is not known."""
+        zone = re.search(r"[^\W\d_]+(?:/\w+)?$", text)
+        if zone and ":" in text and zone[0].lower() not in ("am", "pm"):
+            return f"a zone is stated by its offset, as +03:00 in place of {zone[0]}"
+        if cell_times.minute_clock_s(text) is not None:
+            return f"minutes and seconds are stated by --column t_mmss={shlex.quote(self.columns['t_s'].name)}"
+        return ""
 
     def _at_date(self, t: float, cells: list[str]) -> float:
         """A time of day, s, at the date beside it or before it; unrolled where the table has no date."""
@@ -362,11 +383,24 @@ class Table:
         return scaled[0]
 
     def _parse_time(self, text: str, cells: list[str]) -> float:
+        """Seconds of a time of day, a date, or both, which a zone may follow; raises ValueError."""
+        try:
+            return self._parse_plain_time(text, cells)
+        except ValueError:
+            zoned = cell_times.split_zone(text)
+            if zoned is None:
+                raise
+        return self._parse_plain_time(zoned[0], cells) - zoned[1]
+
+    def _parse_plain_time(self, text: str, cells: list[str]) -> float:
         """Seconds of a time of day, a date, or both, `20.11.2026 10:00:00` or ISO 8601; raises ValueError."""
         self.has_clock_times = True
         if cell_times.LEAP_SECOND_PATTERN.search(text):
             self.is_leap_second = True
             return math.nan
+        is_in_minutes = self.columns["t_s"].unit == MINUTE_CLOCK or cell_times.TENTHS_PATTERN.fullmatch(text)
+        if is_in_minutes and (time := cell_times.minute_clock_s(text)) is not None:
+            return self.minute_clock(time)
         if (time := cell_times.clock_s(text)) is not None:
             self.of_day = "date" not in self.columns
             return self._at_date(time, cells)

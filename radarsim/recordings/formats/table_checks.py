@@ -52,9 +52,14 @@ def refuse_day_numbers(batch: Batch, path: str, name: str, has_date: bool, first
         return
     is_fast = bool(speeds) and float(np.median(np.concatenate(speeds))) > MAX_PLAUSIBLE_MPS
     if is_fast or (kind != cell_times.FRACTIONS_OF_DAY and any(word in split_unit(name)[0] for word in DATE_STEMS)):
-        description = kind if kind == cell_times.FRACTIONS_OF_DAY else f"day numbers, as of {kind}"
-        raise ConfigError(f"{path}: {name}: must be in s; {first_cell!r} and the others are {description}: "
-                          f"--column t_days={shlex.quote(name)}")  # fmt: skip
+        is_fraction, column = kind == cell_times.FRACTIONS_OF_DAY, shlex.quote(name)
+        description = kind if is_fraction else f"day numbers, as of {kind}"
+        cure = f"--column t_days={column}"
+        if kind == cell_times.SPREADSHEET:
+            first_s = cell_times.day_number_s(float(numbers[0]))
+            dates = [cell_times.day_text(first_s + shift * records.DAY_S) for shift in (0, cell_times.DAYS_TO_1904)]
+            cure += f" ({dates[0]}); if they count from 1904 ({dates[1]}): --column t_days1904={column}"
+        raise ConfigError(f"{path}: {name}: must be in s; {first_cell!r} and the others are {description}: {cure}")
 
 
 def refuse_wrapped_bearings(batch: Batch, path: str, column: Column) -> None:

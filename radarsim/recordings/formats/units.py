@@ -23,10 +23,16 @@ DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 
 RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()}
 RADIANS |= {unit: 2 * math.pi / turn for unit, turn in TURNS.items()}
 RADIANS["mrad"] = 1e-3
+DAYS_1904 = "days1904"  # of a spreadsheet whose days count from 1904
+MINUTE_CLOCK = "mmss"  # minutes and seconds of a time of day, as 12:30.5
 DAYS = "days"  # of a spreadsheet, of Matlab, Julian ones: numbers that `cell_times` tells apart
 CLOCK_DIGITS = "hhmmss"  # a time of day as a number, 120006.25
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "dmy": 1.0, "mdy": 1.0}  # dmy: day before month
-TIME_UNITS |= {DAYS: 1.0, CLOCK_DIGITS: 1.0}
+TIME_UNITS |= {DAYS: 1.0, DAYS_1904: 1.0, CLOCK_DIGITS: 1.0, MINUTE_CLOCK: 1.0, "min": 60.0, "h": 3600.0}
+SHORT_TIME_UNITS = (
+    "min",
+    "h",
+)  # which are units at the end of a name only after a comma, in brackets, or of t and time
 UNIT_SYNONYMS = {  # as people write them, in English, German and Russian; without points at the end
     **dict.fromkeys(("metre", "metres", "meter", "meters", "mtr", "м", "метр", "метры", "метров", "метрах"), "m"),
     **dict.fromkeys(("kilometre", "kilometres", "kilometer", "kilometers", "км", "километры", "километрах"), "km"),
@@ -47,6 +53,8 @@ UNIT_SYNONYMS = {  # as people write them, in English, German and Russian; witho
     **dict.fromkeys(("с", "сек", "секунды", "секунд", "секундах", "sek", "sekunden", "sec", "secs", "seconds"), "s"),
     **dict.fromkeys(("мс", "msec", "millisekunden", "milliseconds"), "ms"), **dict.fromkeys(("мкс", "µs", "μs"), "us"),
     **dict.fromkeys(("tage", "tagen", "дни", "сутки"), DAYS), "нс": "ns",
+    **dict.fromkeys(("minute", "minutes", "mins", "minuten", "мин", "минуты", "минут", "минутах"), "min"),
+    **dict.fromkeys(("hour", "hours", "hrs", "hr", "std", "stunden", "ч", "час", "часы", "часов", "часах"), "h"),
 }  # fmt: skip
 UNITS = {unit for units in (HEIGHTS, SPEEDS, RADIANS, TIME_UNITS) for unit in units}
 UNIT_PATTERN = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
@@ -74,7 +82,8 @@ def split_unit(name: str) -> tuple[str, str]:
     name = _stem(name)
     stem, _, last = name.rpartition("_")
     unit = _unit(last)
-    return (stem, unit) if stem and unit in UNITS else (name, "fl" if name in FLIGHT_LEVELS else "")
+    is_unit = unit in UNITS and (unit not in SHORT_TIME_UNITS or stem in ("t", "time", "zeit", "время"))
+    return (stem, unit) if stem and is_unit else (name, "fl" if name in FLIGHT_LEVELS else "")
 
 
 def _stem(text: str) -> str:
