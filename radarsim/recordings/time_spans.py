@@ -10,6 +10,13 @@ MAX_ZONE_HOURS = 14
 WEEK_S = 7 * DAY_S
 ROLLOVER_S = 1024 * WEEK_S  # of the weeks of GPS, which are counted by ten bits
 
+CLOCK_ZEROS = {  # other zeros of clocks, and how much later such times look, s
+    "1904, as of LabVIEW": 2_082_844_800.0,
+    "1900, as of NTP": 2_208_988_800.0,
+    "1980, as of GPS": -315_964_782.0,
+    "1904, as days of a spreadsheet": -1462 * DAY_S,
+}
+
 
 class TimeSpan(NamedTuple):
     """The first and last time of a recording, s from 1970 or from midnight; has_clock: whether they count from such."""
@@ -44,6 +51,10 @@ def meeting_text(plots: TimeSpan, positions: TimeSpan) -> str:
         if _overlap(plots, positions, sign * ROLLOVER_S):
             late_file = "positions" if sign > 0 else "plots"
             return f"{text}: they meet if the {late_file} are 1024 weeks later (a receiver that missed a rollover)"
+    for zero, offset_s in CLOCK_ZEROS.items():
+        for shift_s, late_file in ((-offset_s, "positions"), (offset_s, "plots")):
+            if _overlap(plots, positions, shift_s):
+                return f"{text}: they meet if the times of the {late_file} count from {zero}"
     return f"{text}: they do not meet"
 
 

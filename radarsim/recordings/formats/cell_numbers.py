@@ -5,7 +5,7 @@ import math
 import re
 from collections.abc import Mapping
 
-from radarsim.recordings.formats.units import DEGREES, RADIANS, cell_unit
+from radarsim.recordings.formats.units import DEGREES, EARTH_DEGREES, RADIANS, cell_unit
 
 LARGEST_NUMBER = 1e15
 SIXTY = 60  # minutes in a degree, seconds in a minute
@@ -70,7 +70,7 @@ class CellNumbers:
         if ours in HEMISPHERES and (sides := _split_hemisphere(text, ours)):
             angle, sign = sides
             return sign * abs(self.quantity(angle, "", 1.0, DEGREES)), 1.0
-        if (units is DEGREES or units is RADIANS) and (parts := SEXAGESIMAL_PATTERN.fullmatch(text)):
+        if (units in (DEGREES, EARTH_DEGREES, RADIANS)) and (parts := SEXAGESIMAL_PATTERN.fullmatch(text)):
             degrees, minutes, seconds = (float(part.replace(",", ".")) for part in parts.groups(default="0"))
             if max(minutes, seconds) > SIXTY:  # 60.0 is rounded
                 raise ValueError(text)

@@ -6,6 +6,7 @@ positions with names from aviation (`gs`, `alt_baro`, …) are in feet, knots an
 knots, like the exports that use them. Ranges and bearings have no such convention: their units must be stated."""
 
 import math
+import re
 import shlex
 import types
 from collections.abc import Mapping, Sequence
@@ -13,10 +14,11 @@ from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
-from radarsim.recordings.formats.cell_numbers import unit_of_cells
+from radarsim.recordings.formats.cell_numbers import hemisphere_sign, unit_of_cells
 from radarsim.recordings.formats.column_suggestions import cell_number, name_by_cells, suggest_options
 from radarsim.recordings.formats.units import (
     DEGREES,
+    EARTH_DEGREES,
     FLIGHT_LEVELS,
     HEIGHTS,
     LENGTHS,
@@ -27,6 +29,7 @@ from radarsim.recordings.formats.units import (
     split_unit,
 )
 
+MINUTE_NAME = re.compile(r"(?:lat|lon|lng|long)(?:itude)?[_ ]*(?:min|minutes?|sec|seconds?)")
 FREQUENCY_UNITS = ("hz", "khz", "гц", "кгц")
 MAX_NAMED_UNITS = 4  # in a fault, beside the first
 
@@ -57,8 +60,8 @@ QUANTITIES = {
             *("callsign", "flight", "id", "track", "name"),
         )
     ),
-    "latitude_deg": Quantity(("lat", "latitude"), DEGREES, "deg"),
-    "longitude_deg": Quantity(("lon", "lng", "long", "longitude"), DEGREES, "deg"),
+    "latitude_deg": Quantity(("lat", "latitude"), EARTH_DEGREES, "deg"),
+    "longitude_deg": Quantity(("lon", "lng", "long", "longitude"), EARTH_DEGREES, "deg"),
     "altitude_m": Quantity(
         ("geoaltitude", "geo_altitude", "alt_geom", "altitude", "alt", "height", "ele"), HEIGHTS, "m"
     ),
@@ -150,8 +153,9 @@ def _printable(name: str) -> str:
 class Header:
     """The columns of a file by our names, those assigned by the user first; raises ConfigError.
 
-    columns: by name of the quantity; identities: the indices of those in IDENTITIES; reads_positions: whether positions
-    are read, not plots; aviation, maritime: whether names follow their customs; sample: some rows of the file."""
+    columns: by name of the quantity; hemispheres: the indices of those with N or S, E or W, by coordinate;
+    identities: the indices of those in IDENTITIES; reads_positions: whether positions are read, not plots; aviation,
+    maritime: whether names follow their customs; sample: some rows of the file."""
 
     def __init__(self, path: str, names: list[str], assigned: Mapping[str, str], sample: Sequence[Sequence[str]] = ()):
         self.path, self.names, self.sample = path, [_printable(name) for name in names], sample
@@ -172,6 +176,7 @@ class Header:
             kind: [places[name] for name in names if name in places] for kind, names in IDENTITIES.items()
         }
         self.identities = {kind: indices[0] for kind, indices in identity_columns.items() if indices}
+        self.hemispheres = self._find_hemispheres()
         if "track" in self.columns and not self.identities:
             self.identities["address"] = self.columns["track"].position  # one's own name of it
         self._check()
@@ -231,6 +236,19 @@ class Header:
             for ours in set(EARTH_COLUMNS) - set(self.columns):
                 self.columns[ours] = self._column(ours, indices[JOINT_POSITION], "")
 
+    def _find_hemispheres(self) -> dict[str, int]:
+        """The columns that hold the hemisphere of a coordinate, N or S, E or W, by its quantity."""
+        found = {}
+        used = {column.position for column in self.columns.values()}
+        for ours in EARTH_COLUMNS if self.reads_positions else ():
+            free = sorted(set(range(len(self.names))) - used, key=lambda i: abs(i - 1 - self.columns[ours].position))
+            for i in free:
+                signs = [hemisphere_sign(row[i], ours) for row in self.sample if i < len(row) and row[i].strip()]
+                if signs and not any(map(math.isnan, signs)):
+                    found[ours] = i
+                    break
+        return found
+
     def _column(self, ours: str, index: int, unit: str) -> Column:
         """A column in its unit; '' where neither its name nor the user states one."""
         name, quantity = self.names[index], QUANTITIES[ours]
@@ -242,7 +260,7 @@ class Header:
         if unit and not is_known:
             self.unknown_units[ours] = unit
         unit_or_default = unit or self.customary_units.get(ours, quantity.default_unit)
-        is_assumed = not unit and ours not in UNITLESS and quantity.units is not DEGREES
+        is_assumed = not unit and ours not in UNITLESS and quantity.units not in (DEGREES, EARTH_DEGREES)
         return Column(index, name, quantity.units.get(unit_or_default, 1.0), unit_or_default, is_assumed)
 
     def _check(self) -> None:
@@ -262,6 +280,10 @@ class Header:
                 hints = "; ".join(f"{name}: {', '.join(QUANTITIES[name].names)}" for name in missing)
             ready = f"; perhaps {' '.join(guesses)}" if guesses else ""
             faults.append(f"{self.path}:1: must have {needed}; missing ({hints}); got {got}{ready}")
+        minutes = [name for name in self.names if MINUTE_NAME.fullmatch(name.lower())]
+        if self.reads_positions and minutes:
+            must = "must be in the cells of the degrees, as 52°18.5', not in columns of their own"
+            faults.append(f"{self.path}:1: {', '.join(minutes)}: {must}")
         if columns_without_unit := {
             ours: column.name for ours, column in self.columns.items() if not column.unit and ours not in UNITLESS
         }:

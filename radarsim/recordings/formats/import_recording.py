@@ -21,6 +21,7 @@ from radarsim.recordings.csv_output import column_texts
 from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
 from radarsim.recordings.formats.asterix import Asterix
+from radarsim.recordings.formats.course_check import CourseCheck
 from radarsim.recordings.formats.doppler_check import DopplerCheck
 from radarsim.recordings.formats.fill_values import FILL_NOTE, remove_fill_velocities
 from radarsim.recordings.formats.import_options import Format, Options
@@ -156,6 +157,7 @@ class _Import:
         self.radars = Counter[str]()
         self.note_counts = Counter[str]()  # by what a note says of these rows
         self.doppler = DopplerCheck()
+        self.courses = CourseCheck()
         self.track_names: set[str] = set()
 
     def rows(self) -> Iterator[Iterable[tuple[str, ...]]]:
@@ -290,6 +292,7 @@ class _Import:
             self._note_alternation(batch, self._positions(batch, columns))
         if self.site_distance and batch.kind == POSITIONS:
             self.site_distance.add(batch)
+            self.courses.add(batch)
         if batch.kind == PLOTS:
             self.doppler.add(batch)
         if self.truth is not None:
@@ -457,5 +460,6 @@ class _Import:
         if self.truth is not None:
             result.notes += self.truth.notes()
         # Where a unit changes within the recording, what the velocities miss follows from that.
+        result.notes += self.courses.notes()
         result.notes += [self.jumps.message()] if self.jumps else self.doppler.notes(self.options.towards)
         return result

@@ -1,16 +1,21 @@
 """Positions that cannot be seen from a radar: of no fix, or with swapped or turned coordinates."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from radarsim.language.translate import term
 from radarsim.recordings.formats.records import POSITIONS, Batch
 from radarsim.recordings.formats.sites import Site
+from radarsim.recordings.formats.table_checks import horizon_m
+from radarsim.recordings.formats.units import degrees_of_minutes
 
 MAX_RADAR_DISTANCE_M = 1e6  # of a target that a radar sees along a straight line: an aircraft at 20 km from a mountain
 EARTH_RADIUS_M = 6.371e6
 MAX_KEPT_ROWS = 2000  # from which the cause is told
+BELOW_HORIZON, MIN_HIDDEN_M = 1.2, 200e3  # horizons, and least distance, from which a target is hidden
+MIN_HIDDEN_SHARE = 0.95  # of the positions
 NO_FIX_REASON = term("positions at 0°, 0°, which stand for no fix")
 
 
@@ -36,7 +41,7 @@ class SiteDistance:
         """Count the positions of a batch that are near the radar."""
         lat, lon = batch.columns["latitude_deg"], batch.columns["longitude_deg"]
         if self.rows < MAX_KEPT_ROWS:
-            self.sample.append(np.stack([lat, lon]))
+            self.sample.append(np.stack([lat, lon, batch.columns["altitude_m"]]))
         self.rows += len(lat)
         distance = _distance_m(self.latitude_deg, self.longitude_deg, lat, lon)
         self.near_rows += int((distance < MAX_RADAR_DISTANCE_M).sum())
@@ -44,17 +49,25 @@ class SiteDistance:
     def fault(self) -> str | None:
         """That no position is near the radar, and what would explain it: coordinates that are swapped, turned in sign,
         or in radians."""
-        if not self.rows or self.near_rows:
+        if not self.rows:
             return None
-        lat, lon = np.concatenate(self.sample, axis=1)
-        changes = {
-            "latitude and longitude are swapped, in the recording or in --at": (lon, lat),
+        lat, lon, height = np.concatenate(self.sample, axis=1)
+        signs = {
             "the longitude has the other sign, in the recording or in --at": (lat, -lon),
             "the latitude has the other sign, in the recording or in --at": (-lat, lon),
             "both have the other sign, in the recording or in --at": (-lat, -lon),
+        }
+        if self.near_rows:
+            return self._sign_fault(lat, lon, height, signs)
+        changes = signs | {
+            "latitude and longitude are swapped, in the recording or in --at": (lon, lat),
             "they are in radians (--column latitude_rad=NAME --column longitude_rad=NAME)": (
                 np.degrees(lat),
                 np.degrees(lon),
+            ),
+            "they are degrees and minutes (--column latitude_ddmm=NAME --column longitude_ddmm=NAME)": (
+                degrees_of_minutes(lat),
+                degrees_of_minutes(lon),
             ),
         }
         distances = {cause: self._median_m(*place) for cause, place in changes.items()}
@@ -64,6 +77,22 @@ class SiteDistance:
         if distances[cause] > MAX_RADAR_DISTANCE_M:
             return f"{far}, as far as a radar sees"
         return f"{far}; {distances[cause] / 1e3:.0f} km if {cause}"
+
+    def _sign_fault(
+        self, lat: np.ndarray, lon: np.ndarray, height: np.ndarray, signs: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    ) -> str | None:
+        """That the positions lie below the radar's horizon, and above it with the other sign."""
+        horizon = horizon_m(np.nan_to_num(height, nan=0.0))
+        distance = _distance_m(self.latitude_deg, self.longitude_deg, lat, lon)
+        if (distance > np.maximum(BELOW_HORIZON * horizon, MIN_HIDDEN_M)).mean() < MIN_HIDDEN_SHARE:
+            return None
+        for cause, (other_lat, other_lon) in signs.items():
+            other_distance = _distance_m(self.latitude_deg, self.longitude_deg, other_lat, other_lon)
+            if (other_distance < horizon).mean() >= MIN_HIDDEN_SHARE:
+                far, near = (np.median(metres) / 1e3 for metres in (distance, other_distance))
+                return (f"at: the positions lie {far:.0f} km from it (median), below its horizon; {near:.0f} km if "
+                        f"{cause}")  # fmt: skip
+        return None
 
     def _median_m(self, lat: np.ndarray, lon: np.ndarray) -> float:
         return float(np.median(_distance_m(self.latitude_deg, self.longitude_deg, lat, lon)))

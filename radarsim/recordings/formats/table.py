@@ -10,10 +10,12 @@ import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
+import numpy as np
+
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats import cell_times, columns, records, table_checks
-from radarsim.recordings.formats.cell_numbers import CellNumbers, is_missing, spoiled_number_cure
+from radarsim.recordings.formats.cell_numbers import CellNumbers, hemisphere_sign, is_missing, spoiled_number_cure
 from radarsim.recordings.formats.cell_times import TIME_FORMATS
 from radarsim.recordings.formats.column_suggestions import cell_number
 from radarsim.recordings.formats.columns import EARTH_COLUMNS, QUANTITIES, Header
@@ -23,14 +25,17 @@ from radarsim.recordings.formats.units import (
     DAYS,
     DAYS_1904,
     DEGREES,
+    EARTH_DEGREES,
     KNOT_MPS,
     MINUTE_CLOCK,
     TIME_UNITS,
     TURNS,
+    degrees_of_minutes,
 )
 from radarsim.recordings.row_faults import Faults
 from radarsim.recordings.time_spans import HOUR_S
 
+LARGEST_DEGREES, LARGEST_DDMM, MINUTES_OF_DEGREE = 360.0, 36_000.0, 60  # of coordinates as degrees and minutes, 5236.5
 COMMENT_MARKS = ("#", "//")
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
 MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * KNOT_MPS, 360.0  # of AIS: what is not below them means missing
@@ -259,10 +264,30 @@ class Table:
         lat, lon = self._parse_number(cells, "latitude_deg"), self._parse_number(cells, "longitude_deg")
         if (lat, lon) == UNKNOWN_POSITION or abs(lat) in UNKNOWN_DEGREES or abs(lon) in UNKNOWN_DEGREES:
             lat = lon = math.nan
-        for name, value, limit in (("latitude_deg", lat, 90), ("longitude_deg", lon, 360)):
-            if abs(value) > limit:
-                self._add_fault(name, f"must be from -{limit} to {limit} degrees", f"{value:g}")
+        lat, lon = self._coordinate("latitude_deg", lat, 90, cells), self._coordinate("longitude_deg", lon, 360, cells)
         return t, lat, lon, self._altitude(cells), speed * math.sin(course), speed * math.cos(course), up
+
+    def _coordinate(self, name: str, value: float, limit: int, cells: list[str]) -> float:
+        """A coordinate, degrees, with the sign of its hemisphere, which may stand in a column of its own."""
+        column = self.columns[name]
+        if column.unit == "ddmm":
+            value = float(degrees_of_minutes(np.array(value)))
+        if abs(value) > limit:
+            must = f"must be from -{limit} to {limit} degrees"
+            self._add_fault(name, must, f"{value:g}", self._coordinate_cure(name, value, limit))
+        if name in self.header.hemispheres:
+            sign = hemisphere_sign(cells[self.header.hemispheres[name]], name)
+            return value if math.isnan(sign) else sign * abs(value)
+        return value
+
+    def _coordinate_cure(self, name: str, value: float, limit: int) -> str:
+        """The units in which a coordinate that is too large may be; '' where there is none."""
+        size, theirs = abs(value), shlex.quote(self.columns[name].name)
+        likely = [unit for unit in ("e6", "e7") if LARGEST_DDMM < size <= limit / EARTH_DEGREES[unit]]
+        likely += ["ddmm"] if LARGEST_DEGREES < size <= 100 * limit and size % 100 < MINUTES_OF_DEGREE else []
+        stem = name.removesuffix("_deg")
+        grid = "; metres of a map grid are not read" if size > LARGEST_DDMM else ""
+        return " or ".join(f"--column {stem}_{unit}={theirs}" for unit in likely) + grid
 
     def _plot(self, cells: list[str]) -> tuple[float, ...]:
         """PLOT_COLUMNS of a row."""

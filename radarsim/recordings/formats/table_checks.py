@@ -124,10 +124,10 @@ def flight_level_factor(batch: Batch, columns: Mapping[str, Column]) -> float:
     height, r = batch.columns["altitude_m"][is_known], batch.columns["range_m"][is_known]
     if not height.size or height.max() > MAX_FLIGHT_LEVEL * column.factor:
         return 0.0
-    is_hidden, is_hidden_as_level = (r > _horizon_m(h) for h in (height, factor * height))
+    is_hidden, is_hidden_as_level = (r > horizon_m(h) for h in (height, factor * height))
     return factor if is_hidden.mean() > MIN_HIDDEN_SHARE > is_hidden_as_level.mean() else 0.0
 
 
-def _horizon_m(height: np.ndarray) -> np.ndarray:
+def horizon_m(height: np.ndarray) -> np.ndarray:
     """How far a target (n,) of a height, m, can be seen, m."""
     return HORIZON_M * (np.sqrt(RADAR_HEIGHT_M) + np.sqrt(np.maximum(height, 0.0)))

@@ -4,6 +4,8 @@ import math
 import re
 import unicodedata
 
+import numpy as np
+
 KNOT_MPS, FOOT_M, MILE_M = 1852 / 3600, 0.3048, 1609.344
 LENGTHS = {
     **{"m": 1.0, "km": 1e3, "ft": FOOT_M, "feet": FOOT_M, "nm": 1852.0, "nmi": 1852.0},
@@ -20,6 +22,7 @@ TURNS = {  # in a turn, by unit; of an encoder's counts, `acp`
     "cdeg": 36_000,  # hundredths of a degree
 }
 DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 / math.pi}
+EARTH_DEGREES = {**DEGREES, "e7": 1e-7, "e6": 1e-6, "ddmm": 1.0}  # of coordinates; ddmm: degrees and minutes
 RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()}
 RADIANS |= {unit: 2 * math.pi / turn for unit, turn in TURNS.items()}
 RADIANS["mrad"] = 1e-3
@@ -56,11 +59,17 @@ UNIT_SYNONYMS = {  # as people write them, in English, German and Russian; witho
     **dict.fromkeys(("minute", "minutes", "mins", "minuten", "мин", "минуты", "минут", "минутах"), "min"),
     **dict.fromkeys(("hour", "hours", "hrs", "hr", "std", "stunden", "ч", "час", "часы", "часов", "часах"), "h"),
 }  # fmt: skip
-UNITS = {unit for units in (HEIGHTS, SPEEDS, RADIANS, TIME_UNITS) for unit in units}
+UNITS = {unit for units in (HEIGHTS, SPEEDS, RADIANS, EARTH_DEGREES, TIME_UNITS) for unit in units}
 UNIT_PATTERN = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]$")
 PLAIN_UNIT_PATTERN = re.compile(  # `Range, km`, `range in km`, `дальность в м`, `Zeit/s`, `v/(m/s)`, of a unit
     r"^(.+?)\s*,\s*(\S+)$|^(.+?)\s+(?:in|в)\s+(\S.*)$|^([^/]+?)\s*/\s*\(?([^()]+?)\)?$"
 )
+
+
+def degrees_of_minutes(numbers: np.ndarray) -> np.ndarray:
+    """Angles (n,) in degrees that are written as degrees and minutes, 5236.5 for 52° 36.5'."""
+    size = np.abs(numbers)
+    return np.sign(numbers) * (size // 100 + size % 100 / 60)
 
 
 def turn_of(unit: str) -> float:

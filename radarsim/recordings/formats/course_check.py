@@ -1,0 +1,55 @@
+"""Positions that move against the courses that their records state, as those whose longitude or latitude has lost its
+sign."""
+
+import numpy as np
+
+from radarsim.language.translate import term, tr
+from radarsim.recordings.formats.records import POSITIONS, Batch
+from radarsim.recordings.grouping import rows_by_name
+
+MAX_ROWS, MAX_STEP_S = 3000, 60.0  # rows that are compared, and time from row to row
+METRES_PER_DEGREE = 111_195.0  # of latitude
+MIN_WAY_M = 30.0  # of a step, in an axis, whose direction counts
+MIN_STEPS, MIN_SHARE = 20, 0.9  # of the steps in an axis that are turned
+CAUSES = {  # by the axes that are turned, east and north
+    (True, False): term("the longitudes may have lost their sign"),
+    (False, True): term("the latitudes may have lost their sign"),
+    (True, True): term("both coordinates may have lost their sign, or the courses are reversed"),
+}
+
+
+class CourseCheck:
+    """Compare the steps of the first positions with their stated velocities."""
+
+    def __init__(self) -> None:
+        self.rows = 0
+        self.steps: list[np.ndarray] = []  # (2, 2, n): actual and stated, east and north, m
+
+    def add(self, batch: Batch) -> None:
+        """Take the steps of a batch, while there are fewer than MAX_ROWS rows."""
+        if batch.kind != POSITIONS or self.rows >= MAX_ROWS:
+            return
+        self.rows += len(batch.track)
+        names = ("t_s", "latitude_deg", "longitude_deg", "east_mps", "north_mps")
+        for name, rows in rows_by_name(batch.track).items():
+            t, lat, lon, east, north = (batch.columns[key][rows] for key in names)
+            steps_s = np.diff(t)
+            eastward = METRES_PER_DEGREE * np.cos(np.radians(lat[1:])) * np.diff(lon)
+            stated = [0.5 * (speed[1:] + speed[:-1]) * steps_s for speed in (east, north)]
+            is_used = np.isfinite(stated).all(axis=0) & (steps_s > 0) & (steps_s < MAX_STEP_S) & bool(name)
+            actual = [eastward, METRES_PER_DEGREE * np.diff(lat)]
+            self.steps.append(np.array([actual, stated])[:, :, is_used])
+
+    def notes(self) -> list[str]:
+        """A note if most steps are turned against the courses in an axis."""
+        if not self.steps:
+            return []
+        actual, stated = np.concatenate(self.steps, axis=2)
+        is_long = (np.abs(actual) > MIN_WAY_M) & (np.abs(stated) > MIN_WAY_M)
+        is_turned = is_long & (actual * stated < 0)
+        turned = tuple(
+            bool(long >= MIN_STEPS and count >= MIN_SHARE * long)
+            for count, long in zip(is_turned.sum(axis=1), is_long.sum(axis=1), strict=True)
+        )
+        cause = CAUSES.get(turned)
+        return [] if cause is None else [tr("positions move against their courses: {cause}", cause=tr(cause))]
