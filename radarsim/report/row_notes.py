@@ -74,6 +74,10 @@ def with_note_texts(table: "pd.DataFrame") -> "pd.DataFrame":
 def note_texts(table: "pd.DataFrame") -> list[str]:
     """The texts of the notes of a table's rows; none where it has no such column."""
     notes = table["note"].tolist() if "note" in table else []
-    distinct_notes = {id(note): note for note in notes}  # a few objects in thousands of rows
-    texts = {key: str(note) if isinstance(note, RowNote) else note for key, note in distinct_notes.items()}
-    return [texts[id(note)] for note in notes]
+    texts: list[str] = []
+    previous, text = None, ""
+    for note in notes:
+        if note is not previous:  # a few notes in thousands of rows, most of them in a row
+            previous, text = note, str(note) if isinstance(note, RowNote) else note
+        texts.append(text)
+    return texts

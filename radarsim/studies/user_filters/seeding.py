@@ -22,6 +22,7 @@ SEEDING = {  # by module: what takes a seed as its first argument
 }
 OTHER = 1_000_003  # is added to a seed for another one
 SEED_LIMIT = 2**32  # of the older generators of NumPy
+_object_hash = object.__hash__  # of an identity; `id` raises an event, which costs a call of every audit hook
 
 
 class SeedRecorder:
@@ -45,12 +46,13 @@ class SeedRecorder:
     def recording(self) -> Iterator[None]:
         """The code within is recorded, in this thread."""
         replacements = {id(seed): (seed, self._spy(module, seed)) for module, seed in _seeding_objects()}
+        seed_hashes = {_object_hash(seed) for seed, _ in replacements.values()}
         changed = []
         for name, module in list(sys.modules.items()):
             if name.partition(".")[0] in ("numpy", "torch", "jax") and name not in SEEDING:
                 continue
             names = getattr(module, "__dict__", {})
-            if replacements.keys().isdisjoint(map(id, list(names.values()))):  # as nearly all of a thousand modules
+            if seed_hashes.isdisjoint(map(_object_hash, list(names.values()))):  # as nearly all of a thousand modules
                 continue
             for key, value in [(key, value) for key, value in list(names.items()) if id(value) in replacements]:
                 changed.append((names, key, value))
