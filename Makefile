@@ -52,7 +52,7 @@ processors: $(VENV)/tested
 ALL ?=
 version-environments: $(VENV)/versions/installed$(ALL)
 
-versions: $(VENV)/versions/installed$(ALL)
+versions: $(VENV)/tested $(VENV)/versions/installed$(ALL)
 	$(BIN)/python -m tests.trust.versions check $(if $(ALL),--all)
 
 # constraints-lowest.txt, after a change of a lower bound in pyproject.toml; wants `uv` on PATH.
@@ -123,16 +123,17 @@ messages: $(VENV)/installed
 	PYTHONPATH=docs $(BIN)/python -m making.messages
 
 # All that the other targets install, in one step: the search for versions takes as long as each of theirs.
-environment:
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+environment: | $(BIN)/python
 	$(INSTALL) '.[test,docs]'
 	touch $(VENV)/installed $(VENV)/tested $(VENV)/documented
 
 clean:
 	rm -rf $(VENV) docs/_build build *.egg-info .pytest_cache .ruff_cache .hypothesis
 
-$(VENV)/installed: pyproject.toml constraints.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/installed: pyproject.toml constraints.txt | $(BIN)/python
 	$(INSTALL) .
 	touch $@
 
@@ -144,6 +145,6 @@ $(VENV)/documented: $(VENV)/installed
 	$(INSTALL) '.[docs]'
 	touch $@
 
-$(VENV)/versions/installed$(ALL): pyproject.toml constraints-lowest.txt $(VENV)/tested
+$(VENV)/versions/installed$(ALL): pyproject.toml constraints-lowest.txt | $(BIN)/python
 	$(BIN)/python -m tests.trust.versions install $(if $(ALL),--all)
 	touch $@
