@@ -38,6 +38,7 @@ class FastestLegs:
     def __init__(self) -> None:
         self.numbers: dict[str, int] = {}
         self.last = np.empty((0, 1))
+        self.steps = np.empty((3, 0))  # of the last batch: the number of the track, its time, and the step before it, s
 
     def has_jump(self, tracks: Sequence[str], t: np.ndarray, positions: np.ndarray) -> bool:
         """Whether a row at positions (n, d) is too far from that before it in its track, or too much later."""
@@ -55,6 +56,7 @@ class FastestLegs:
         is_last = np.diff(sorted_numbers, append=-1) != 0
         self.last[sorted_numbers[is_last]] = sorted_rows[is_last]
         steps = sorted_rows - previous
+        self.steps = np.array([sorted_numbers, sorted_rows[:, 0], steps[:, 0]])
         with np.errstate(invalid="ignore"):
             distances = np.sqrt((steps[:, 1:] ** 2).sum(axis=1))
             is_jump = (distances > MAX_JUMP_MPS * steps[:, 0]) | (steps[:, 0] > MAX_STEP_S)

@@ -47,9 +47,7 @@ class CourseCheck:
         actual, stated = np.concatenate(self.steps, axis=2)
         is_long = (np.abs(actual) > MIN_WAY_M) & (np.abs(stated) > MIN_WAY_M)
         is_turned = is_long & (actual * stated < 0)
-        turned = tuple(
-            bool(long >= MIN_STEPS and count >= MIN_SHARE * long)
-            for count, long in zip(is_turned.sum(axis=1), is_long.sum(axis=1), strict=True)
-        )
-        cause = CAUSES.get(turned)
+        long_steps, turned_steps = is_long.sum(axis=1), is_turned.sum(axis=1)
+        east, north = ((long_steps >= MIN_STEPS) & (turned_steps >= MIN_SHARE * long_steps)).tolist()
+        cause = CAUSES.get((east, north))
         return [] if cause is None else [tr("positions move against their courses: {cause}", cause=tr(cause))]

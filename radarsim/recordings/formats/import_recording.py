@@ -21,6 +21,7 @@ from radarsim.recordings.csv_output import column_texts
 from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
 from radarsim.recordings.formats.asterix import Asterix
+from radarsim.recordings.formats.clock_steps import may_be_small_step
 from radarsim.recordings.formats.course_check import CourseCheck
 from radarsim.recordings.formats.doppler_check import DopplerCheck
 from radarsim.recordings.formats.fill_values import FILL_NOTE, remove_fill_velocities
@@ -286,8 +287,10 @@ class _Import:
         if self.zero is None:
             self.zero = self._time_zero(float(t[0]))
         columns = {"t_s": t - self.zero} | self._add_places(batch)
-        if not self.all_at_once and self.legs.has_jump(batch.track, t, self._positions(batch, columns)):
-            raise NeedsAllRows
+        if not self.all_at_once:
+            has_jump = self.legs.has_jump(batch.track, t, self._positions(batch, columns))
+            if has_jump or may_be_small_step(*self.legs.steps):
+                raise NeedsAllRows
         if not self.result.rows:  # the first batch of rows shows it
             self._note_alternation(batch, self._positions(batch, columns))
         if self.site_distance and batch.kind == POSITIONS:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from radarsim.language.translate import term, tr
-from radarsim.recordings.formats.clock_steps import MAX_SET_BACKS, SetBack, find_set_back
+from radarsim.recordings.formats.clock_steps import MAX_SET_BACKS, MIN_STEPS, SetBack, find_set_back, find_small_step
 from radarsim.recordings.formats.records import DAY_S, Batch
 from radarsim.recordings.grouping import rows_by_name
 from radarsim.recordings.time_spans import HOUR_S, MIN_DATED_S, ROLLOVER_S, WEEK_S
@@ -49,6 +49,7 @@ FALL_NOTES = {  # by how much a clock is set back, s
 SET_BACK_NOTE = term(
     "the clock was set back by {size:.6g} s{when}: the {count} rows before are taken as that much earlier"
 )
+SET_ON_NOTE = term("the clock was set on by {size:.6g} s{when}: the {count} rows before are taken as that much later")
 ZONE_NOTE = term(
     "the clock was set back by {hours:g} hours{when}, as to another time zone: the {count} rows before are taken as "
     "that much earlier"
@@ -173,6 +174,11 @@ def _undo_clock_steps(batch: Batch, find_positions: Callable[[Batch], np.ndarray
         while len(notes) < MAX_SET_BACKS and (set_back := find_set_back(t, positions, tracks)) is not None:
             notes.append(_set_back_note(set_back))
             t[set_back.before] -= set_back.size_s
+    elif any(len(rows) > MIN_STEPS for rows in tracks):
+        positions = find_positions(batch)
+        while len(notes) < MAX_SET_BACKS and (set_back := find_small_step(t, positions, tracks)) is not None:
+            notes.append(_set_back_note(set_back))
+            t[set_back.before] -= set_back.size_s
     return notes
 
 
@@ -185,6 +191,8 @@ def _set_back_note(set_back: SetBack) -> str:
         if abs(end_s - midnight.timestamp()) < MAX_LEAP_SECOND_STEP_S and (midnight.month, midnight.day) in LEAP_DAYS:
             return tr(LEAP_SECOND_NOTE, count=count, when=midnight - datetime.timedelta(days=1))
     when = tr(" at {time:%H:%M:%S}", time=datetime.datetime.fromtimestamp(end_s, datetime.UTC)) if is_dated else ""
+    if set_back.size_s < 0:
+        return tr(SET_ON_NOTE, size=-set_back.size_s, count=count, when=when)
     hours = set_back.size_s / HOUR_S
     if hours > ZONE_STEP_HOURS and abs(hours / ZONE_STEP_HOURS - round(hours / ZONE_STEP_HOURS)) < ZONE_TOLERANCE:
         return tr(ZONE_NOTE, hours=ZONE_STEP_HOURS * round(hours / ZONE_STEP_HOURS), count=count, when=when)

@@ -76,6 +76,47 @@ def test_the_clock_of_several_targets_is_one(tmp_path, by_track):
     assert "the 75 rows before" in done.notes[0]
 
 
+@pytest.mark.parametrize("size_s", [1.2, 2.5, 4.9, -1.5])
+@pytest.mark.parametrize("noise_m", [0, 30])
+def test_a_clock_that_is_set_by_less_than_a_scan_is_named_and_undone(tmp_path, size_s, noise_m):
+    """The times then rise, but by no whole scan."""
+    times = 5.0 * np.arange(N)
+    done, columns, _ = imported(tmp_path, table(set_back(FIRST_S + times, size_s), noise_m))
+    np.testing.assert_allclose(columns["t_s"], times, rtol=0, atol=1e-6)
+    (note,) = done.notes
+    assert note.startswith(
+        f"the clock was set {'back' if size_s > 0 else 'on'} by {abs(size_s):g} s at 22:14:55: the 20"
+    )
+    assert done.skipped == []
+
+
+def test_the_clock_of_several_targets_is_set_by_less_than_a_scan(tmp_path):
+    rng = np.random.default_rng(4)
+    rows = [(FIRST_S + 4 * k + number - 1.5 * (k >= 20), number, 60_000 + (-1) ** number * 760 * k + rng.normal(0, 30))
+            for k in range(N) for number in range(3)]  # fmt: skip
+    text = "time,track,range_m\n" + "".join(f"{t},{number},{r:.1f}\n" for t, number, r in rows)
+    done, columns, _ = imported(tmp_path, text.encode())
+    assert done.notes[0].startswith("the clock was set back by 1.5 s at ")
+    assert "the 60 rows before" in done.notes[0]
+    assert np.unique(columns["t_s"] % 4).tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("kind", ["a plot between scans", "the antenna stops", "jitter"])
+def test_steps_that_are_no_scans_are_no_clock(tmp_path, kind):
+    """Where the places agree with the times."""
+    times = 4.0 * np.arange(N)
+    times = {
+        "a plot between scans": np.sort([*times, 81.5]),
+        "the antenna stops": times + 1.5 * (times >= 80),
+        "jitter": times + np.random.default_rng(1).uniform(0, 3, N),
+    }[kind]
+    noise = np.random.default_rng(2).normal(0, 30, times.size)
+    rows = (f"{t},7,{30_000 + 190 * t + e:.1f}" for t, e in zip(times, noise, strict=True))
+    done, columns, _ = imported(tmp_path, "\n".join(["time,track,range_m", *rows]).encode())
+    assert done.notes == []
+    np.testing.assert_allclose(columns["t_s"], times - times[0], rtol=0, atol=1e-9)
+
+
 def late_rows():
     k = list(range(N))
     return {
