@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
-from radarsim.language.translate import tr
+from radarsim.language.translate import quote_name, tr
 from radarsim.report import case_selection, compared_value, gain_sentences, key_labels, sentences, sweep_figures, tables
 from radarsim.report.drawing.model import Figure, Panel
 from radarsim.report.quantities import GAIN, Component
@@ -50,7 +50,7 @@ def _gain_panels(grid: sweep_figures.SweptGrid, gains: "pd.DataFrame", component
     names = [name for f, name in enumerate(axes.filters) if f != axes.baseline]
     for filter_name in names:
         for component in components:
-            words = str(component.words)
+            words = tr(str(component.words))
             title = f"{key_labels.escape_dollars(filter_name)}: {words}" if len(names) > 1 else words
             values = {
                 result.name: _gain_and_half_width(rows.get((result.name, filter_name, component.name)))
@@ -103,8 +103,8 @@ def gain_map_sentences(
                 text = tr(
                     "Gain of {filter} against {base} in the {quantity} at the last scan: {least} ({where_least}) to "
                     "{greatest} ({where_greatest}){remark}.",
-                    filter=filter_name,
-                    base=axes.filters[axes.baseline],
+                    filter=quote_name(filter_name),
+                    base=quote_name(axes.filters[axes.baseline]),
                     quantity=component.words,
                     least=gain_sentences.number_text(low),
                     where_least=where[low_row["case"]],

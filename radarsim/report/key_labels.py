@@ -154,10 +154,10 @@ def math_symbol(symbol: str) -> str:
 
 
 def component_symbol(component: str) -> str:
-    """A component of the tables on a figure's axis: "vb" as $v_\beta$; a longer name unchanged."""
+    """A component of the tables on a figure's axis: "vb" as $v_\beta$; a word in the language in use."""
     match = re.fullmatch(r"([vVa]?)([a-z])", component)
     if not match:
-        return escape_dollars(component)
+        return escape_dollars(tr(component))
     base = GREEK.get(match[2], match[2])
     return f"${match[1]}_{base}$" if match[1] else f"${base}$"
 

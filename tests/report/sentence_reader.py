@@ -27,8 +27,8 @@ EXACT = re.compile(rf"(?P<value>{NUMBER}){UNIT}{MARK}")
 FOR_ALL = re.compile(r"95[ \u00a0]% (?:for (?:all|both)|сразу для)")
 RUSSIAN_COMMA = re.compile(r"(?<=\d),(?=\d)")
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-TIME = re.compile(rf"(?<!= )(?<![\d.,])({NUMBER})[ \u00a0][sс](?![\w/]| \[)")
-SCAN = re.compile(r"(?:scan|обзор\w*) (\d+)")
+TIME = re.compile(rf"(?<!= )(?<![\d.,])({NUMBER})[ \u00a0][sс](?![\w/)]| \[)")  # not (20 s), from when errors count
+SCAN = re.compile(r"(?:scan|обзор\w*) (\d+)(?!\d|[.,]\d|[ \u00a0][%\[])")  # not of the worst scan 98.3 %
 LAST = re.compile(r"the last scan|последн\w+ обзор")
 OF_THE_LAST = re.compile(r"^(?: \w+)?(?: \w+)? \([^)]*\)")  # in brackets behind a number: what that is of
 
@@ -87,6 +87,8 @@ def columns_of(tables) -> Iterator[Table]:
 def derived_columns(tables, results=()) -> Iterator[Table]:
     """σ over what a filter believes, biases, σ by a paired gain over an exact σ, and paired gains of stages."""
     curves, gains = tables["curves"], tables["gains"]
+    if "exact_sigma" not in curves:  # of a study that has bounds in its place
+        curves = curves.assign(exact_sigma=np.nan)
     ratios = [curves[name].to_numpy(float) for name in ("sigma", "sigma_lo", "sigma_hi")]
     with np.errstate(divide="ignore", invalid="ignore"):
         believed = curves["believed_sigma"].to_numpy(float)

@@ -333,8 +333,8 @@ def _floor_sentence(comparison: RivalComparison) -> list[Sentence]:
 
 
 def _further_gains(comparison: RivalComparison) -> list[Sentence]:
-    """The gains at the same scan against all filters but the config's best."""
-    rows = comparison.gains[~comparison.gains["baseline"].isin([comparison.best, *comparison.equal])]
+    """The gains at the same scan against all filters but those of the verdict."""
+    rows = comparison.gains[~comparison.gains["baseline"].isin([*comparison.rivals, *comparison.equal])]
     if not len(rows):
         return []
     against = [f"{quote_name(baseline)} {comparison.gain_text(baseline)}" for baseline in rows["baseline"]]
