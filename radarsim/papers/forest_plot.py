@@ -4,7 +4,6 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from textwrap import shorten
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from radarsim.report.drawing.model import GREY, PAGE_MM, Axis, Figure, Line, Not
 from radarsim.report.math_text import with_formulas
 
 MAX_DRAWN_MARGINS = 4.0  # margins: larger distances are drawn there
-MAX_STATEMENT_CHARACTERS = 56  # letters of a claim beside its row
 BEYOND, RIM = 4.35, 4.6  # where an arrow says so, and where the panel ends
 CLASS_COLOURS = (5, 2, 4, GREY, 3, 1, 6)  # of the classes in their order: green, red, blue, grey, …
 CLASS_STYLES = {
@@ -70,10 +68,8 @@ def _paper_panel(paper: str, claims: Sequence[tuple[Sequence[Mapping], Mapping]]
     key = claims[0][0][0]["claim"].partition(".")[0]
     ticks, marks, values = [], [], []
     for y, (parts, worst) in enumerate(claims):
-        statement = shorten(
-            tr(parts[0]["statement"]), MAX_STATEMENT_CHARACTERS, placeholder=" …", break_on_hyphens=False
-        )
-        ticks.append((float(y), f"{with_formulas(statement)}  {parts[0]['claim'].partition('.')[2]}"))
+        statement = with_formulas(tr(parts[0]["statement"]))
+        ticks.append((float(y), f"{statement}  {parts[0]['claim'].partition('.')[2]}"))
         values.append(Note(RIM, float(y), decisive_value_words(worst), "e"))
     for kind, style in CLASS_STYLES.items():
         of_class = [(y, worst) for y, (parts, worst) in enumerate(claims) if parts[0]["class"] == kind]

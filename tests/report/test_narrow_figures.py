@@ -65,8 +65,9 @@ def test_claims_keep_statement_and_unit_at_every_width():
     boxes = [text.get_window_extent() for text in sorted(axes.texts, key=lambda text: text.get_window_extent().y0)]
     for below, above in pairwise(boxes):
         assert below.y1 < above.y0 + 1 or below.x0 > above.x1 or above.x0 > below.x1
-    wide = drawing_canvas.render(replace(figure, width_mm=PAGE_MM)).axes[0]
+    wide = drawing_canvas.render(replace(figure, width_mm=2 * PAGE_MM)).axes[0]
     assert not [text for text in wide.texts if "A statement" in text.get_text()]
+    assert all(tick.get_text().count("A statement") == 2 for tick in wide.get_yticklabels())  # none is cut short
 
 
 def test_notes_along_the_top_that_would_meet_stand_in_rows():

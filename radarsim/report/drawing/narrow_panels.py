@@ -13,6 +13,8 @@ from radarsim.report.math_text import letters_in
 
 MIN_PANEL_MM = 40.0  # between the names of its rows and the values beside it
 RIM_MM = 3.0  # of a figure's width, free of names
+NAME_GAP_MM = 0.4  # for each further line of a name
+NAME_ROOM = 0.9  # of a row, above the highest one
 LABEL_SHARE = 1.0  # of a panel, that its label may take
 
 
@@ -33,13 +35,13 @@ def _fit_panel(panel: Panel, width_mm: float) -> Panel:
     wrapped = [wrap(name, (width_mm - RIM_MM) / NAME_LETTER_MM, " ") for name in names]
     lines = max(name.count("\n") + 1 for name in wrapped)
     notes = [Note(0.0, y, name, "row") for (y, _), name in zip(panel.y.ticks, wrapped, strict=True)]
-    first, last = (float(end or 0.0) for end in panel.y.limits)
+    first, last = float(panel.y.limits[0] or 0.0), min(y for y, _ in panel.y.ticks) - NAME_ROOM
     return replace(
         panel,
         x=replace(panel.x, label=wrap(panel.x.label, LABEL_SHARE * (width_mm - values_mm) / LETTER_MM, " ")),
-        y=replace(panel.y, ticks=tuple((value, "") for value, _ in panel.y.ticks)),
+        y=replace(panel.y, ticks=tuple((value, "") for value, _ in panel.y.ticks), limits=(first, last)),
         marks=(*panel.marks, *notes),
-        height_mm=panel.height_mm + NAME_LINE_MM * lines * abs(last - first),
+        height_mm=panel.height_mm + (NAME_LINE_MM * lines + NAME_GAP_MM * (lines - 1)) * abs(last - first),
     )
 
 

@@ -20,6 +20,7 @@ MIN_LAST_GAP = 0.5  # between the last two ticks at scans, in intervals
 MAX_EXTRA_TICKS = 3  # more than asked for, on a logarithmic axis
 MIN_HIGH_SHARE = 0.9  # median of shares whose differences from one matter
 MAX_DECADES = 7  # labelled on a logarithmic axis
+MIN_END_GAP = 0.1  # of a logarithmic axis, from its outer power of ten to a tick beyond
 
 
 @dataclass(frozen=True)
@@ -59,22 +60,28 @@ def steps(low: float, high: float, count: int) -> list[float]:
 
 
 def decades(low: float, high: float, count: int) -> list[tuple[float, str]]:
-    """Powers of ten, and 2 and 5 times these if that gives not many more than `count`, else only at the ends."""
+    """Powers of ten, and 2 and 5 times these if that gives not many more than `count`, else only at ends far from them.
+
+    All are written out where each is short, else all raised except 1 to 10."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     stride = max(1, -(-(last - first + 1) // MAX_DECADES))
     exponents = range(first, last + 1, stride)
-    ticks = list(zip((10.0**n for n in exponents), powers(exponents), strict=True))
-    multiples = [m * 10.0**n for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
-    if stride > 1 or len(ticks) + len(multiples) > count + MAX_EXTRA_TICKS:
-        ends = (min(multiples, default=low), max(multiples, default=high))
-        multiples = [v for v in ends if stride == 1 and ticks and not ticks[0][0] <= v <= ticks[-1][0]]
-    return sorted([*ticks, *((v, tick_text(v)) for v in multiples)])
+    powers = [(1, n) for n in exponents]
+    multiples = [(m, n) for n in range(first - 1, last + 1) for m in (2, 5) if low <= m * 10.0**n <= high]
+    if stride > 1 or len(powers) + len(multiples) > count + MAX_EXTRA_TICKS:
+        gap = MIN_END_GAP * math.log10(high / low)
+        ends = (multiples[0], multiples[-1]) if stride == 1 and powers and multiples else ()
+        multiples = [(m, n) for m, n in ends if not first - gap < math.log10(m) + n < last + gap]
+    parts = [*powers, *multiples]
+    short = all(-4 <= n <= 4 for _, n in parts)
+    return sorted((m * 10.0**n, _decade_text(m, n, short)) for m, n in parts)
 
 
-def powers(exponents: Sequence[int]) -> list[str]:
-    """Text of powers of ten: all written out where each is short, else all raised except 1 and 10."""
-    short = all(-4 <= n <= 4 for n in exponents)
-    return [tick_text(10.0**n) if short or n in (0, 1) else power_of_ten(n) for n in exponents]
+def _decade_text(multiple: int, exponent: int, short: bool) -> str:
+    """The number of a tick, a multiple of a power of ten."""
+    if short or exponent == 0 or (multiple, exponent) == (1, 1):
+        return tick_text(multiple * 10.0**exponent)
+    return power_of_ten(exponent) if multiple == 1 else f"{multiple}·{power_of_ten(exponent)}"
 
 
 def tick_text(value: float) -> str:
