@@ -379,7 +379,7 @@ def test_a_share_just_under_one_is_never_written_as_one():
     written = [text.get_text() for text in drawing_canvas.render(drawing.figure).axes[0].texts]
     assert written == ["1", "0.9998", "0.9995", "0.99999", "0.5", "0"]
     assert all(f">{text}<" in page_figure.embed(drawing, "p") for text in written)
-    assert wording.estimate((0.99996, 0.9, 1.0)) == "0.99996 [0.9, 1]"
+    assert wording.estimate((0.99996, 0.9, 1.0)) == "0.99996 [0.90000, 1.00000]"
     assert [wording.significant_digits(value) for value in (0.99999, 1.0, 1.00001)] == ["0.99999", "1.000", "1.000"]
     nan = float("nan")
     assert [wording.share(value, nan, nan) for value in (100.0, 99.9999)] == ["100 %", "99.9999 %"]
