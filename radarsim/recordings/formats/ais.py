@@ -36,6 +36,7 @@ try:
 except ImportError:
     pyais = None
 SENTENCE_PATTERN = re.compile(rb"![A-Z]{2}VD[MO],[^\r\n]*")
+TARGET_PATTERN = re.compile(rb"\$[A-Z]{2}(?:TTM|TLL),")  # of a radar beside it
 TAG_TIME = re.compile(rb"[\\,]c:(\d{9,13}(?:\.\d+)?)")
 # The first of several is the time of reception.
 TRAILING_TIME = re.compile(rb"\*[0-9A-Fa-f]{2}[,; \t]+(\d{9,13}(?:\.\d+)?)(?:[,; \t]+\d{9,13}(?:\.\d+)?)*\s*$")
@@ -68,18 +69,20 @@ class Ais:
         self.last_time = math.nan  # the last time that a line stated, or that follows from one
         self.announced_time = math.nan  # of a line that states the time of the next sentence
         self.untimed_count = 0  # reports whose minute no line states
+        self.target_count = 0  # sentences of a radar's targets
 
     def notes(self, radars: Iterable[str] = ()) -> list[str]:
-        """A note on reports without a time, and how they get one."""
-        if not self.untimed_count:
-            return []
-        if math.isnan(self.last_time):
-            return [
-                tr("reports that state no time: {count}; the seconds of their minute run on", count=self.untimed_count)
-            ]
-        return [
-            tr("reports that state no time: {count}; they get the nearest with their second", count=self.untimed_count)
-        ]
+        """Notes on reports without a time, and how they get one, and on what is not read."""
+        notes = []
+        if self.target_count:
+            message = term("targets of a radar beside AIS: {count} ($RATTM or $RATLL; --from nmea reads them)")
+            notes.append(tr(message, count=self.target_count))
+        if self.untimed_count:
+            message = term("reports that state no time: {count}; they get the nearest with their second")
+            if math.isnan(self.last_time):
+                message = term("reports that state no time: {count}; the seconds of their minute run on")
+            notes.append(tr(message, count=self.untimed_count))
+        return notes
 
     def batches(self) -> Iterator[Batch]:
         """The position reports in batches; raises ConfigError where most sentences are damaged."""
@@ -121,6 +124,7 @@ class Ais:
                 self.skipped[term("damaged lines of time")] += 1
         elif line.lstrip().startswith(b"$"):
             self.skipped[term("sentences other than AIS")] += 1
+            self.target_count += TARGET_PATTERN.match(line.lstrip()) is not None
 
     def _decode(self, sentence: bytes, stated_s: float) -> tuple[Any, float]:
         """The message that a sentence completes, and the first time that its sentences state, s from 1970.

@@ -17,7 +17,9 @@ TARGET_COLUMNS = {  # of targets by their distance and bearing (TTM), and by the
     b"TTM": {"track": "track", "range": "range [m]", "bearing": "bearing [deg]", "altitude": "altitude [m]"},
     b"TLL": {"track": "track", "lat": "lat", "lon": "lon", "altitude": "altitude [m]"},
 }
-SENTENCE_PATTERN = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC|ZDA|TTM|TLL),[^\r\n]*")
+SENTENCE_PATTERN = re.compile(rb"\$[A-Z]{2}(?:GGA|RMC|ZDA|TTM|TLL|GLL),[^\r\n]*")
+ANY_SENTENCE_PATTERN = re.compile(rb"^[$!][A-Z]{2,3}([A-Z]{3}),", re.MULTILINE)
+PREFIX_CLOCK_PATTERN = re.compile(rb"([01]\d|2[0-3]):([0-5]\d):([0-5]\d(?:[.,]\d+)?)")  # of a logger, before a sentence
 TARGET_PATTERN = re.compile(rb"\$[A-Z]{2}(TTM|TLL),[^\r\n]*")
 HEADING_PATTERN = re.compile(rb"\$[A-Z]{2}(?:HDT,([\d.]+),T|THS,([\d.]+),A)[^\r\n]*")
 DISTANCE_UNITS_M = {"N": 1852.0, "K": 1000.0, "S": 1609.344}
@@ -39,13 +41,14 @@ def read_nmea(path: str, file: BinaryIO, only_positions: bool = False) -> Sheet:
     if (kinds := set(TARGET_PATTERN.findall(head))) and not only_positions:
         return _read_targets(path, file, has_dates, max(kinds))
     sheet = Sheet(path, ["time", *NMEA_COLUMNS.values()], iter(()), is_one_track=True)
+    has_better = {b"RMC", b"GGA"} & set(ANY_SENTENCE_PATTERN.findall(head))  # than GLL, of the same fixes
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         fix: dict[str, float] = {}  # the numbers of all sentences of one time
         places: dict[bytes, tuple[float, float]] = {}  # of these by talker and kind; another place is of another time
         number, dates = 0, _Dates()
         for number, line in enumerate(file, start=1):
-            sentence = _parse_fix(line, sheet) if line.strip() else {}
+            sentence = _parse_fix(line, sheet, not has_better) if line.strip() else {}
             if sentence and "lat" not in sentence:  # ZDA
                 dates.time(sentence["clock"], sentence.get("midnight"))
                 continue
@@ -82,7 +85,8 @@ class _Dates:
 def _read_targets(path: str, file: BinaryIO, has_dates: bool, kind: bytes) -> Sheet:
     """The targets that a ship's radar tracks, of sentences of a kind: number, place, time of day; bearings from the bow
     are turned by the heading (HDT, THS) before them. Lost targets, those of the other kind and own positions are left
-    out. A target that states no time has that of the clock before it, else of the first."""
+    out. A target that states no time has that of the logger before its sentence, of the clock before it, or of the
+    first."""
     columns = TARGET_COLUMNS[kind]
     sheet = Sheet(path, ["time", *columns.values()], iter(()))
 
@@ -103,12 +107,13 @@ def _read_targets(path: str, file: BinaryIO, has_dates: bool, kind: bytes) -> Sh
                 if target_match[1] != kind:
                     sheet.skipped[term("targets by their place, beside their plots")] += 1
                 elif target := _parse_target(target_match, heading, sheet):
-                    target["clock"] = own_clock if math.isnan(target["clock"]) else target["clock"]
+                    if math.isnan(target["clock"]):
+                        target["clock"] = _prefix_clock(line[: target_match.start()], own_clock)
                     if math.isnan(target["clock"]):
                         waiting.append((number, target))
                     else:
                         yield number, cells_of(target)
-            elif line.strip() and (fix := _parse_fix(line, sheet)):
+            elif line.strip() and (fix := _parse_fix(line, sheet, reads_gll=False)):
                 own_clock = fix["clock"]
                 dates.time(own_clock, fix.get("midnight"))
                 if "lat" in fix:
@@ -171,14 +176,28 @@ def _clock_s(match: re.Match[str]) -> float:
     return 3600.0 * int(match[1]) + 60 * int(match[2]) + float(match[3])
 
 
-def _parse_fix(line: bytes, sheet: Sheet) -> dict[str, float]:
+def _prefix_clock(prefix: bytes, otherwise: float) -> float:
+    """The time of day, s, that a logger has written before a sentence; otherwise another."""
+    match = PREFIX_CLOCK_PATTERN.search(prefix)
+    if match is None:
+        return otherwise
+    hours, minutes, seconds = (float(text.replace(b",", b".")) for text in match.groups())
+    return 3600 * hours + 60 * minutes + seconds
+
+
+def _parse_fix(line: bytes, sheet: Sheet, reads_gll: bool) -> dict[str, float]:
     """The numbers of a sentence by the names of NMEA_COLUMNS, `clock` in s of the day; empty without a fix; of
-    ZDA only times."""
+    ZDA only times. reads_gll: whether sentences GLL are read."""
     match = SENTENCE_PATTERN.search(line)
+    if match and match[0][3:6] == b"GLL" and not reads_gll:
+        match = None
     if not match or (b"*" in match[0] and not ais.has_valid_checksum(match[0])):
         sheet.skipped[term("damaged sentences") if match else term("other lines")] += 1
         return {}
     kind, clock, *cells = [*match[0].partition(b"*")[0].decode("ascii", "replace").split(","), *[""] * 12]
+    if kind.endswith("GLL"):
+        (clock, status), cells = cells[3:5], [clock, *cells[:3]]
+        cells += ["1" if status in ("A", "") else "0", *[""] * 8]
     time = CLOCK_PATTERN.fullmatch(clock)
     if kind.endswith("ZDA"):
         day, month, year = cells[:3]

@@ -153,6 +153,10 @@ def detect_format(path: str, head: bytes) -> Format:
         return "gpx"
     if start.startswith((b"{", b"[")):
         return "json"
+    if kinds := sorted({kind.decode() for kind in nmea.ANY_SENTENCE_PATTERN.findall(head)}):
+        allowed = "RMC, GGA, GLL, TTM, TLL or VDM"
+        raise ConfigError(f"{path}: must have sentences of NMEA 0183 with positions or targets, {allowed}; it begins "
+                          f"with {', '.join(kinds)}")  # fmt: skip
     if is_table(head):
         names = next(line for line in head.splitlines() if line.strip() and not line.startswith(b"#")).lower()
         return "opensky" if b"icao24" in names and b"lat" in names else "csv"
