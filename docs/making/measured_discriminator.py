@@ -151,7 +151,7 @@ def model_error(column: str) -> Callable[[Results], str]:
 
 def wide(results: Results) -> str:
     """σ of f₀ of the first window alone over the potential one of the burst (P4.7)."""
-    part_name = "σ of f0 of the first window over the potential one of the burst (σ² = 2.25, c = 1)"
+    part_name = "RMS error of f0 of the first window over the Cramér–Rao bound of the burst (σ² = 2.25, c = 1)"
     return claim_value(PAPER, "P4.7", part_name, "")(results)
 
 

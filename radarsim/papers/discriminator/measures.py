@@ -1,6 +1,6 @@
 """How P4's claims are measured: which case is which interpretation of the paper, which estimator which discriminator.
 
-The paper's numbers do not belong together: its potential spreads follow from a noise variance of 2.25, a quarter of the
+The paper's numbers do not belong together: its bounds follow from a noise variance of 2.25, a quarter of the
 one it states, and then its threshold c is the 1 of (14); its first window follows from the stated 9, and then c is the
 0.5 of (11). Both interpretations are judged: "computed" and "printed"."""
 
