@@ -95,7 +95,7 @@ def derived_columns(tables, results=()) -> Iterator[Table]:
         exact = curves["exact_sigma"].to_numpy(float) / believed
         yield Table("σ over believed", *(part / believed for part in ratios), exact, curves)
     if "conversion" in tables:
-        names = ("bias_m", "bias_lo", "bias_hi", "formula_m")
+        names = ("bias_m", "bias_m_lo", "bias_m_hi", "formula_m")
         biases = [tables["conversion"][name].to_numpy(float) for name in names]
         yield Table("bias of a conversion", *biases, tables["conversion"])
     if "bias_se" in curves:

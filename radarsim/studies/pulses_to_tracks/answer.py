@@ -99,7 +99,7 @@ def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Senten
     case_sentences = []
     if len(filters) > 1:
         for clause in _nearest_and_furthest(result, tables_by_name, filters):
-            case_sentences.append(clause.with_text(f"{case}: {clause.text}."))
+            case_sentences.append(clause.with_text(f"{case}, {clause.text}."))
     for name in filters:
         clause = _locks_and_ratio(result, tables_by_name, name)
         case_sentences.append(clause.with_text(f"{case}, {quote_name(name)}: {clause.text}."))
@@ -135,8 +135,8 @@ def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters:
     if not compared_value.are_distinguished(*values):
         return []
     text = tr(
-        "the RMS range error at the last scan is {near} times that of ideal bursts with {best}, and {far} times with "
-        "{worst}{chosen}",
+        "RMS range error at the last scan over that of ideal bursts{chosen}: least with {best}, {near}; greatest with "
+        "{worst}, {far}",
         best=quote_name(nearest["filter"]),
         near=_ratio(nearest, looks=len(filters)),
         worst=quote_name(furthest["filter"]),

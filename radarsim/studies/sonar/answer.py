@@ -85,7 +85,7 @@ def _bias_of_conversion(
         "Bias of a converted plot along the line of sight: with the plain conversion up to {bias}, {ratio} σ "
         "of the range ({case})",
         bias=exact_marks.exact_text(f"{wording.number(float(worst['formula_m']), 3)} {tr('m')}"),
-        ratio=exact_marks.exact_text(wording.number(ratio, 3)),
+        ratio=wording.number(ratio, 3),
         case=key_labels.without_markup(
             key_labels.swept_description(result, without=["frame"]) or key_labels.config_device(result)
         ),

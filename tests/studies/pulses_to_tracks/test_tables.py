@@ -114,11 +114,11 @@ def test_sentences(result):
     assert len(sentences) == 7
     ratios = result.tables["idealisations"].query("component == 'r'").groupby("filter").tail(1)
     ratios = ratios.set_index("filter")["paired_over_ideal"]
-    near, best, worst, far = re.fullmatch(
-        r"RLS 4: the RMS range error at the last scan is ([\d.]+) .* times that of ideal bursts with “(.+)”, and "
-        r"([\d.]+) \[.*\] times with “(.+)” \(95 % for all \d together\)\.",
+    best, near, worst, far = re.fullmatch(
+        r"RLS 4, RMS range error at the last scan over that of ideal bursts \(95 % for all \d together\): least with "
+        r"“(.+)”, ([\d.]+) \[.*\]; greatest with “(.+)”, ([\d.]+) \[.*\]\.",
         sentences[0],
-    ).group(1, 2, 4, 3)
+    ).group(1, 2, 3, 4)
     assert (best, worst) == (ratios.idxmin(), ratios.idxmax())
     assert [float(near), float(far)] == pytest.approx([ratios.min(), ratios.max()], rel=1e-2)
     (spectrum,) = [line for line in sentences if line.startswith("RLS 4, “spectrum”: ")]
