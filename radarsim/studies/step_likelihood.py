@@ -24,6 +24,7 @@ class StepLikelihood:
     explains: tuple[str, ...] = ()
     outlier_kinds = ALL_KINDS
     far_kinds: tuple[str, ...] = ()
+    is_smooth = True
 
     def __init__(self, study: "StepStudy", spec: Any, keys: Any, tracks: Sequence[Mapping[str, np.ndarray]]):
         self.study, self.spec, self.filter_keys, self.filter = study, spec, keys, keys.name

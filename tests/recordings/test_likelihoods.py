@@ -6,12 +6,15 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal as normal
 
 from radarsim.api.load_experiments import load_all
+from radarsim.kernels.kalman_algebra import pack, unpack
 from radarsim.kernels.likelihood import HARD_FACTOR, log_likelihood, with_lasting_errors
 from radarsim.physics import frames
 from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.recordings import simulate_plots
 from radarsim.recordings.fit import advice, fit
 from radarsim.recordings.study_part import recording_interface
+from radarsim.studies.ambiguous_doppler import plot_likelihood as ambiguous_likelihood
+from radarsim.studies.ambiguous_doppler.kernels import recorded_rows
 from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.multimodel.model_bank import start_weights
 from radarsim.studies.range_doppler import plot_likelihood
@@ -522,8 +525,52 @@ def test_the_likeliest_hypotheses_are_kept_in_their_order():
         w = np.round(-4 * rng.random(60), 1)
         w -= w.max()
         order = np.argsort(-w, kind="stable")
-        np.testing.assert_array_equal(likeliest(w, most, least), [i for i in order if np.exp(w[i]) >= least][:most])
-    np.testing.assert_array_equal(likeliest(np.full(4, np.nan), 3, 0.1), [0])
+        kept = sorted([i for i in order if np.exp(w[i]) >= least][:most])
+        np.testing.assert_array_equal(likeliest(w, most, least), kept)
+    for most in (3, 10):
+        assert 0 < likeliest(np.full(4, np.nan), most, 0.1).size <= most
+
+
+def mixture_moments(x, w, P):
+    """Mean and covariance of hypotheses x (3, n) of log weights w (n,) and the common packed covariance P."""
+    p = np.exp(w) / np.exp(w).sum()
+    mean = x @ p
+    return mean, unpack(P) + (p * (x - mean[:, None])) @ (x - mean[:, None]).T
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_hypotheses_that_hardly_differ_are_merged_by_moments(order):
+    """Of their mixture mean and covariance stay; none that is left is nearer to another than was asked, but for the
+    moves of the means."""
+    rng, spread = np.random.default_rng(3), np.zeros((3, 3))
+    spread[: order + 1, : order + 1] = manoeuvre_covariance(1.0, 2.0)[: order + 1, : order + 1] + np.eye(order + 1)
+    P = np.array(pack(spread))
+    x, w = np.linalg.cholesky(spread + np.diag(np.diag(spread) == 0)) @ rng.normal(size=(3, 80)), -3 * rng.random(80)
+    x[order + 1 :] = 0.0
+    merged_P = P.copy()
+    merged_x, merged_w = recorded_rows.merge_alike(x, w, merged_P, 0.5)
+    assert merged_w.size < 60
+    for before, after in zip(mixture_moments(x, w, P), mixture_moments(merged_x, merged_w, merged_P), strict=True):
+        np.testing.assert_allclose(after, before, rtol=1e-12, atol=1e-12 * np.abs(spread).max())
+    alone, alone_w = recorded_rows.merge_alike(x, w, P.copy(), 1e-9)
+    np.testing.assert_allclose(alone, x, rtol=1e-14)
+    np.testing.assert_allclose(alone_w, w, rtol=1e-14)
+
+
+@pytest.mark.parametrize("law", [ErrorLaw(), ErrorLaw(outlier_laws=(outlier_law(0.03, 0.01), outlier_law(0.0, 0.05)))])
+def test_merged_hypotheses_are_as_likely_as_the_longest_list(monkeypatch, law):
+    """Against lists that drop next to nothing, to 0.002: a thousandth of what an interval's end is below a maximum."""
+    columns = recording("ambiguous_rls2", "scans=40")
+    merged = likelihood(loaded("ambiguous_rls2"), "memory", columns)
+    complete = likelihood(
+        loaded("ambiguous_rls2", "filters.5.hypotheses=4000", "filters.5.prune_below=1e-9"), "memory", columns
+    )
+    for factor in (0.8, 1.0):
+        values = factor * merged.stated
+        value = merged(values, law)
+        with monkeypatch.context() as patch:
+            patch.setattr(ambiguous_likelihood, "MERGE_DISTANCE", 0.0)
+            assert value == pytest.approx(complete(values, law), rel=0, abs=2e-3)
 
 
 def test_a_wrong_velocity_error_is_named_though_velocities_fold(monkeypatch):

@@ -31,7 +31,7 @@ from radarsim.recordings.fit.likelihood_slice import (
     rival_of_outliers,
     single_explanations,
 )
-from radarsim.recordings.fit.newton_steps import polish_maximum
+from radarsim.recordings.fit.newton_steps import LEAP_STEPS, SMOOTH_STEPS, polish_maximum
 from radarsim.recordings.fit.profile_search import HALF_CHI2_95
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
 from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
@@ -254,5 +254,6 @@ def compare_filters(likelihoods: Sequence[Likelihood]) -> FilterComparison:
 def _polish_values(likelihood: CountedLikelihood, start: dict[str, float]) -> tuple[dict[str, float], float]:
     """Refine roughly searched values: printed numbers must not depend on the last digits of a processor."""
     slice_ = LikelihoodSlice(likelihood, list(start))
-    point = polish_maximum(slice_, slice_.to_search(start))
+    steps = SMOOTH_STEPS if likelihood.likelihood.is_smooth else LEAP_STEPS
+    point = polish_maximum(slice_, slice_.to_search(start), steps)
     return slice_.to_values(point), slice_(point)

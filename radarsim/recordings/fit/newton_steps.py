@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +14,19 @@ FIRST_STEP = 0.3
 # Accuracy of a maximum and of an interval's end, in the logarithm of a key; of the likelihood a tenth of that. Far
 # finer than printed digits, since the path of a search depends on last digits, and these differ between processors.
 TOLERANCE = 1e-6
-SLOPE_STEP = 1e-3  # difference for a slope, in the logarithm of a key
-CURVATURE_STEP = 1e-2  # the same during the search, where curvature is needed too
+
+
+class StepSizes(NamedTuple):
+    """The accuracy of a search, and its differences for a slope, and for slope and curvature, in the logarithm of a
+    key."""
+
+    tolerance: float
+    slope: float
+    curvature: float
+
+
+SMOOTH_STEPS = StepSizes(TOLERANCE, 1e-3, 1e-2)
+LEAP_STEPS = StepSizes(1e-4, 1e-2, 3e-2)  # of a likelihood that leaps, by 1e-3, where hypotheses are merged or dropped
 # curvature that counts as none, and the longest Newton step, in that logarithm
 MIN_CURVATURE = 1e-3
 MAX_NEWTON_STEP = 1.5
@@ -22,25 +34,28 @@ MAX_CORRELATION = 0.999  # of the correlation of two keys
 
 
 def polish_maximum(
-    log_likelihood_at: Callable[[np.ndarray], float], point: np.ndarray, moving: np.ndarray | None = None
+    log_likelihood_at: Callable[[np.ndarray], float],
+    point: np.ndarray,
+    steps: StepSizes = SMOOTH_STEPS,
+    moving: np.ndarray | None = None,
 ) -> np.ndarray:
     """The maximum of a likelihood near the result of a search, by two Newton steps of its moving coordinates; default:
     of all.
 
-    A search by comparison stalls at the root of the last digits. They make a difference over SLOPE_STEP wrong by 10⁻⁷,
-    and the maximum as well."""
-    curvature, start = Curvature(log_likelihood_at), point
+    A search by comparison stalls at the root of the last digits. They make a difference over 10⁻³ wrong by 10⁻⁷, and
+    the maximum as well."""
+    curvature, start = Curvature(log_likelihood_at, steps), point
     start_value, moving = log_likelihood_at(point), np.arange(point.size) if moving is None else moving
     if not moving.size or not math.isfinite(curvature.step(point, start_value, moving)[1]):
         return start
-    moves = SLOPE_STEP * np.eye(point.size)[moving]
+    moves = steps.slope * np.eye(point.size)[moving]
     for _ in range(2):
         rises = [log_likelihood_at(point + move) - log_likelihood_at(point - move) for move in moves]
         point = point.copy()
-        point[moving] += curvature.newton_step(np.array(rises) / (2 * SLOPE_STEP))
+        point[moving] += curvature.newton_step(np.array(rises) / (2 * steps.slope))
     return (
         point
-        if log_likelihood_at(point) >= start_value - TOLERANCE and np.abs(point - start).max() < FIRST_STEP
+        if log_likelihood_at(point) >= start_value - steps.tolerance and np.abs(point - start).max() < FIRST_STEP
         else start
     )
 
@@ -49,24 +64,25 @@ class Curvature:
     """Curvature of a likelihood near a point, for Newton steps: along each coordinate it is computed anew at each step,
     from the differences that give the slope; cross terms between coordinates, (n, n), are kept from before."""
 
-    def __init__(self, log_likelihood_at: Callable[[np.ndarray], float], correlations: np.ndarray | None = None):
-        self.log_likelihood_at, self.correlations = log_likelihood_at, correlations
+    def __init__(self, log_likelihood_at: Callable[[np.ndarray], float], steps: StepSizes):
+        self.log_likelihood_at, self.step_size = log_likelihood_at, steps.curvature
+        self.correlations: np.ndarray | None = None
         self.H = np.zeros((0, 0))  # the curvature at the last step, of the coordinates free then
 
     def step(self, point: np.ndarray, value: float, free: np.ndarray) -> tuple[np.ndarray, float]:
         """An ascending step from `at`, of the free coordinates alone, and its predicted gain."""
-        moves = CURVATURE_STEP * np.eye(point.size)[free]
+        moves = self.step_size * np.eye(point.size)[free]
         above, below = (np.array([self.log_likelihood_at(point + sign * move) for move in moves]) for sign in (1, -1))
         if not (np.isfinite(value) and min(above.min(), below.min(), value) > IMPOSSIBLE_LOG_LIKELIHOOD):
             return np.zeros(point.size), math.nan
-        slope, curvature = (above - below) / (2 * CURVATURE_STEP), (above - 2 * value + below) / CURVATURE_STEP**2
+        slope, curvature = (above - below) / (2 * self.step_size), (above - 2 * value + below) / self.step_size**2
         scale = np.sqrt(np.maximum(np.abs(curvature), MIN_CURVATURE))
         if self.correlations is None:
             self.correlations = np.eye(point.size)
             for i, j in itertools.combinations(range(free.size), 2):
                 cross = self.log_likelihood_at(point + moves[i] + moves[j]) - above[i] - above[j] + value
                 correlation = float(
-                    np.clip(cross / CURVATURE_STEP**2 / (scale[i] * scale[j]), -MAX_CORRELATION, MAX_CORRELATION)
+                    np.clip(cross / self.step_size**2 / (scale[i] * scale[j]), -MAX_CORRELATION, MAX_CORRELATION)
                 )
                 self.correlations[free[i], free[j]] = self.correlations[free[j], free[i]] = correlation
         self.H = H = self.correlations[np.ix_(free, free)] * np.outer(scale, scale)

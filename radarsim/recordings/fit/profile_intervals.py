@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from radarsim.recordings.fit.newton_steps import TOLERANCE
 from radarsim.recordings.fit.profile_search import HALF_CHI2_95, INTERVAL_REACH, ROUGH_TOLERANCE, LikelihoodSearch
 
 TRIAL_FALLS = np.array([2.0, 4.0, 6.0])  # below these a key that may be zero is clearly not zero, in that logarithm
@@ -120,7 +119,10 @@ class ProfileIntervals:
             if not low < end.log_key < high:
                 end = self._interpolate(bracket, _line_weights([height(point) for point in bracket], wanted))
             change = abs(end.log_key - points[0].log_key)
-            if change * min(1.0, change / last_change) < TOLERANCE or high - low < TOLERANCE:
+            if (
+                change * min(1.0, change / last_change) < self.search.steps.tolerance
+                or high - low < self.search.steps.tolerance
+            ):
                 return end._replace(value=limit)
             last_change = change
             point = self._profile(i, end.log_key, end.point)
@@ -139,7 +141,7 @@ class ProfileIntervals:
         so."""
         start = neighbour.copy()
         start[i] = log_key
-        point, value = self.search.climb(start, i, TOLERANCE)
+        point, value = self.search.climb(start, i, self.search.steps.tolerance)
         return ProfilePoint(log_key, value, point)
 
     def _with_raised_zeros(self, i: int, end: ProfilePoint) -> ProfilePoint:

@@ -13,7 +13,14 @@ from radarsim.recordings.fit.likelihood_slice import (
     single_explanations,
     starting_values,
 )
-from radarsim.recordings.fit.newton_steps import FIRST_STEP, TOLERANCE, Curvature, polish_maximum
+from radarsim.recordings.fit.newton_steps import (
+    FIRST_STEP,
+    LEAP_STEPS,
+    SMOOTH_STEPS,
+    TOLERANCE,
+    Curvature,
+    polish_maximum,
+)
 from radarsim.studies.error_law import ErrorLaw, OutlierLaw
 from radarsim.studies.recording_interface import ALL_KINDS, Likelihood
 
@@ -63,6 +70,7 @@ class LikelihoodSearch:
     def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, start_point: np.ndarray | None = None):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         self.end_count, self.ends_started_at = 0, 0
+        self.steps = SMOOTH_STEPS if likelihood.is_smooth else LEAP_STEPS
         start, self.lowest = np.log(starting_values(likelihood)), np.log(likelihood.zero_limits)
         self.highest = start + math.log(INTERVAL_REACH)
         self.zero_reach = np.full(start.size, NEAR_ZERO_LOG)
@@ -77,7 +85,7 @@ class LikelihoodSearch:
             self.highest = np.append(self.highest, most)
             self.zero_reach = np.append(self.zero_reach, [NEAR_ZERO_LOG] * 2 + [NEAR_WIDTH_LOG] * 2)
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
-        self.curvature_model = Curvature(self.log_likelihood)
+        self.curvature_model = Curvature(self.log_likelihood, self.steps)
         self.rival, self.rival_top, self.near_points = np.zeros(0), -math.inf, dict[int, np.ndarray]()
         self.best, self.top = self.climb(start if start_point is None else start_point, None, ROUGH_TOLERANCE)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
@@ -136,7 +144,7 @@ class LikelihoodSearch:
         starts.sort(key=lambda start: -start[0])
         free = np.array([j for j in range(point.size) if j != fixed_index])
         candidates = [
-            self._climb_by_newton(start, value, free, ROUGH_ACCURACY, Curvature(self.log_likelihood))[:2]
+            self._climb_by_newton(start, value, free, ROUGH_ACCURACY, Curvature(self.log_likelihood, self.steps))[:2]
             for value, start in starts[:climb_count]
             if value > min_value
         ]
@@ -161,8 +169,9 @@ class LikelihoodSearch:
 
     def _polish(self, start: np.ndarray) -> bool:
         """Take the maximum near a point as the best if it is higher, and return whether it is."""
-        point, _ = self.climb(start, None, TOLERANCE)
-        point = polish_maximum(self.log_likelihood, point, self._moving(point, np.arange(point.size)))
+        point, _ = self.climb(start, None, self.steps.tolerance)
+        moving = self._moving(point, np.arange(point.size))
+        point = polish_maximum(self.log_likelihood, point, self.steps, moving)
         value = self.log_likelihood(point)
         if is_higher := value > self.top:
             self.best, self.top = point, value
@@ -172,7 +181,7 @@ class LikelihoodSearch:
         """Raise keys from zero where that makes the plots likelier, then compute the curvature at the maximum."""
         while (start := self._raised_point()) is not None and self._polish(start):
             pass
-        self.curvature_model = Curvature(self.log_likelihood)
+        self.curvature_model = Curvature(self.log_likelihood, self.steps)
         moving = self._moving(self.best, np.arange(self.best.size))
         self.curvature_model.step(self.best, self.top, moving)
         self.end_distances = self._expected_end_distances(moving)
@@ -192,7 +201,7 @@ class LikelihoodSearch:
         ]
         candidates = [(self.log_likelihood(point), point) for point in trials]
         value, point = max(candidates, key=lambda candidate: candidate[0], default=(-math.inf, self.best))
-        return point if value > self.top + TOLERANCE else None
+        return point if value > self.top + self.steps.tolerance else None
 
     def to_values(self, point: np.ndarray) -> np.ndarray:
         """The values of the keys at a point."""
@@ -249,7 +258,7 @@ class LikelihoodSearch:
         hypotheses jumps where one is dropped: a simplex that gains next to nothing shows that no step can."""
         free = np.array([i for i in range(len(start)) if i != fixed_index])
         point, value = start, self.log_likelihood(start)
-        curvature = self.curvature_model if fixed_index is not None else Curvature(self.log_likelihood)
+        curvature = self.curvature_model if fixed_index is not None else Curvature(self.log_likelihood, self.steps)
         for max_evaluations in simplex_evaluations:
             point, value, is_maximum = self._climb_by_newton(point, value, free, tolerance, curvature)
             if is_maximum:
@@ -258,7 +267,7 @@ class LikelihoodSearch:
             point, value = self._climb_by_simplex(point, free, tolerance, max_evaluations)
             if value - value_before < ROUGH_ACCURACY:
                 return point, value
-            curvature = Curvature(self.log_likelihood)
+            curvature = Curvature(self.log_likelihood, self.steps)
         return point, value
 
     def _climb_by_newton(
@@ -287,7 +296,7 @@ class LikelihoodSearch:
             if predicted_gain < SMALL_GAIN_FACTOR * tolerance:
                 return point, value, True
             if fraction < 1 or predicted_gain > ROUGH_ACCURACY:
-                curvature = Curvature(self.log_likelihood)
+                curvature = Curvature(self.log_likelihood, self.steps)
         return point, value, False
 
     def _set_zero(self, point: np.ndarray, value: float, free: np.ndarray) -> tuple[np.ndarray, float]:

@@ -16,9 +16,9 @@ from radarsim.studies.error_law import BIAS, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.recording_interface import usual_interval_s
 
-# Of those kept where velocities may be outliers: all live on then for some rows. A choice for speed: what a longer list
-# would find is not bounded.
-MAX_OUTLIER_HYPOTHESES = 50
+# σ by which hypotheses differ that are merged: the logarithm of the likelihood of 120 rows is right to 0.005, and leaps
+# by 0.002 with a key. Where the longest list is dropped instead, by 0.05; a tenth of outliers would need thousands.
+MERGE_DISTANCE = 0.2
 MIN_SIGMA_RATIO, MIN_VARIANCE_RATIO = 1e-4, 1e-6  # to the configured values: smaller ones count as zero
 
 
@@ -50,6 +50,7 @@ class PlotLikelihood:
         self.is_folded = self.member.doppler == "folded"
         # Off by some σ of a folded velocity is off by another fold, or by nearly half a span: as a far one.
         self.far_kinds = self.columns[1:] if self.is_folded else ()
+        self.is_smooth = not self.is_folded or list_limits(options)[0]
         self.span = np.append(data_span(tracks, self.columns), 0.0)[:2]
         self.given_tracks = list(tracks)
         self.cleaned_tracks = [
@@ -84,15 +85,16 @@ class PlotLikelihood:
         sigma[: self.observes] = values[: self.observes]
         reach = (1 if self.options.hypotheses == 1 else 2) if self.is_folded else 0
         merge, max_count, min_ratio = list_limits(self.options)
-        if outliers[1, [NEAR, FAR]].any():
-            max_count = min(max_count, MAX_OUTLIER_HYPOTHESES)
         prior, result = np.array(prior_covariance(self.member, self.spec)), []
         for problem in self.problems:
             scores = np.empty((2, len(problem.rows), 2))
             rows = self._velocities(problem.rows, law.bias * sigma[1])
             present = np.isfinite(rows[:, :2])
             arguments = np.where(np.isfinite(rows), rows, 0.0), present, prior, sigma**2, float(values[-1])
-            hypotheses, errors = (reach, merge, max_count, min_ratio), (outliers, self.span, start_factor(outliers[0]))
+            hypotheses, errors = (
+                (reach, merge, max_count, min_ratio, MERGE_DISTANCE),
+                (outliers, self.span, start_factor(outliers[0])),
+            )
             if not recorded_rows.log_likelihood(problem.F, problem.Q, *arguments, *hypotheses, *errors, *scores):
                 return []
             result.append(scores)

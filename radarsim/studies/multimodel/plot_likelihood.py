@@ -44,6 +44,7 @@ class PlotLikelihood:
         self.zero_limits = np.append(MIN_VALUE_RATIO * self.stated[:3], MIN_VALUE_RATIO * (self.stated[3] or 1.0))
         self.outlier_kinds = ALL_KINDS
         self.far_kinds: tuple[str, ...] = ()
+        self.is_smooth = True
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
         self.span = float(data_span(tracks, self.columns[:1] if "range_m" in self.columns else self.columns).max())
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, layout.START) for columns in tracks]

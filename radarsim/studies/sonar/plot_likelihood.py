@@ -55,6 +55,7 @@ class PlotLikelihood:
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
         self.outlier_kinds = self.columns if self.spec.frame == "polar" else ALL_KINDS
         self.far_kinds: tuple[str, ...] = ()
+        self.is_smooth = True
         self.span = data_span(tracks, self.columns)
         if self.spec.frame != "polar":
             self.span[:2] = 2 * max(float(np.nanmax(np.abs(track["range_m"]), initial=0.0)) for track in tracks)

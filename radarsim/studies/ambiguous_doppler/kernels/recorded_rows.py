@@ -11,16 +11,22 @@ from radarsim.kernels.compiler import kernel
 from radarsim.kernels.kalman_algebra import (
     add_outer,
     add_scaled,
+    add_spread,
+    factorise,
     predict_covariance,
     predict_state,
+    scale_row,
     take_rate,
     take_value,
+    whiten,
 )
 from radarsim.kernels.likelihood import FAR, LAW_COUNT, LOG_DENSITY, MEAN, NEAR, OFFSET, SPREAD, VARIANCE, fill_laws
 
 FARTHEST = 9.0  # standard deviations of the velocity's innovation within which folds are tried
 START_RANGES = 3  # of a track, among which gross errors are left out
 NEGLIGIBLE = 80.0  # below the logarithm of the greatest weight
+ROUNDING = 1e-9  # of the logarithm of a ratio
+SMALLEST_MASS = 1e-300  # of the laws of a number
 INVISIBLE = 45.0  # the same, in a sum of weights: thousands of such change no digit
 MAX_SEQUENCES = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
 
@@ -112,26 +118,29 @@ def nearby_folds(S, D):
 
 @kernel
 def likeliest(w, max_count, min_ratio):
-    """The indices of at most `max_count` weights of at least `min_ratio`, the best first, equal ones in their order.
+    """The indices of at most `max_count` weights of at least `min_ratio`, in their order; of equal ones the first.
 
     w (n,) are logarithms, the best one's 0."""
-    threshold, ties_left = w.min(), max_count
-    floor = np.log(min_ratio) - 1e-9 if min_ratio > 0.0 else -np.inf  # spares the exponentials of most
-    if (w >= floor).sum() > max_count:
-        threshold = np.partition(w, w.size - max_count)[w.size - max_count]
-        ties_left = max_count - (w > threshold).sum()
-    indices, count = np.empty(min(w.size, max_count), dtype=np.int64), 0
+    floor = np.log(min_ratio) if min_ratio > 0.0 else -np.inf
+    indices, count = np.empty(w.size, dtype=np.int64), 0
     for i in range(w.size):
-        if w[i] >= threshold and w[i] >= floor and np.exp(w[i]) >= min_ratio:
-            if w[i] == threshold:
-                ties_left -= 1
-            if (w[i] > threshold or ties_left >= 0) and count < indices.size:
-                indices[count] = i
-                count += 1
-    if count == 0:  # weights that are no numbers: the density, which is none either, shows it
+        indices[count] = i
+        # An exponential only at the very limit, where the logarithm may round to its other side.
+        count += w[i] >= floor + ROUNDING or (w[i] >= floor - ROUNDING and np.exp(w[i]) >= min_ratio)
+    # Where weights are no numbers, the density, which is none either, shows it.
+    if count == 0:
         return np.zeros(1, dtype=np.int64)
-    indices = indices[:count].copy()
-    return indices[np.argsort(-w[indices], kind="mergesort")]
+    if count <= max_count:
+        return indices[:count]
+    large = w[indices[:count]]
+    threshold = np.partition(large, count - max_count)[count - max_count]
+    ties_left, kept = max_count - (large > threshold).sum(), 0
+    for k in range(count):
+        is_tie = large[k] == threshold
+        indices[kept] = indices[k]
+        kept += large[k] > threshold or (is_tie and ties_left > 0)
+        ties_left -= is_tie
+    return indices[: min(max(kept, 1), max_count)]
 
 
 @kernel
@@ -139,61 +148,77 @@ def fold_innovations(x, w, v, D, max_fold, S):
     """The innovations (n, folds) of a velocity v for each hypothesis and fold, and the logarithms of their weights with
     a predicted variance S; max_fold as for `take_velocity`."""
     n, folds = w.size, 2 * max(max_fold, 0) + 1
-    e, weight = np.empty((n, folds)), np.empty((n, folds))
+    e, weight, factor = np.empty((n, folds)), np.empty((n, folds)), 0.5 / S
     for i in range(n):
         innovation = v - x[1, i]
         if max_fold >= 0:
             innovation -= D * np.rint(innovation / D)
         for j in range(folds):
             e[i, j] = innovation + D * (j - folds // 2)
-            weight[i, j] = w[i] - e[i, j] * e[i, j] / (2.0 * S)
+            weight[i, j] = w[i] - e[i, j] * e[i, j] * factor
     return e, weight
 
 
 @kernel
+def weigh_outliers(w, e, weight, R, S, D, max_fold, outliers, span):
+    """Weigh the velocity of innovations e (n, folds) for what it may be, in place: all folds of a hypothesis gain by a
+    far outlier alike, which says nothing of the fold: were it divided among them, all would live on. e becomes the
+    innovations by which a hypothesis moves.
+
+    Returns the logarithm of the density, the probability of no outlier, and by what the variance of the innovation
+    changes. Arguments as for `take_velocity`."""
+    n, folds = e.shape
+    log_norm, nearest_fold = 0.5 * np.log(2.0 * np.pi * S), folds // 2
+    T = S + (outliers[OFFSET] * outliers[OFFSET] + outliers[SPREAD] * outliers[SPREAD]) * R
+    width = D if max_fold >= 0 else max(span, math.sqrt(T))
+    sound, near = 1.0 - outliers[NEAR] - outliers[FAR], outliers[NEAR] * math.sqrt(S / T)
+    far, factor = outliers[FAR] * math.exp(log_norm) / width, 0.5 / S
+    best, prior_sum, total, sound_sum, pull_sum, spread = w.max(), 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        # Of the nearest fold, and of all in units of it.
+        e2 = e[i, nearest_fold] * e[i, nearest_fold]
+        regular, close = sound * math.exp(-e2 * factor), 0.0
+        if near > 0.0:
+            close = near * math.exp(-0.5 * e2 / T)
+        square, branches = (regular + close * S / T) * e2, 1.0
+        for j in range(folds):
+            fall = (e[i, j] * e[i, j] - e2) * factor
+            if j != nearest_fold and fall < INVISIBLE:
+                share = math.exp(-fall)
+                branches += share
+                square += regular * share * e[i, j] * e[i, j]
+        regular *= branches
+        mass, prior = max(regular + close + far, SMALLEST_MASS), math.exp(w[i] - best)
+        pull = (regular + close * S / T) / mass
+        shift = math.log(mass / branches) + e2 * factor
+        for j in range(folds):
+            weight[i, j] += shift
+            e[i, j] *= pull
+        prior_sum += prior
+        total += prior * mass
+        sound_sum += prior * regular
+        pull_sum += prior * mass * pull
+        spread += prior * (1.0 - pull) * square
+    return math.log(total / prior_sum) - log_norm, sound_sum / total, (spread - pull_sum * S) / total
+
+
+@kernel
 def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outliers, span):
-    """Update with a velocity v of variance R; returns states and weights, the likeliest first, the logarithm of the
-    density of v over all hypotheses and folds, and the probability that v is no outlier. P is updated in place.
+    """Update with a velocity v of variance R; returns states and weights, the logarithm of the density of v over all
+    hypotheses and folds, and the probability that v is no outlier. P is updated in place.
 
     max_fold: folds to either side of the nearest that are tried; -1: none, v is not folded. merge: hypotheses are
     merged into one; else at most `max_count` are kept, of at least `min_ratio` times the weight of the best. outliers
-    (4,): near ones are normal, the offset a part of their width; far ones uniform over the span D of folded velocities,
-    or `span` of the data; merged by moments."""
+    (4,): near ones are normal, the offset a part of their width, of velocities that are not folded; far ones uniform
+    over the span D of folded velocities, or `span` of the data; merged by moments."""
     updated_P, gain, S = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), R, 1.0)
     e, weight = fold_innovations(x, w, v, D, max_fold, S)
-    n, folds = e.shape
-    log_norm, soundness = 0.5 * np.log(2.0 * np.pi * S), 1.0
+    folds, soundness = e.shape[1], 1.0
     if outliers[NEAR] + outliers[FAR] > 0.0:
-        T = S + (outliers[OFFSET] * outliers[OFFSET] + outliers[SPREAD] * outliers[SPREAD]) * R
-        width = D if max_fold >= 0 else max(span, math.sqrt(T))
-        far, near_share = outliers[FAR] * math.exp(log_norm) / width, outliers[NEAR] * math.sqrt(S / T)
-        best, total, factor, sound, spread = w.max(), 0.0, 0.0, 0.0, 0.0
-        for i in range(n):
-            regular, close, square = 0.0, 0.0, 0.0
-            for j in range(folds):
-                e2 = e[i, j] * e[i, j]
-                r = (1.0 - outliers[NEAR] - outliers[FAR]) * math.exp(-0.5 * e2 / S)
-                c = near_share * math.exp(-0.5 * e2 / T) if near_share > 0.0 else 0.0
-                weight[i, j] = r + c
-                regular += r
-                close += c
-                square += (r + c * S / T) * e2
-            # A far outlier says nothing of the fold. Were it divided among the folds, all of them would live on.
-            for j in range(folds):
-                part = weight[i, j] / (regular + close) if regular + close > 0.0 else (1.0 if j == folds // 2 else 0.0)
-                part *= regular + close + far
-                weight[i, j] = w[i] + math.log(part) if part > 0.0 else -1e300
-            prior, mass = math.exp(w[i] - best), regular + close + far
-            pull = (regular + close * S / T) / mass if mass > 0.0 else 0.0
-            e[i] *= pull
-            total += prior * mass
-            sound += prior * regular
-            factor += prior * mass * pull
-            spread += prior * (1.0 - pull) * square
-        soundness = sound / total
-        P_before = (P[0], P[1], P[2], P[3], P[4], P[5])
-        updated_P = add_outer(P_before, (spread - factor * S) / total, gain)
-    density = log_sum_exp(weight) - log_sum_exp(w) - log_norm
+        density, soundness, spread = weigh_outliers(w, e, weight, R, S, D, max_fold, outliers, span)
+        updated_P = add_outer((P[0], P[1], P[2], P[3], P[4], P[5]), spread, gain)
+    else:
+        density = log_sum_exp(weight) - log_sum_exp(w) - 0.5 * np.log(2.0 * np.pi * S)
     best = weight.max()
     if merge:
         p = np.exp(weight[0] - best)
@@ -214,33 +239,56 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outli
 
 
 @kernel
+def merge_alike(x, w, P, distance):
+    """Merge hypotheses that differ by less than a distance, in standard deviations, by moments: each with the first one
+    so near. Returns states and weights; P is updated in place.
+
+    Two that took another fold once, long ago, agree by now, and would be thousands."""
+    n, count, mass, limit = w.size, 0, 0.0, distance * distance
+    lower, parts, _ = factorise((P[0], P[1], P[2], P[3] if P[3] > 0.0 else 1.0, P[4], P[5] if P[5] > 0.0 else 1.0))
+    roots = math.sqrt(parts[0]), math.sqrt(parts[1]), math.sqrt(parts[2])
+    group, totals, means = np.empty(n, dtype=np.int64), np.zeros(n), np.zeros((3, n))
+    first0, first1, first2 = np.empty(n), np.empty(n), np.empty(n)
+    for i in range(n):
+        state = x[0, i], x[1, i], x[2, i]
+        y = scale_row(whiten(state, lower), roots)
+        k = count  # without a branch in the loop, which looks at eight at a time
+        for j in range(count):
+            d0, d1, d2 = y[0] - first0[j], y[1] - first1[j], y[2] - first2[j]
+            k = min(k, j if d0 * d0 + d1 * d1 + d2 * d2 < limit else count)
+        if k == count:
+            first0[k], first1[k], first2[k] = y
+            count += 1
+        share = max(math.exp(w[i]), SMALLEST_MASS)
+        group[i], mass = k, mass + share
+        totals[k] += share
+        means[0, k], means[1, k], means[2, k] = add_scaled((means[0, k], means[1, k], means[2, k]), share, state)
+    means = means[:, :count] / totals[:count]
+    if count < n:
+        wide_P, none = (P[0], P[1], P[2], P[3], P[4], P[5]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for i in range(n):
+            k = group[i]
+            d = x[0, i] - means[0, k], x[1, i] - means[1, k], x[2, i] - means[2, k]
+            wide_P = add_spread(wide_P, math.exp(w[i]) / mass, none, d)
+        for i in range(6):
+            P[i] = wide_P[i]
+    return means, np.log(totals[:count])
+
+
+@kernel
 def log_likelihood(
-    F,
-    Q,
-    rows,
-    present,
-    prior,
-    variances,
-    manoeuvre_variance,
-    reach,
-    merge,
-    max_count,
-    min_ratio,
-    outliers,
-    span,
-    start_factor,
-    score,
-    soundness,
-):
+    F, Q, rows, present, prior, variances, manoeuvre_variance, reach, merge, max_count, min_ratio, merge_distance,
+    outliers, span, start_factor, score, soundness
+):  # fmt: skip
     """Fill in the log likelihoods of a track of n rows under a filter; false where the filter leaves too many folds.
 
     F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span; present (n, 2):
     which of the first two count (a kernel has no not-a-number); prior (6,): covariance before the first plot;
     variances (2,) of range and velocity; reach: 0: velocities are not folded, 1: the nearest fold, 2: all folds that
-    matter; merge, max_count, min_ratio as in `take_velocity`; outliers (2, 4): their laws; span (2,): of the data;
-    start_factor: on the variance of the first START_RANGES ranges, which are no outliers: they find the state. Filled:
-    score (n, 2), zero where nothing is measured, and soundness (n, 2), the probabilities that the numbers are no
-    outliers."""
+    matter; merge, max_count, min_ratio as in `take_velocity`; merge_distance: of `merge_alike`; outliers (2, 4): their
+    laws; span (2,): of the data; start_factor: on the variance of the first START_RANGES ranges, which are no outliers:
+    they find the state. Filled: score (n, 2), zero where nothing is measured, and soundness (n, 2), the probabilities
+    that the numbers are no outliers."""
     x, w, P, ranges, laws = np.zeros((3, 1)), np.zeros(1), prior.copy(), 0, np.empty((3, LAW_COUNT))
     for k in range(len(rows)):
         z, v, D = rows[k, 0], rows[k, 1], rows[k, 2]
@@ -272,4 +320,6 @@ def log_likelihood(
             x, w, score[k, 1], soundness[k, 1] = take_velocity(
                 x, w, P, variances[1], v, D, *hypotheses, outliers[1], span[1]
             )
+            if w.size > 1:
+                x, w = merge_alike(x, w, P, merge_distance)
     return True
