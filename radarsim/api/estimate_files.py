@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-UNIT_FACTORS = 1e3, 1e-3, -1.0, 3.6, 1 / 3.6, 180 / np.pi, np.pi / 180  # between units that are confused
+KNOT_MPS, FOOT_M = 1852 / 3600, 0.3048
+UNIT_FACTORS = (  # between units that are confused
+    *(1e3, 1e-3, -1.0, 3.6, 1 / 3.6, 180 / np.pi, np.pi / 180, KNOT_MPS, 1 / KNOT_MPS, FOOT_M, 1 / FOOT_M),
+)
 INDEX_COLUMNS = "realisation", "k", "t_s"  # of a table of estimates; its other columns are components
 TIME_TOLERANCE = 1e-3  # of the time between scans: how far a time in a table may be from that of a plot
 

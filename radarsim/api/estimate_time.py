@@ -13,7 +13,8 @@ MIN_TIME_FACTOR = 3.0  # by which errors against the truth of another scan must 
 MIN_LINK_SIGMAS = 8.0  # of a correlation of errors with plots before the scan, to be clear
 MAX_LINK_SIGMAS = 4.0  # of a correlation with the plots of the scan, to be chance
 MAX_LINK_RATIO = 0.15  # of the second to the first
-SHIFTS = (-2, -1, 1, 2)  # scans
+HALF = 0.5
+SHIFTS = (-2, -1, HALF, 1, 2)  # scans; half a scan late a filter may be that lags
 MAX_SCANS = 200  # examined
 MIN_ROWS_PER_UNKNOWN = 3.0  # realisations from which the part of the truth in a plot is fitted
 
@@ -25,8 +26,8 @@ def time_warnings(
     m) of theirs; x and plots may hold not-a-number. full_truth: that of all components (n, K, D)."""
     if x.shape[1] <= 2 * max(SHIFTS):
         return []
-    scans = _examined_scans(max(SHIFTS), x.shape[1] - max(SHIFTS))
-    factors = {shift: _error_factor(x[:, scans], truth[:, scans], truth[:, scans + shift]) for shift in SHIFTS}
+    scans = _examined_scans(int(max(SHIFTS)), x.shape[1] - int(max(SHIFTS)))
+    factors = {shift: _error_factor(x[:, scans], truth[:, scans], _shifted(truth, scans, shift)) for shift in SHIFTS}
     shift = max(factors, key=lambda candidate: factors[candidate])
     scans, full_truth = _examined_scans(1, x.shape[1]), truth if full_truth is None else full_truth
     errors = x[:, scans] - truth[:, scans]
@@ -43,8 +44,15 @@ def time_warnings(
     return []
 
 
-def _shift_warning(name: str, shift: int, factor: float) -> str:
-    scans = plural("{count} scan", "{count} scans", abs(shift))
+def _shifted(truth: np.ndarray, scans: np.ndarray, shift: float) -> np.ndarray:
+    """The truth (n, K, d) so many scans later than scans (k,); of half a scan the mean of two."""
+    if shift == HALF:
+        return np.asarray(0.5 * (truth[:, scans] + truth[:, scans + 1]))
+    return truth[:, scans + int(shift)]
+
+
+def _shift_warning(name: str, shift: float, factor: float) -> str:
+    scans = tr("half a scan") if shift == HALF else plural("{count} scan", "{count} scans", int(abs(shift)))
     fields = {"name": name, "scans": scans, "factor": f"{factor:.2g}"}
     if shift < 0:
         return tr("{name}: the estimates fit the truth of {scans} earlier: their errors are then {factor} "

@@ -239,6 +239,15 @@ def test_a_filter_that_lags_behind_is_not_called_late(components, alpha, beta):
     assert len(time_warnings("mine", late, truth, measured)) == 1
 
 
+def test_estimates_for_half_a_scan_later_are_recognised():
+    rng = np.random.default_rng(8)
+    truth = np.stack([1e5 - 250 * 10.0 * np.arange(20), np.full(20, -250.0)], axis=-1)[None] + np.zeros((200, 1, 1))
+    noise = rng.normal(0, 1, (200, 20, 2)) * [50, 5]
+    early = truth + noise + np.stack([5 * truth[..., 1], 0 * truth[..., 1]], axis=-1)
+    (line,) = time_warnings("mine", early[..., :1], truth[..., :1], noise)
+    assert "fit the truth of half a scan later" in line
+
+
 def test_predictions_of_random_targets_are_recognised():
     """What realisations differ in by their truth is no error of a plot."""
     rng = np.random.default_rng(8)
@@ -264,7 +273,9 @@ def test_values_in_another_unit_or_of_the_other_sign_are_found(estimates):
         estimates[..., 0] / 1e3
     )
     assert "of Vr must be in m/s, with the sign of the truth: multiplied by -1 " in refusal(estimates * [1, -1, 1])
-    assert "of Vr must be in m/s, with the sign of the truth: multiplied by 0.2778 " in refusal(estimates * [1, 3.6, 1])
+    for factor in (3.6, 3600 / 1852, 1 / 0.3048):
+        expected = f"of Vr must be in m/s, with the sign of the truth: multiplied by {1 / factor:.4g} "
+        assert expected in refusal(estimates * [1, factor, 1])
 
 
 def test_masked_values_are_no_estimates(estimates):
