@@ -692,6 +692,10 @@ def test_outliers_of_which_no_row_is_one_may_be_a_manoeuvre():
     found = {finding.name: finding for finding in advice.find_errors(one)}
     assert not found["outliers"].rows
     assert found["outliers"].rival is not None
+    fitted = fit.fit_likelihood(one)
+    assert not fitted.outliers
+    assert fitted.further_explanation.name == OUTLIERS
+    assert fitted.further_explanation.rival is not None
 
 
 def test_the_best_filter_is_that_which_foretells_best():

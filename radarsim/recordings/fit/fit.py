@@ -117,12 +117,13 @@ def share_within_sound(law: OutlierLaw) -> float:
 
 class FurtherExplanation(NamedTuple):
     """An explanation besides the keys, one of EXPLANATIONS: its value, and the increase of the log-likelihood by it;
-    rival: hard manoeuvres, where these explain the plots about as well as outliers."""
+    rival: hard manoeuvres, where these explain the plots about as well as outliers; weaker_rival: where less well."""
 
     name: str
     value: float
     gain: float
     rival: Rival | None = None
+    weaker_rival: Rival | None = None
 
 
 class OutlierRow(NamedTuple):
@@ -308,9 +309,14 @@ def fit_likelihood(
     while allowing is None and (explanation := result.further_explanation) and _is_clear_error(explanation):
         allowed = (*allowed, explanation.name)
         try:
-            result = fit_keys(likelihood, allowed, stages.next(), rough)
+            further = fit_keys(likelihood, allowed, stages.next(), rough)
         except ConfigError:  # so many outliers that the errors follow another law: the plain fit reports it
             break
+        if explanation.weaker_rival is not None and not further.outlier_rows:
+            # Outliers of which no row is one may be manoeuvres.
+            explanation = explanation._replace(rival=explanation.weaker_rival)
+            return replace(result, further_explanation=explanation, plain=None if result is plain else plain)
+        result = further
     return result if result is plain else replace(result, plain=plain)
 
 
@@ -418,20 +424,24 @@ def _find_further_explanation(search: "LikelihoodSearch", likelihood: Likelihood
             {key: value for key, value in fixed.items() if key not in free_keys},
         )
         values, maximum = climb(slice_, fixed | maxima[i][0])
-        maxima[i] = max(maxima[i], ({OUTLIERS: values[OUTLIERS]}, maximum), key=lambda maximum: maximum[1])
+        maxima[i] = max(maxima[i], (values, maximum), key=lambda maximum: maximum[1])
     if not maxima:
         return None
-    values, maximum = max(maxima, key=lambda maximum: maximum[1])
+    (values, maximum), name = max(zip(maxima, names, strict=True), key=lambda candidate: candidate[0][1])
     needed_gain = half_chi2(0.95 ** (1 / len(maxima)))
     if maximum <= search.top + needed_gain:
         return None
-    ((name, value),) = values.items()
-    rival = rival_of_outliers(counted_likelihood, fixed | values) if name == OUTLIERS else None
+    value, all_values = values[name], fixed | values
+    rival = rival_of_outliers(counted_likelihood, fixed | {name: value}) if name == OUTLIERS else None
+    weaker_rival = None
     if rival is not None and rival.is_clear:
         if rival.gain > 0:
-            name, value, maximum = MANOEUVRES, rival.share, maximum + rival.gain
-        rival = None
-    return FurtherExplanation(name, value, maximum - search.top, rival)
+            name, value, maximum, rival = MANOEUVRES, rival.share, maximum + rival.gain, None
+        elif find_outlier_rows(
+            likelihood, np.array([all_values[key] for key in likelihood.keys]), replace(law, outliers=value)
+        ):
+            rival, weaker_rival = None, rival
+    return FurtherExplanation(name, value, maximum - search.top, rival, weaker_rival)
 
 
 def fitted_settings(fit_: Fit) -> dict[str, float]:
