@@ -9,7 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from making import chart, claims, contents, formulas, generated, modules
+from making import chart, claims, contents, formulas, generated, modules, object_search
 
 import radarsim
 
@@ -73,6 +73,7 @@ html_search_scorer = str(Path(__file__).parent / "style" / "search.js")
 def setup(app):
     """What is made while building: the contents from the index, pages from the program, a front page."""
     formulas.setup(app)
+    object_search.setup(app)
     app.connect("source-read", contents.add)
     app.connect("source-read", generated.fill)
     app.connect("env-get-outdated", generated.outdated)
