@@ -317,7 +317,7 @@ def test_exact_values_decide_under_a_interpretation_as_in_a_run(ran, tmp_path):
     """Of 60 realisations: what a run knows exactly is undecided neither in the shipped interpretation nor in a changed
     one."""
     wanted = dataclasses.replace(ran, paper=dataclasses.replace(ran.paper, interpretations=Near()))
-    (over,) = judge_requests([wanted], out=tmp_path, realisations=60, figures=False).papers[0].claims
+    (over,) = judge_requests([wanted], out=tmp_path, realisations=60, write=False).papers[0].claims
     assert all(judged.is_known_exactly and judged.n == 60 for one in over.verdicts for _, judged in one.parts)
     assert over.outcome.kind != UNDECIDED
     measured = {judged.exact for one in over.verdicts for _, judged in one.parts}

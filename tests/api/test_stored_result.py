@@ -137,6 +137,7 @@ def test_export_of_nothing_says_where_it_looked(tmp_path):
     assert not (tmp_path / "a.nc").exists()
 
 
+@pytest.mark.slow_cases("ps")  # by the code that writes eps
 @pytest.mark.parametrize("kind", ["pdf", "ps", "eps"])
 def test_a_saved_figure_embeds_true_type_fonts(ran, kind, tmp_path):
     path = tmp_path / f"a.{kind}"

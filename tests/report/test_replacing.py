@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -52,38 +53,44 @@ def replace(folder, contents):
     atomic_files.replace_all(folder, with_record(contents), stale=provenance.outputs)
 
 
-def test_a_replacement_that_is_killed_at_any_step_leaves_all_old_or_all_new_files(tmp_path):
-    seen, step = [], 0
-    while True:
-        folder = tmp_path / str(step)
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory):
+    """Folders as a process left them that was killed as it replaced files, one for each step; the last one it
+    finished."""
+    folders, is_killed = [], True
+    while is_killed:
+        folder = tmp_path_factory.mktemp("killed")
         replace(folder, OLD)
         (folder / "my notes.txt").write_bytes(b"mine")
-        if not killed_at(step, lambda folder=folder: replace(folder, NEW)):
-            break
+        is_killed = killed_at(len(folders), lambda folder=folder: replace(folder, NEW))
+        folders.append(folder)
+    return folders
+
+
+def test_a_replacement_that_is_killed_at_any_step_leaves_all_old_or_all_new_files(killed, tmp_path):
+    seen = []
+    for step, left in enumerate(killed[:-1]):
+        folder = shutil.copytree(left, tmp_path / str(step))
         files = found(folder)
         assert files.pop("my notes.txt") == b"mine"
         assert files in (with_record(OLD), with_record(NEW)), step
         seen.append(files == with_record(NEW))
         replace(folder, OLD)  # and whatever is left is in nobody's way
         assert {**found(folder)}.pop("my notes.txt") == b"mine"
-        step += 1
-    assert step > 20
+    assert len(seen) > 20
     assert seen == sorted(seen)
     assert {*seen} == {False, True}
-    files = found(folder)
+    files = found(killed[-1])
     del files["my notes.txt"]
     assert files == with_record(NEW)
 
 
-def test_the_next_writer_finishes_first(tmp_path):
+def test_the_next_writer_finishes_first(killed, tmp_path):
     """Else files of a run that nobody wrote down would stay."""
-    for step in range(100):
-        folder = tmp_path / str(step)
-        replace(folder, OLD)
-        if not killed_at(step, lambda folder=folder: replace(folder, NEW)):
-            break
+    for step, left in enumerate(killed):
+        folder = shutil.copytree(left, tmp_path / str(step))
         replace(folder, {"curves.csv": b"third"})
-        assert found(folder) == with_record({"curves.csv": b"third"}), step
+        assert found(folder) == with_record({"curves.csv": b"third"}) | {"my notes.txt": b"mine"}, step
 
 
 def test_a_signal_in_the_middle_is_late(tmp_path, monkeypatch):
