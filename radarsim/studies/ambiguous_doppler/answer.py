@@ -174,10 +174,10 @@ def _least_error_of_all(
     equal = [name for name in same_kind if is_equal(_largest_sigma(worst_rows[name][0]), best_value)]
     since_texts = {wording.since(*scans[result.name]) for result in combining}
     text = plural(
-        "Smallest worst-case RMS range error {since}: {best}, {least}; {kind}, {other}, reaches {most} "
-        "({where}){scans}.",
-        "Smallest worst-case RMS range error {since}, over {count} cases: {best}, {least}; {kind}, {other}, reaches "
-        "{most} ({where}){scans}.",
+        "Smallest worst-case RMS range error {since}{scans}: {best}, {least}; {kind}, {other}, reaches {most} "
+        "({where}).",
+        "Smallest worst-case RMS range error {since}, over {count} cases{scans}: {best}, {least}; {kind}, {other}, "
+        "reaches {most} ({where}).",
         len(combining),
         since=since_texts.pop() if len(since_texts) == 1 else tr("after the start of the track"),
         best=join_names([*map(quote_name, equal)]),
