@@ -152,8 +152,8 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
         if (case_name := key_labels.without_markup(key_labels.swept_description(result)))
     )
     text = plural(
-        "{estimator}: locked in {least} to {most}; {count} case of {realisations}.",
-        "{estimator}: locked in {least} to {most}; {count} cases of {realisations} each ({together}).",
+        "{estimator}, {count} case of {realisations}: locked in {least} to {most}.",
+        "{estimator}, {count} cases of {realisations} each ({together}): locked in {least} to {most}.",
         len(cases),
         estimator=quote_name(name),
         least=lowest,
