@@ -2,6 +2,7 @@
 
 import math
 import re
+import sys
 from collections.abc import Iterable, Sequence
 
 from radarsim.language.numerals import numeral, power_of_ten
@@ -42,11 +43,13 @@ def number(value: float, digits: int = 4) -> str:
         return ""
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
+    if 0 < abs(value) < sys.float_info.min:
+        digits = 1  # the least number above zero, an end that a claim excludes, has no more
     if 0 < 1 - value < 10.0**-digits:
         digits = min(-math.floor(math.log10(1 - value)), MAX_SHARE_DIGITS)
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     if value == 0 or -4 <= int(exponent) < MAX_PLAIN_DIGITS:
-        return numeral(f"{float(f'{value:.{digits}g}') + 0.0:.10g}")
+        return numeral(f"{float(f'{value:.{digits}g}') + 0.0:.{max(digits, 10)}g}")
     short = f"{float(mantissa):g}"
     raised = power_of_ten(int(exponent))
     return raised if short == "1" else f"−{raised}" if short == "-1" else f"{numeral(short)}·{raised}"

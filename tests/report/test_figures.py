@@ -61,6 +61,19 @@ def test_a_point_of_a_band_without_a_neighbour_has_a_whisker():
     assert drawn(one(Line(np.arange(60.0), y, "a", Style(0, 0, 0)))).lines[0].get_markevery()[-2:] == [55, 56]
 
 
+def test_whiskers_of_a_lone_point_are_off_the_axis():
+    y = np.array([1.0, np.nan, 2.0, 2.0])
+    lone = Line(np.arange(4.0), y, "a", lo=y - 1, hi=y + 1)
+    ends = [drawn(one(line)).get_xlim()[0] for line in (lone, replace(lone, y=y[[0, 2, 2, 2]]))]
+    assert ends[0] < -0.15 < ends[1] < 0
+
+
+def test_a_title_is_not_broken_before_a_unit():
+    panel = replace(one(Line(np.arange(3.0), np.arange(3.0))).panels[0], title="false plots per scan: 0.03 km⁻²")
+    axes = drawing_canvas.render(Figure("f", "", "", (panel,) * 3, 3, 175.0)).axes[0]
+    assert axes.get_title(loc="left").split("\n") == ["false plots per scan:", "0.03\xa0km⁻²"]
+
+
 def test_lines_that_never_lose_are_named_and_not_drawn():
     shares = [Line(np.arange(3.0), np.array(y), name) for y, name in (([1, 1, 1], "a"), ([1, 0.9, 0.8], "b"))]
     (line,), said = panel_layout.loss_lines(shares)

@@ -229,7 +229,7 @@ def _fill_grid(figure: Figure, plan: LegendPlan, grid: np.ndarray, columns: int)
     for n, (axes, panel) in enumerate(zip(grid.flat, plan.panels, strict=False)):
         x, y = wrap_label(panel.x, cell_mm), wrap_label(panel.y, figure.panel_height_mm - 5)
         y = replace(y, label="") if figure.share_y and n % columns else y
-        title = wrap(panel.title, TITLE_LETTERS_PER_MM * cell_mm)
+        title = wrap(with_unbroken_units(panel.title), TITLE_LETTERS_PER_MM * cell_mm)
         length_mm = cell_mm - SIDE_MM - (END_LETTER_MM * longest_name(panel) if plan.at_ends[n] else 0.0)
         draw_panel(axes, stack_top_notes(replace(panel, title=title, x=x, y=y), length_mm), map_colours)
         end_names.append(name_line_ends(axes, panel) if plan.at_ends[n] else [])

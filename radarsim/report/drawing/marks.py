@@ -34,13 +34,14 @@ from radarsim.report.wording import number
 MapColours = dict[tuple[str, str], Normalize]  # colour scales of maps, by the label of their bar and their group
 MAX_WRITTEN_CELLS = 100  # of a map, whose values are written in
 SHARE_LIMITS = (0, 1)
+MARGIN, WHISKER_MARGIN = 0.02, 0.06  # of an axis of x, beside its marks
 
 
 def draw_panel(axes: Axes, panel: Panel, map_colours: MapColours) -> None:
     """Draw the marks and axes of a panel."""
     axes.set_xscale(panel.x.scale)
     axes.set_yscale(panel.y.scale)
-    axes.margins(x=0.02)
+    axes.margins(x=_side_margin(panel))
     for mark in panel.marks:
         _draw_mark(axes, mark, panel, map_colours)
     axes.set_xlabel(panel.x.label)
@@ -79,6 +80,15 @@ def _draw_mark(axes: Axes, mark: Mark, panel: Panel, map_colours: MapColours) ->
             _draw_map(axes, mark, map_colours)
         case Note():
             _draw_note(axes, mark)
+
+
+def _side_margin(panel: Panel) -> float:
+    """The share of an axis of x beside its marks; more where the whiskers of a lone point would lie upon the axis."""
+    lines = [mark for mark in panel.marks if isinstance(mark, Line) and len(mark.x)]
+    ends = [end for line in lines for end in (np.nanmin(line.x), np.nanmax(line.x))]
+    outer = {min(ends, default=0.0), max(ends, default=0.0)}
+    has_whiskers = any(line.lo is not None and line.x[i] in outer for line in lines for i in lone_points(line))
+    return WHISKER_MARGIN if has_whiskers else MARGIN
 
 
 def _draw_line(axes: Axes, line: Line, crosses: str) -> None:
