@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import quote_name, term, tr
+from radarsim.language.translate import join_names, quote_name, term, tr
 from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import Estimate
 
@@ -29,7 +29,7 @@ class NoiseKey(NamedTuple):
 class FilterChoices(NamedTuple):
     """A filter with several values of its process noise: σ by value, its ends the same where it is known, else of
     intervals that all hold at once; and the best values, of which there are several where noise or too little parts
-    them."""
+    them, and none where no value settles in time."""
 
     name: str
     sigmas: Mapping[Any, Estimate]
@@ -74,14 +74,17 @@ def gain_sentences(
             )
         )
         for other in others
-        if baseline.best and other.best
     ]
 
 
 def _clauses(key: NoiseKey, baseline: FilterChoices, other: FilterChoices) -> Iterator[str]:
     is_measured = baseline.is_measured or other.is_measured
-    gain = _span_text(_gain(baseline.best_sigma, other.best_sigma), is_measured)
-    yield tr("{gain} with each at its best {symbol}", gain=gain, symbol=key.symbol)
+    unsettled = [quote_name(choices.name) for choices in (baseline, other) if not choices.best]
+    if unsettled:
+        yield tr("no {symbol} settles in time with {filters}", symbol=key.symbol, filters=join_names(unsettled))
+    else:
+        gain = _span_text(_gain(baseline.best_sigma, other.best_sigma), is_measured)
+        yield tr("{gain} with each at its best {symbol}", gain=gain, symbol=key.symbol)
     gains = {
         value: _gain(baseline.sigmas[value], sigma) for value, sigma in other.sigmas.items() if value in baseline.sigmas
     }

@@ -1,6 +1,6 @@
 """The answer's sentences on gains of observing the velocity, component by component; of a single filter on its σ."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import GAIN, RADIAL
 from radarsim.report.sentences import Sentence
 from radarsim.studies.counted_scans import CountedScans
-from radarsim.studies.range_doppler.config import configured_variance
+from radarsim.studies.range_doppler.config import FilterKeys, configured_variance
 from radarsim.studies.range_doppler.settling import case_scans
 from radarsim.studies.range_doppler.study import prepare
 from radarsim.studies.range_doppler.tables import Result, follows_the_model, steady_sigma
@@ -41,6 +41,7 @@ def answer_gains(results: Sequence[Result], tables_by_name: TablesByName, omits_
             gains[(component.name,)],
             all_gains[(component.name,)],
             component.words,
+            _than_baseline(unswept_results, results),
             labels,
             {result.name: case_scans(result.spec, result.axes.manoeuvre_variance, c) for result in results},
             omits_range and c == 0,
@@ -56,19 +57,20 @@ def _gain_sentence(
     gains: "pd.DataFrame",
     all_gains: "pd.DataFrame",
     quantity: str,
+    baseline: str,
     labels: Mapping[str, str],
     scans: Mapping[str, CountedScans],
     is_on_loss: bool,
 ) -> Sentence | None:
     """The gain in one quantity at the last scan, or at the last common time.
 
-    gains: of the cases in the sentence; all_gains: of all cases, among which the greatest loss is looked for; scans:
-    those of each case that count for extremes; is_on_loss: on the greatest loss alone, if any."""
+    gains: of the cases in the sentence; all_gains: of all cases, among which the greatest loss is looked for;
+    baseline: as `_than_baseline`; scans: those of each case that count for extremes; is_on_loss: on the greatest loss
+    alone, if any."""
     if all(gain_sentences.is_equal(compared_value.row_value(row, GAIN)) for _, row in all_gains.iterrows()):
         return _equality(results, all_gains, quantity)
     best_clause: list[Sentence] = []
     compared, time_text = _rows_compared(gains)
-    baseline = _than_baseline(results)
     has_several_filters = gains["filter"].nunique() > 1
     if is_on_loss:
         loss = _worst_loss(all_gains, None, labels, scans)
@@ -116,7 +118,7 @@ def _equality(results: Sequence[Result], gains: "pd.DataFrame", quantity: str) -
     text = tr(
         "{quantity}: the RMS error is equal to that {base} at every scan ({known}).",
         quantity=_capitalised(quantity),
-        base=_with_baseline(results),
+        base=_with_baseline(results, results),
         known=tr("exact") if value.is_exact else gain_sentences.unseen_text(min(result.count for result in results)),
     )
     return Sentence(text)
@@ -177,7 +179,7 @@ def _range_of_gains(
 
 def _long_run_clause(gains: str) -> list[Sentence]:
     """The clause on gains of the long run, which are exact, where there are such."""
-    return [Sentence(tr("not settled: {gains} in the long run", gains=gains))] if gains else []
+    return [Sentence(tr("still changing: {gains} in the long run", gains=gains))] if gains else []
 
 
 def _long_run_gain(results: Sequence[Result], row: "pd.Series[Any]") -> str:
@@ -217,7 +219,7 @@ def _best_gain(
     if best["k"] == sentence_row["k"]:
         return []
     text = tr(
-        "{since} at best {gain}, at {t_s:g} s", since=wording.since(*counted), gain=_extreme_text(gain), t_s=best["t_s"]
+        "{since} at best {gain}, at {t_s:g} s", since=_since_text(counted), gain=_extreme_text(gain), t_s=best["t_s"]
     )
     return [Sentence(text, gain.intervals)]
 
@@ -241,13 +243,18 @@ def _worst_loss(
         text = tr("at worst {gain}, at {t_s:g} s", **fields)
     counted = scans[worst["case"]]
     if counted.reason != "last":
-        text = f"{wording.since(*counted)} {text}"
+        text = f"{_since_text(counted)} {text}"
     return [Sentence(text, loss.intervals)]
 
 
-def _than_baseline(results: Sequence[Result]) -> str:
+def _since_text(counted: CountedScans) -> str:
+    """From which scan on the errors of a gain count: those of filters that have settled, whose gain may not have."""
+    return tr("from {t_s:g} s on", t_s=counted.t_s) if counted.reason == "settled" else wording.since(*counted)
+
+
+def _than_baseline(results: Sequence[Result], other_results: Sequence[Result]) -> str:
     """The clause on what the gains are relative to, and of which realisations where plots may be missed."""
-    baseline = tr("than {base}", base=_with_baseline(results))
+    baseline = tr("than {base}", base=_with_baseline(results, other_results))
     if any(result.spec.radar.detection_probability < 1 for result in results):
         return tr("{base}, where both have an estimate", base=baseline)
     return baseline
@@ -260,17 +267,31 @@ def _is_range_alone(results: Sequence[Result]) -> bool:
     return all(f.observes == ("range",) for f in baselines) and len(range_filters) == len(baselines)
 
 
-def _with_baseline(results: Sequence[Result]) -> str:
-    """The baseline after `than`: `with range alone` if only the baseline filter observes no more."""
+def _with_baseline(results: Sequence[Result], other_results: Sequence[Result]) -> str:
+    """The baseline after `than`: `with range alone` if only the baseline filter observes no more.
+
+    With D_M where it is the same in all results, but not in all of other_results, which hold them."""
     baselines = [result.spec.filters[result.axes.baseline] for result in results]
-    variances = {variance for variance in map(configured_variance, baselines) if isinstance(variance, float)}
     if _is_range_alone(results):
-        if len(variances) > 1:
+        if len(_configured_variances(baselines)) > 1:
             return tr("with range alone at the same D_M")
+        variances, all_variances = (
+            _configured_variances(f for result in group for f in result.spec.filters)
+            for group in (results, other_results)
+        )
+        if len(variances) == 1 < len(all_variances):
+            (variance,) = variances
+            return tr("with range alone, at D_M = {variance}", variance=key_labels.format_value(variance, powers=True))
         return tr("with range alone")
     if len({f.name for f in baselines}) == 1:
         return tr("with filter {filter}", filter=quote_name(baselines[0].name))
     return tr("with the baseline filter")
+
+
+def _configured_variances(filters: Iterable[FilterKeys]) -> set[float]:
+    """The D_M that a config gives filters as numbers."""
+    variances = map(configured_variance, filters)
+    return {variance for variance in variances if isinstance(variance, float) and not np.isnan(variance)}
 
 
 def _case_label(row: "pd.Series[Any]", labels: Mapping[str, str], has_several_filters: bool) -> str:

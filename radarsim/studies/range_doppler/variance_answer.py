@@ -63,8 +63,10 @@ def _best_settled_variances(results: Sequence[Result], tables_by_name: TablesByN
             best = [_best_variance(rows, str(name)) for name, rows in rows_with_variance.groupby("filter", sort=False)]
             name = key_labels.without_markup(key_labels.config_device(members[0]))
             text = plural(
-                "{name}, best D_M, by the steady RMS range error, settled in under {count} scan period: {filters}.",
-                "{name}, best D_M, by the steady RMS range error, settled in under {count} scan periods: {filters}.",
+                "{name}, best D_M, with the least steady RMS range error of those that settle in under {count} scan "
+                "period: {filters}.",
+                "{name}, best D_M, with the least steady RMS range error of those that settle in under {count} scan "
+                "periods: {filters}.",
                 PERIODS,
                 name=name,
                 filters="; ".join(best),
@@ -99,10 +101,10 @@ def _gains_over(
 def _best_variance(rows: "pd.DataFrame", filter_name: str) -> str:
     best = rows[rows["best"]]
     if not len(best):
-        return tr("{filter} none of the values tried", filter=filter_name)
+        return tr("{filter}: none of those tried settles so soon", filter=quote_name(filter_name))
     row = best.iloc[0]
     return tr(
-        "{filter} {variance} (RMS error {sigma:.4g} m, settled after {settling:g} s)",
+        "{filter} {variance} ({sigma:.4g} m, settled after {settling:g} s)",
         filter=quote_name(filter_name),
         variance=key_labels.format_value(float(row["manoeuvre_variance"]), powers=True),
         sigma=row["steady_sigma"],

@@ -218,23 +218,23 @@ def test_a_gain_that_has_not_settled_is_quoted_with_that_of_the_long_run(expecte
     results = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection})]
     told = answer_texts(answer, results, made_of(results))[:3]
     for sentence, gain in zip(told, known, strict=True):
-        assert f"; not settled: {gain:.1f} % lower{words}" in sentence
+        assert f"; still changing: {gain:.1f} % lower{words}" in sentence
     longer = [expected_radar("rls2", radar=S_BAND | {"detection_probability": detection}, scans=40)]
     if detection == 1:
-        assert "settled" not in " ".join(answer_texts(answer, longer, made_of(longer)))
+        assert "still changing" not in " ".join(answer_texts(answer, longer, made_of(longer)))
 
 
 def test_a_target_that_breaks_the_model_has_no_gain_of_the_long_run(expected_radar):
     target = {"kind": "jerk_pulse", "coefficients": [1e5, -250], "start_s": 20, "jerk_mps3": 1, "duration_s": 20}
     results = [expected_radar("rls2", radar=S_BAND, target=target)]
-    assert "settled" not in " ".join(answer_texts(answer, results, made_of(results)))
+    assert "still changing" not in " ".join(answer_texts(answer, results, made_of(results)))
 
 
 def test_of_several_radars_those_are_named_that_have_not_settled(expected_radar):
     results = [expected_radar("rls2", name="mine", radar=S_BAND), expected_radar("rls4", name="rls4")]
     told = answer_texts(answer, results, made_of(results))[0]
     assert told.count("in the long run") == 1
-    assert "not settled: 36.5 % lower (" in told
+    assert "still changing: 36.5 % lower (" in told
 
 
 def test_answer_names_a_baseline_that_observes_more(expected_radar):
@@ -293,10 +293,20 @@ def test_answer_is_silent_of_a_loss_that_is_none(paper):
     assert "at worst" not in answer_texts(answer, one, made)[0]
 
 
+def test_answer_tells_the_variance_of_its_gains_where_others_are_swept(paper, swept):
+    results = [*paper[:1], *swept]
+    first = answer_texts(answer, results, made_of(results))[0]
+    assert "than with range alone, at D_M = 10⁻³" in first
+    assert "D_M" not in answer_texts(answer, paper[:1], made_of(paper[:1]))[0]
+
+
+BEST = "with the least steady RMS range error of those that settle"
+
+
 def test_answer_tells_the_best_variance(swept):
     told = answer_texts(answer, swept, made_of(swept))[0]  # before the gains: it is what is asked
-    assert told.startswith("RLS 2, best D_M, by the steady RMS range error, settled in under 10 scan periods: ")
-    assert ": r 10⁻³ (RMS error 189.1 m, settled after 90 s); r+Vr 10⁻³ (RMS error 154." in told
+    assert told.startswith(f"RLS 2, best D_M, {BEST} in under 10 scan periods: ")
+    assert ": r 10⁻³ (189.1 m, settled after 90 s); r+Vr 10⁻³ (154." in told
 
 
 def test_a_target_that_breaks_the_model(expected_radar):
