@@ -15,7 +15,13 @@ import numpy as np
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats import cell_times, columns, records, table_checks
-from radarsim.recordings.formats.cell_numbers import CellNumbers, hemisphere_sign, is_missing, spoiled_number_cure
+from radarsim.recordings.formats.cell_numbers import (
+    LARGEST_NUMBER,
+    CellNumbers,
+    hemisphere_sign,
+    is_missing,
+    spoiled_number_cure,
+)
 from radarsim.recordings.formats.cell_times import TIME_FORMATS
 from radarsim.recordings.formats.column_suggestions import cell_number
 from radarsim.recordings.formats.columns import EARTH_COLUMNS, QUANTITIES, Header
@@ -64,7 +70,8 @@ class Table:
         self.header = Header(self.path, sheet.header, assigned or {}, sheet.sample)
         self.columns = self.header.columns
         self.kind = records.POSITIONS if self.header.reads_positions else records.PLOTS
-        self.time_name = sheet.header[self.columns["t_s"].position].strip()
+        self.time_index = self.columns["t_s"].position
+        self.time_name = sheet.header[self.time_index]
         self.clock = records.UnrolledClock(records.DAY_S, near_s=MIDNIGHT_S)
         self.minute_clock = records.UnrolledClock(HOUR_S)
         self.day_s = math.nan  # of the date read last
@@ -206,7 +213,7 @@ class Table:
         if len(cells) != self.width:
             self._check_other_line(cells)
             return
-        if cells[self.columns["t_s"].position].strip() == self.time_name and self._is_second_header(cells):
+        if cells[self.time_index] == self.time_name and self._is_second_header(cells):
             return
         row = row_of(cells)
         if self.faults:  # the rest is only read for further ones
@@ -460,11 +467,18 @@ class Table:
 
     def _parse_number(self, cells: list[str], name: str) -> float:
         column = self.columns.get(name)
-        text = cells[column.position].strip() if column else ""
+        if column is None:
+            return math.nan
+        text = cells[column.position].strip()
         if self.has_joint_position and name in EARTH_COLUMNS:
             text = text.partition(",")[2 * (name == "longitude_deg")]
-        if not column or not text:
+        if not text:
             return math.nan
+        try:
+            if abs(value := float(text)) <= LARGEST_NUMBER:
+                return value * column.factor
+        except ValueError:  # the reader of all other cells says what is wrong
+            pass
         try:
             return self.numbers.quantity(text, name, column.factor, QUANTITIES[name].units)
         except ValueError:
