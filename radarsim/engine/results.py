@@ -49,11 +49,13 @@ class CaseResult(Generic[A_co]):
 
     A study's own tables take results with its own axes, `CaseResult[RangeDopplerAxes]`; a plain `CaseResult` is any.
 
-    against holds the same case with the sums and axes of each further baseline; outside, where it has filters of
-    somebody else, with theirs.
+    further_baselines holds the same case with the sums and axes of each further baseline; user_filters, where it has
+    filters of somebody else, with theirs.
 
-    `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error; a
-    study adds its own."""
+    `error` (F, K, C, 4) holds the sums of e, e², e³, e⁴; `paired` (F, K, C) those of e²·e² with the baseline's error;
+    where not all realisations have an estimate, `estimates` (F, K, C) counts those that do, and `both` (F, K, C, 5)
+    those that have the baseline's too, with the sums of e², e⁴ and of the baseline's over these; a study adds its
+    own."""
 
     name: str
     study: str

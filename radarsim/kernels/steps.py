@@ -5,7 +5,7 @@ arrays are flat; rows are eights of realisations. Of `groups` eights and K scans
 scan, its first is the time since the scan before, s; numbers (n,) numbers of a case, or of a filter; plots (groups · K
 · PLOT) rows: of a scan 1 where there is a plot, else 0, the numbers of the plot, the truth, and the same two of each
 false plot; errors (groups · K · C) rows: errors of the components, zero beyond the block's last realisation and of
-lost tracks.
+lost tracks; among false plots C + 1 rows of a scan, the last 1 of tracks that count, else 0.
 
 Layout of the noise: the normals 2 j and 2 j + 1 of scan k are those of pair `pairs` · k + j of the stream of plots;
 whether there is one, the uniform number k of the stream of detections; for false plots the uniform numbers j and
@@ -13,7 +13,7 @@ whether there is one, the uniform number k of the stream of detections; for fals
 
 import numpy as np
 
-from radarsim.kernels.compiler import kernel
+from radarsim.kernels.compiler import kernel, kernel_part
 from radarsim.kernels.lane_programs import emit_program
 from radarsim.kernels.lanes import WIDTH, add_totals, address, full, get, put, row, total, where_greater
 from radarsim.kernels.random import U, fill_normal_strip, fill_uniform_pairs, fill_uniform_strip
@@ -30,8 +30,8 @@ def truth_kernel(first: Program, following: Program, pairs: int, rows: int, unif
     begin, move = emit_program(first), emit_program(following)
 
     @kernel
-    def draw(keys, start, groups, scan_numbers, width, numbers, detection, state, a, b, u, even, plots):
-        scans = scan_numbers.size // width
+    def draw(keys, start, groups, known, width, numbers, detection, state, a, b, u, even, plots):
+        scans = known.size // width
         for g in range(groups):
             for k in range(scans):
                 if k % STRIP == 0:
@@ -48,7 +48,7 @@ def truth_kernel(first: Program, following: Program, pairs: int, rows: int, unif
                     present = where_greater(full(detection), uniform, present, full(0.0))
                 put(plot_row, 0, present)
                 noise = (k % STRIP) * pairs
-                scan_row = row(address(scan_numbers), k * width // WIDTH)
+                scan_row = row(address(known), k * width // WIDTH)
                 addresses = (
                     address(state),
                     scan_row,
@@ -66,28 +66,42 @@ def truth_kernel(first: Program, following: Program, pairs: int, rows: int, unif
     return draw
 
 
+@kernel_part
+def add_errors_of_both(sums, first, components, error_row, baseline_row):
+    """Add, from sums[first] on, how many tracks count in both rows, and e² and e⁴ of each over these, by component."""
+    counted = get(error_row, components) * get(baseline_row, components)
+    for c in range(components):
+        e, b = counted * get(error_row, c), counted * get(baseline_row, c)
+        square, base_square = e * e, b * b
+        sums[first + 5 * c] += total(counted)
+        add_totals(sums, first + 5 * c + 1, square, square * square, base_square, base_square * base_square)
+
+
 def filter_kernel(first: Program, following: Program, rows: int, components: int, tested: bool, events: int):
     """The kernel that runs a filter over plots of `rows` rows a scan, and adds up its errors.
 
     error (K, C, 4) takes the sums of e … e⁴, paired (K, C) those of e² times the baseline's e²; where tested, believed
-    (K, C) takes those of the variances that the filter believes, nees (K, 2) those of e' P⁻¹ e and its square."""
+    (K, C) takes those of the variances that the filter believes, nees (K, 2) those of e' P⁻¹ e and its square. Among
+    false plots counts (K, events) takes those of the events, and both (K, C, 5) how many tracks count with the baseline
+    too, and the sums of e², e⁴ and of the baseline's over these."""
     begin, step = emit_program(first), emit_program(following)
+    error_rows = components + (1 if events else 0)
 
     @kernel
     def follow(
-        groups, count, scan_numbers, width, numbers, plots, state, errors, base, error, paired, believed, nees, counts
+        groups, count, known, width, numbers, plots, state, errors, base, error, paired, believed, nees, counts, both
     ):
-        scans = scan_numbers.size // width
+        scans = known.size // width
         sums, products, variances, squares = address(error), address(paired), address(believed), address(nees)
-        totals = address(counts)
+        totals, shared = address(counts), address(both)
         is_counted, extra, marks = np.empty(WIDTH), np.zeros((components + 1) * WIDTH), np.zeros((events + 1) * WIDTH)
         for g in range(groups):
             for lane in range(WIDTH):
                 is_counted[lane] = 1.0 if g * WIDTH + lane < count else 0.0
             for k in range(scans):
                 n = g * scans + k
-                error_row, baseline_row = row(address(errors), n * components), row(address(base), n * components)
-                scan_row, plot_row = row(address(scan_numbers), k * width // WIDTH), row(address(plots), n * rows)
+                error_row, baseline_row = row(address(errors), n * error_rows), row(address(base), n * error_rows)
+                scan_row, plot_row = row(address(known), k * width // WIDTH), row(address(plots), n * rows)
                 addresses = (
                     address(state),
                     scan_row,
@@ -104,6 +118,9 @@ def filter_kernel(first: Program, following: Program, rows: int, components: int
                     step(addresses)
                 for event in range(events):
                     totals[k * events + event] += total(get(address(marks), event))
+                if events:
+                    put(error_row, components, get(address(marks), 0))
+                    add_errors_of_both(shared, k * components * 5, components, error_row, baseline_row)
                 for c in range(components):
                     e, b = get(error_row, c), get(baseline_row, c)
                     square = e * e

@@ -203,7 +203,7 @@ GAINS = ("case", "filter", "baseline", "component", "k", "t_s", "gain_percent", 
 
 
 def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
-    """Paired gains against the baseline filter, where both have an estimate (P1 eq. 17).
+    """Paired gains against the baseline filter, over the realisations in which both have an estimate (P1 eq. 17).
 
     baseline: the filter compared with
     gain_percent ± gain: by how much σ is less than the baseline's, of the same realisations"""
@@ -211,16 +211,21 @@ def gains(results: Sequence[CaseResult]) -> "pd.DataFrame":
 
 
 def _gains(result: CaseResult) -> Columns:
-    axes, b = result.axes, result.axes.baseline
-    both = np.array(axes.available[b : b + 1] & axes.available)
-    both[b] = False
-    both &= "paired" in result.sums  # trackers keep tracks in realisations of their own
-    index = f, k, c = row_index(result, both)
-    error = np.asarray(result.sums["error"])
-    square, fourth = error[index][:, 1], error[index][:, 3]
-    base_square, base_fourth = error[b, k, c][:, 1], error[b, k, c][:, 3]
+    axes, b, has_both = result.axes, result.axes.baseline, "both" in result.sums
+    compared = np.array(axes.available[b : b + 1] & axes.available)
+    compared[b] = False
+    compared &= "paired" in result.sums  # trackers keep tracks in realisations of their own
+    if has_both:
+        compared &= np.asarray(result.sums["both"])[..., 0] > 0
+    index = f, k, c = row_index(result, compared)
     cross = np.asarray(result.sums["paired"])[index] if f.size else np.zeros(0)  # a lone filter pairs with none
-    gain = statistics.gain(square, fourth, base_square, base_fourth, cross, realisation_counts(result)[index])
+    if has_both:
+        n, square, fourth, base_square, base_fourth = np.asarray(result.sums["both"])[index].T
+    else:
+        n, error = realisation_counts(result)[index], np.asarray(result.sums["error"])
+        square, fourth = error[index][:, 1], error[index][:, 3]
+        base_square, base_fourth = error[b, k, c][:, 1], error[b, k, c][:, 3]
+    gain = statistics.gain(square, fourth, base_square, base_fourth, cross, n)
     return {
         **label_columns(
             result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **component_columns(result, c)

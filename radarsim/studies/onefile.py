@@ -363,10 +363,14 @@ class OneFile(Study):
             )
             texts = [f"{quote_name(name)} {gain_sentences.percent_text(gain, result.count)}" for name, gain in values]
             base = result.axes.filters[result.axes.baseline]
-            text = tr("Gain over {base} there: {filters}.", base=quote_name(base), filters=join_names(texts))
+            text = self._gains_text(result, quote_name(base), join_names(texts))
             yield sentences.Sentence(
                 case_selection.after_swept_values(result, text), sentences.intervals("gains", "gain", gains)
             )
+
+    def _gains_text(self, result: "CaseResult", base: str, gains: str) -> str:
+        """The sentence on gains over the baseline at the last scan."""
+        return tr("Gain over {base} at {t:g} s: {filters}.", base=base, filters=gains, t=float(result.axes.t_s[-1]))
 
     def span_mps(self, spec: Any) -> float | None:
         """The unambiguous interval into which measured velocities are folded, which the filters allow for. Default:

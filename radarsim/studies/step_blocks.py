@@ -53,9 +53,10 @@ def follow_realisations(
 
     nothing = np.zeros((1, 2))
     scans, components = plan.axes.k.size, len(plan.axes.components)
-    max_groups = max(1, MAX_ROWS // (scans * (plan.scene.plot_rows + 2 * components)))
+    error_rows = components + (1 if "both" in sums else 0)
+    max_groups = max(1, MAX_ROWS // (scans * (plan.scene.plot_rows + 2 * error_rows)))
     work = aligned_zeros(max(member.rows for member in plan.filters) * WIDTH)
-    baseline_errors, own_errors = (aligned_zeros(max_groups * scans * components * WIDTH) for _ in range(2))
+    baseline_errors, own_errors = (aligned_zeros(max_groups * scans * error_rows * WIDTH) for _ in range(2))
     order = sorted(range(len(plan.filters)), key=lambda f: f != plan.axes.baseline)
     for start in range(0, count, max_groups * WIDTH):
         used = min(max_groups * WIDTH, count - start)
@@ -64,8 +65,8 @@ def follow_realisations(
         for f in order:
             member, errors = plan.filters[f], baseline_errors if f == plan.axes.baseline else own_errors
             tested = [sums[name][f] if member.tested else nothing for name in ("believed", "nees")]
-            counts = sums["counts"][f] if "counts" in sums else nothing
-            filter_sums = sums["error"][f], sums["paired"][f], *tested, counts
+            counts, both = [sums[name][f] if name in sums else nothing for name in ("counts", "both")]
+            filter_sums = sums["error"][f], sums["paired"][f], *tested, counts, both
             member.kernel(
                 groups,
                 used,
@@ -80,7 +81,7 @@ def follow_realisations(
             )
             if "counts" in sums:
                 sums["estimates"][f] = counts[:, :1]
-            values = errors.reshape(max_groups, scans, components, WIDTH)[:groups]
+            values = errors.reshape(max_groups, scans, error_rows, WIDTH)[:groups, :, :components]
             yield f, start, used, values.transpose(0, 3, 1, 2).reshape(-1, scans, components)
 
 

@@ -166,10 +166,20 @@ class ClutteredStudy(StepStudy):
             ]
             if texts:
                 text = tr(
-                    "Tracks kept for {t:g} s: {filters}; RMS errors refer to these.",
+                    "Tracks kept for {t:g} s: {filters}; the RMS errors of each filter are of its own.",
                     t=float(result.axes.t_s[-1]),
                     filters=join_names(texts),
                 )
                 intervals = sentences.intervals("tracks", "kept_share", rows)
                 yield sentences.Sentence(case_selection.after_swept_values(result, text), intervals)
         yield from super()._sentences(result, tables_by_name)
+
+    def _gains_text(self, result: "CaseResult", base: str, gains: str) -> str:
+        if "both" not in result.sums:
+            return super()._gains_text(result, base, gains)
+        return tr(
+            "Gain over {base} at {t:g} s, of the tracks that both keep: {filters}.",
+            base=base,
+            filters=gains,
+            t=float(result.axes.t_s[-1]),
+        )

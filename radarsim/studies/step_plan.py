@@ -54,7 +54,8 @@ def prepare_plan(study: "StepStudy", case: "Case") -> Plan:
     if any(member.tested for member in filters):
         sums = Layout(**sums.shapes, believed=(f, k, c), nees=(f, k, 2))
     if scene.false:
-        sums = Layout(**sums.shapes, estimates=(f, k, c), counts=(f, k, 1 + len(study.counted)))
+        counts = f, k, 1 + len(study.counted)
+        sums = Layout(**sums.shapes, estimates=(f, k, c), counts=counts, both=(f, k, c, 5))
     keys = np.stack([noise_key(case, stream) for stream in ("plots", "detections", "false plots")])
     draw = cached_kernel(
         steps.truth_kernel, scene.first, scene.following, scene.pairs, scene.plot_rows, scene.uniform_pairs

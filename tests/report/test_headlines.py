@@ -96,7 +96,7 @@ SENTENCES = {
         f"Range: σ is 18.3 %{MARK} lower than with range alone.",
         f"Radial velocity: σ is 18.3 %{MARK} lower than with range alone.",
         f"“range only”: σ of the radial velocity is 18.3 %{MARK} lower.",
-        f"Gain over r there: 18.3 %{MARK}.",
+        f"Gain over r at 78 s: 18.3 %{MARK}.",
     ),
     "ru": (
         f"Дальность: СКО на 18,3 %{MARK} меньше.",

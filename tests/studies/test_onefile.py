@@ -172,7 +172,7 @@ def test_question_answer_and_figures(made):
     answer = answer_texts(study, results, every)
     slow, quick = (f"{value:.4g} m" for value in results[1].axes.exact_sigma[:, -1, 0])
     assert answer[2] == f"σ_w = 2 m, RMS error of the position after 78 s: “slow” {slow} and “quick” {quick}."
-    assert answer[3].startswith("σ_w = 2 m, gain over “slow” there: “quick” ")
+    assert answer[3].startswith("σ_w = 2 m, gain over “slow” at 78 s: “quick” ")
     other = [replace(one, name=name, swept_values=()) for one, name in zip(results, ("walk", "stroll"), strict=True)]
     tables_of = {name: table.replace({one.name: own.name for one, own in zip(results, other, strict=True)})
                  for name, table in every.items()}  # fmt: skip

@@ -115,11 +115,6 @@ class RangeDoppler(Study):
 
         return tables.curves(results)
 
-    def gains(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
-        from radarsim.studies.range_doppler import tables
-
-        return tables.gains(results)
-
     def inputs(self, results: "Sequence[CaseResult]") -> "pd.DataFrame":
         from radarsim.studies.range_doppler import tables
 

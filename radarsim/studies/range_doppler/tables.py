@@ -37,32 +37,6 @@ def has_individual_gains(result: Result) -> bool:
     return "both" in result.sums
 
 
-def gains(results: Sequence[Result]) -> "pd.DataFrame":
-    """Paired gains over the realisations in which both the filter and the baseline have an estimate."""
-    parts = (
-        _individual_gains(result) if has_individual_gains(result) else {**common.gains([result])} for result in results
-    )
-    return common.join_columns(parts, common.GAINS)
-
-
-def _individual_gains(result: Result) -> common.Columns:
-    axes, b = result.axes, result.axes.baseline
-    both = np.asarray(result.sums["both"])
-    mask = axes.available[b] & (both[..., 0] > 0)
-    mask[b] = False
-    indices = f, k, c = common.row_index(result, mask)
-    n, square, fourth, baseline_square, baseline_fourth = (both[indices][:, j] for j in range(5))
-    paired = np.asarray(result.sums["paired"])[indices]
-    gain = statistics.gain(square, fourth, baseline_square, baseline_fourth, paired, n)
-    return {
-        **common.label_columns(
-            result, f, k, baseline=np.full(f.size, axes.filters[b], dtype=object), **common.component_columns(result, c)
-        ),
-        "gain_percent|gain": gain,
-        "exact_percent": axes.exact_gains[indices],
-    }
-
-
 STEADY = (
     *(
         "case",
@@ -255,7 +229,7 @@ def _gains_where_missed(results: Sequence[Result]) -> "pd.DataFrame | None":
     """As everywhere; where plots may be missed, of realisations in which both filters have an estimate."""
     if not any(has_individual_gains(result) for result in results):
         return None
-    return _with_notes(gains(results), common.join_columns(map(_case_curves, results)), results)
+    return _with_notes(common.gains(results), common.join_columns(map(_case_curves, results)), results)
 
 
 tables = table.make

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
+from radarsim.report import tables
 from radarsim.studies.registry import study
 from tests.studies.plane import naive
 from tests.studies.plane.cases import STRAIGHT, case_of, member, plots_of, run_of
@@ -65,6 +67,25 @@ def test_tracks_among_false_plots_are_the_twins():
 @pytest.mark.parametrize("filters", MORE, ids=lambda filters: filters[0]["name"])
 def test_tracks_of_more_filters_are_the_twins(filters):
     compare(filters, 20)
+
+
+def test_gains_are_of_the_tracks_that_both_filters_keep():
+    dense = CLUTTER | {"false_plots_per_km2": 0.3}
+    case, n = (
+        case_of([member("converted", doppler=False), member("extended", association="pda")], STRAIGHT, 10, **dense),
+        40,
+    )
+    plan = study("plane").prepare(case)
+    single = [run_of(case, i) for i in range(n)]
+    e, kept = (np.array([sums[name] for sums in single]) for name in ("error", "estimates"))
+    both = kept * kept[:, :1]
+    assert (kept[:, 0] != kept[:, 1]).any(axis=0)[-1].all()
+    base_square, square = ((both[:, 1, -1] * e[:, f, -1, :, 0] ** 2).sum(0) for f in (0, 1))
+    sums = plan.layout.unpack(study("plane").simulate(plan, 0, n))
+    gains = tables.gains([CaseResult(case.name, case.study, case.spec, (), n, sums, plan.axes)])
+    last = gains[gains["k"] == 10]
+    expected = 100 * (1 - np.sqrt(square / base_square))
+    np.testing.assert_allclose(last["gain_percent"], expected, rtol=1e-9)
 
 
 def test_recorded_plots_do_not_say_which_is_the_targets():

@@ -241,7 +241,7 @@ def test_gain_is_of_those_that_have_both_estimates(seven):
     from types import SimpleNamespace
 
     from radarsim.engine.results import CaseResult
-    from radarsim.studies.range_doppler import tables
+    from radarsim.report import tables
     from radarsim.studies.range_doppler.filter_design import least_squares_start
 
     plan, _ = seven
