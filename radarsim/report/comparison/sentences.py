@@ -65,7 +65,7 @@ def percent_text(value: float) -> str:
     """A change in per cent with its sign; from four times on as a multiple."""
     if value >= MULTIPLE:
         return tr("{factor} times", factor=significant_digits(1 + value / 100, ".3g"))
-    return f"{signed(value, '.3g')} %"
+    return f"{signed(value, '#.3g' if value else '.3g')} %"
 
 
 def signed(value: float, form: str = ".3g") -> str:
