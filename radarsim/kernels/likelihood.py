@@ -67,12 +67,12 @@ def log_likelihood_of_tracks(
     soundness
 ):  # fmt: skip
     """`log_likelihood` of several tracks, whose rows follow each other: of track i lengths[i], which starts from x[i]
-    and P, and whose outliers follow their law from its row first[i] on."""
+    and P[i], and whose outliers follow their law from its row first[i] on."""
     b = 0
     for i in range(lengths.size):
         a, b = b, b + lengths[i]
         log_likelihood(
-            x[i], P.copy(), F[a:b], Q[a:b], H[a:b], z[a:b], variance[a:b], present[a:b], manoeuvre, outliers, first[i],
+            x[i], P[i], F[a:b], Q[a:b], H[a:b], z[a:b], variance[a:b], present[a:b], manoeuvre, outliers, first[i],
             hard_share, span, white, log_densities[a:b], soundness[a:b]
         )  # fmt: skip
 
@@ -222,13 +222,14 @@ def with_lasting_errors(x, P, with_errors, F, Q, H, variance, correlation):
     """The arguments x, P, F, Q and H of `log_likelihood`, white 0 and manoeuvre 1, for errors that last: after the d
     components of the state come m errors of the numbers, in their standard deviations.
 
-    x (…, d) and P (d, d) at the first row, there with_errors (d, m) their covariance with the errors; F, Q (n, d, d): Q
-    of the manoeuvre as it is; H (n, m, d), variance (n, m); correlation (n,): of errors with those of the row before.
-    """
+    x (…, d) and P (…, d, d) at the first row, there with_errors (d, m) their covariance with the errors; F, Q (n, d,
+    d): Q of the manoeuvre as it is; H (n, m, d), variance (n, m); correlation (n,): of errors with those of the row
+    before."""
     n, m, d = H.shape
     errors, eye = slice(d, d + m), np.eye(m)
     state = np.concatenate([x, np.zeros((*x.shape[:-1], m))], axis=-1)
-    wide = np.block([[P, with_errors], [with_errors.T, eye]])
+    wide = np.zeros((*P.shape[:-2], d + m, d + m))
+    wide[..., :d, :d], wide[..., :d, d:], wide[..., d:, :d], wide[..., d:, d:] = P, with_errors, with_errors.T, eye
     F_, Q_ = np.zeros((n, d + m, d + m)), np.zeros((n, d + m, d + m))
     F_[:, :d, :d], Q_[:, :d, :d] = F, Q
     F_[:, errors, errors] = correlation[:, None, None] * eye

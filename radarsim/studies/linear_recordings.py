@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED
 from radarsim.studies.gross_errors import data_span, soundness_by_column
 from radarsim.studies.linear_design import period
 from radarsim.studies.missed_scans import WHOLE_PERIODS, missed_scan_times
-from radarsim.studies.recording_interface import Track, usual_interval_s
+from radarsim.studies.recording_interface import Track, track_batches, usual_interval_s
 
 if TYPE_CHECKING:
     from radarsim.studies.linear import LinearStudy
@@ -170,15 +170,21 @@ class PlotLikelihood:
             for track in tracks
         ]
         self.span = data_span(self.given_tracks, self.model.columns)
-        self.plots = [
-            (np.diff(track["t_s"], prepend=track["t_s"][0]), self.model.numbers(track, len(track["t_s"])))
-            for track in tracks
-        ]
+        self.batches = [self._batch(batch) for batch in track_batches(tracks, lambda track: len(track["t_s"]))]
         self.usual_s = usual_interval_s(tracks)
 
-    def _track_scores(self, values: np.ndarray, law: ErrorLaw) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The log-densities (n, D) of the numbers of each track, and their probabilities to be no outliers."""
-        from radarsim.kernels.likelihood import log_likelihood, with_lasting_errors
+    def _batch(self, tracks: Sequence[Mapping[str, np.ndarray]]) -> "_Batch":
+        """Tracks for the kernel."""
+        lengths = np.array([len(track["t_s"]) for track in tracks])
+        intervals = [np.diff(track["t_s"], prepend=track["t_s"][0]) for track in tracks]
+        scans = [self.model.scan_numbers(-1, dt) for dt in intervals]
+        z = [self.model.numbers(track, len(track["t_s"])) for track in tracks]
+        return _Batch(lengths, np.concatenate(intervals), np.concatenate(scans), np.concatenate(z))
+
+    def _batch_scores(self, values: np.ndarray, law: ErrorLaw) -> list[tuple["_Batch", np.ndarray, np.ndarray]]:
+        """For each batch of tracks the log-densities (n, D) of its numbers, and their probabilities to be no
+        outliers."""
+        from radarsim.kernels.likelihood import log_likelihood_of_tracks, with_lasting_errors
 
         spec, correlation = self.spec, law.correlation
         outliers = law.outlier_rows(len(self.model.columns))
@@ -186,24 +192,25 @@ class PlotLikelihood:
             spec = _changed(spec, key.split("."), float(value))
         start = self.model.study.assumed_motion(spec, self.model.filter_keys)
         result = []
-        for dt, z in self.plots:
-            (F, Q), (H, R) = self.model.moves(dt, spec), self.model.rows(self.model.scan_numbers(-1, dt), spec)
-            x, P = np.array(start.mean, dtype=float), np.array(start.covariance, dtype=float)
+        for batch in self.batches:
+            count, z = len(batch.lengths), batch.z
+            (F, Q), (H, R) = self.model.moves(batch.intervals, spec), self.model.rows(batch.scans, spec)
+            x, P = (np.array([value] * count, dtype=float) for value in (start.mean, start.covariance))
             model, white, has_number = (x, P, F, Q, H), 1.0, np.isfinite(z)
             if correlation:
-                first = np.zeros((x.size, z.shape[1]))
-                model, white = with_lasting_errors(x, P, first, F, Q, H, R, correlation ** (dt / self.usual_s)), 0.0
+                first, shares_left = np.zeros((x.shape[1], z.shape[1])), correlation ** (batch.intervals / self.usual_s)
+                model, white = with_lasting_errors(x, P, first, F, Q, H, R, shares_left), 0.0
             score, soundness = np.empty((2, *z.shape))
             numbers = np.where(has_number, z, 0.0), R, has_number
-            errors = outliers, 0, law.manoeuvres, self.span, white
-            log_likelihood(*model, *numbers, 1.0, *errors, score, soundness)
-            result.append((score, soundness))
+            errors = outliers, np.zeros(count, dtype=np.int64), law.manoeuvres, self.span, white
+            log_likelihood_of_tracks(batch.lengths, *model, *numbers, 1.0, *errors, score, soundness)
+            result.append((batch, score, soundness))
         return result
 
     def _scores(self, values: np.ndarray, law: ErrorLaw) -> np.ndarray:
         """Sums over all tracks for each number of a plot."""
         total: np.ndarray = np.zeros(len(self.model.columns))
-        for score, _ in self._track_scores(values, law):
+        for _, score, _ in self._batch_scores(values, law):
             total += score.sum(axis=0)
         return total
 
@@ -213,13 +220,27 @@ class PlotLikelihood:
 
     def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier."""
-        scores = self._track_scores(values, law)
-        judged = [(i, np.arange(len(soundness)), soundness) for i, (_, soundness) in enumerate(scores)]
+        parts = [
+            part
+            for batch, _, soundness in self._batch_scores(values, law)
+            for part in np.split(soundness, np.cumsum(batch.lengths)[:-1])
+        ]
+        judged = [(i, np.arange(len(part)), part) for i, part in enumerate(parts)]
         return soundness_by_column(self.model.columns, self.given_tracks, self.given_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The sums of each number of a plot."""
         return dict(zip(self.model.columns, self._scores(values, STATED_ERRORS).tolist(), strict=True))
+
+
+class _Batch(NamedTuple):
+    """Tracks for the kernel, one after the other: the numbers of their rows; of each row the time since the row before,
+    the number of its scan, and what it measured (n, D)."""
+
+    lengths: np.ndarray
+    intervals: np.ndarray
+    scans: np.ndarray
+    z: np.ndarray
 
 
 def _changed(model: Any, path: Sequence[str], value: float) -> Any:

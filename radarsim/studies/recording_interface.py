@@ -1,10 +1,10 @@
 """What a study offers for simulated and recorded plots: drawing them, its filters over them, their likelihood."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import RLock
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from radarsim.errors import ConfigError
 from radarsim.studies.error_law import STATED_ERRORS, ErrorLaw
@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     import numpy as np
 
     from radarsim.config.experiment import Case
+
+
+Item = TypeVar("Item")
+BATCH_ROWS = 20_000  # of tracks that a kernel takes together
 
 
 @dataclass(frozen=True)
@@ -110,6 +114,20 @@ class Likelihood(Protocol):
 
     def by_number(self, values: "np.ndarray") -> Mapping[str, float]:
         """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
+
+
+def track_batches(tracks: "Iterable[Item]", row_count: "Callable[[Item], int]") -> "Iterator[list[Item]]":
+    """Tracks in batches of about BATCH_ROWS rows: one call of a kernel for each of many short tracks would take most of
+    the time, and arrays of all rows too much memory."""
+    batch, rows = list["Item"](), 0
+    for track in tracks:
+        batch.append(track)
+        rows += row_count(track)
+        if rows >= BATCH_ROWS:
+            yield batch
+            batch, rows = [], 0
+    if batch:
+        yield batch
 
 
 def usual_interval_s(tracks: "Sequence[Mapping[str, np.ndarray]]") -> float:

@@ -13,11 +13,11 @@ from radarsim.physics.motion import manoeuvre_covariance, transition
 from radarsim.recordings import simulate_plots
 from radarsim.recordings.fit import advice, fit
 from radarsim.recordings.study_part import recording_interface
+from radarsim.studies import recording_interface as recording_interface_module
 from radarsim.studies.ambiguous_doppler import plot_likelihood as ambiguous_likelihood
 from radarsim.studies.ambiguous_doppler.kernels import recorded_rows
 from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.multimodel.model_bank import start_weights
-from radarsim.studies.range_doppler import plot_likelihood
 from radarsim.studies.sonar import conversion
 from tests.recordings.error_laws import error_laws, outlier_law
 from tests.tolerances import Z, assert_rounded, polynomial_condition, rounding, scaled_condition
@@ -148,21 +148,23 @@ def test_errors_that_last_have_the_density_of_their_correlations():
     assert_rounded(score.sum(), expected, density_size(off, spread), operations=len(off))
 
 
+@pytest.mark.parametrize("config", ["rls2", "sonar_smoothing"])
 @pytest.mark.parametrize("law", [ErrorLaw(), ErrorLaw(outliers=0.02), ErrorLaw(correlation=0.4)])
-def test_tracks_that_are_taken_together_are_those_taken_alone(law, monkeypatch):
-    case = loaded("rls2", "scans=30")
-    tracks = [recording("rls2", "scans=30", number=number) for number in range(3)]
+def test_tracks_that_are_taken_together_are_those_taken_alone(config, law, monkeypatch):
+    case = loaded(config, "scans=30")
+    tracks = [recording(config, "scans=30", number=number) for number in range(3)]
     tracks[1] = {name: column[:12] for name, column in tracks[1].items()}
     tracks[2]["range_m"][:2] = np.nan
-    together, values = likelihood(case, None, *tracks), np.array([200.0, 12.0, 1e-4])
+    together = likelihood(case, None, *tracks)
+    values = together.stated * np.array([0.8, 0.8, 0.1])
     alone = [likelihood(case, None, track) for track in tracks]
     for part in alone:
-        part.span = together.span
-    assert_rounded(together(values, law), sum(part(values, law) for part in alone), together.rows, operations=9)
+        part.span, part.usual_s = together.span, together.usual_s
+    assert_rounded(together(values, law), sum(part(values, law) for part in alone), together.rows, operations=20)
     for soundness, part in zip(together.soundness(values, law), alone, strict=True):
         for name, column in part.soundness(values, law)[0].items():
-            np.testing.assert_array_equal(soundness[name], column)
-    monkeypatch.setattr(plot_likelihood, "BATCH_ROWS", 20)
+            np.testing.assert_allclose(soundness[name], column, rtol=1e-12)
+    monkeypatch.setattr(recording_interface_module, "BATCH_ROWS", 20)
     assert likelihood(case, None, *tracks)(values, law) == pytest.approx(together(values, law), rel=1e-12)
 
 

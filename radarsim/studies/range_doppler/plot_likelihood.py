@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +17,8 @@ from radarsim.studies.range_doppler.config import Filter, Keys
 from radarsim.studies.range_doppler.filter_design import noise_by_time, observation
 from radarsim.studies.range_doppler.kernels import recorded_rows
 from radarsim.studies.range_doppler.tracking import MEASURED, START_RANGES, configured_variances
-from radarsim.studies.recording_interface import usual_interval_s
+from radarsim.studies.recording_interface import track_batches, usual_interval_s
 
-BATCH_ROWS = 20_000  # of tracks that the kernel takes together
 MIN_MANOEUVRE = 1e-6  # of the stated manoeuvre variance, which counts as none
 WIDE_VELOCITY_MPS, WIDE_ACCELERATION_MPS2 = 3e4, 3e3  # standard deviations before the first plot: nothing is known
 
@@ -57,7 +56,8 @@ class PlotLikelihood:
         self.given_tracks = list(tracks)
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, START_RANGES) for columns in tracks]
         problems = (self._problem(number, columns) for number, columns in enumerate(self.cleaned_tracks))
-        self.batches = [_joined(batch) for batch in _batches(problem for problem in problems if problem is not None)]
+        whole_problems = (problem for problem in problems if problem is not None)
+        self.batches = [_joined(batch) for batch in track_batches(whole_problems, lambda problem: len(problem.z))]
 
     def _problem(self, track: int, columns: Mapping[str, np.ndarray]) -> "_Problem | None":
         """A track from its first range on; None where it has none."""
@@ -85,8 +85,8 @@ class PlotLikelihood:
         """The log-densities (n, m) of the numbers of some tracks, and their probabilities to be no outliers."""
         outliers, correlation = law.outlier_rows(self.observes), law.correlation
         variances, manoeuvre = np.square(values[: self.observes]), float(values[self.observes])
-        P = np.diag([variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
-        P[0, 0] *= start_factor(outliers[0])
+        start = np.diag([start_factor(outliers[0]) * variances[0], WIDE_VELOCITY_MPS**2, WIDE_ACCELERATION_MPS2**2])
+        P = np.tile(start, (len(batch.lengths), 1, 1))
         score, soundness, spread = (*np.empty((2, *batch.z.shape)), np.tile(variances, (len(batch.z), 1)))
         offset = np.zeros(self.observes)
         offset[1:] = law.bias * values[1 : self.observes]
@@ -143,20 +143,6 @@ class _Problem(NamedTuple):
     start: np.ndarray  #: (tracks, 3) the states at the first rows
     first_scored_rows: np.ndarray  #: (tracks,) of each, the row from which the state is known
     lengths: np.ndarray  #: (tracks,) the numbers of their rows
-
-
-def _batches(problems: Iterable[_Problem]) -> Iterator[list[_Problem]]:
-    """Tracks in batches of about BATCH_ROWS rows: one call for each of many short tracks would take most of the time,
-    and arrays of all rows too much memory."""
-    batch, rows = list[_Problem](), 0
-    for problem in problems:
-        batch.append(problem)
-        rows += len(problem.z)
-        if rows >= BATCH_ROWS:
-            yield batch
-            batch, rows = [], 0
-    if batch:
-        yield batch
 
 
 def _joined(problems: list[_Problem]) -> _Problem:

@@ -1,5 +1,6 @@
 """The likelihood of recorded sonar plots under a filter."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -8,11 +9,11 @@ import numpy as np
 from radarsim.config.experiment import Case
 from radarsim.kernels.gap_noise import manoeuvre_noise
 from radarsim.kernels.kalman_algebra import unpack
-from radarsim.kernels.likelihood import log_likelihood, start_factor, with_lasting_errors
+from radarsim.kernels.likelihood import log_likelihood_of_tracks, start_factor, with_lasting_errors
 from radarsim.physics.motion import transition
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
-from radarsim.studies.recording_interface import ALL_KINDS, usual_interval_s
+from radarsim.studies.recording_interface import ALL_KINDS, track_batches, usual_interval_s
 from radarsim.studies.sonar import conversion
 from radarsim.studies.sonar.scene import lateral_scale, third_coordinate
 from radarsim.studies.sonar.tracking import BEARING, RANGE, THIRD_COLUMN_AND_KEY, unwrap_bearings
@@ -62,9 +63,10 @@ class PlotLikelihood:
         smooth_tracks = [{**track, "bearing_rad": unwrap_bearings(track["bearing_rad"])} for track in tracks]
         self.cleaned_tracks = [without_gross_starts(track, self.columns, STARTING_PLOTS) for track in smooth_tracks]
         problems = (self._problem(number, track, scale) for number, track in enumerate(self.cleaned_tracks))
-        self.problems = [problem for problem in problems if problem is not None]
+        whole_problems = (problem for problem in problems if problem is not None)
+        self.batches = [_joined(batch) for batch in track_batches(whole_problems, lambda problem: len(problem.t))]
 
-    def _problem(self, track: int, columns: Mapping[str, np.ndarray], scale: np.ndarray) -> "_TrackProblem | None":
+    def _problem(self, track: int, columns: Mapping[str, np.ndarray], scale: np.ndarray) -> "_TracksProblem | None":
         """A track from its first complete plot on; None if it has none."""
         z, C, size = np.stack([columns[name] for name in self.columns]), self.coordinates, self.size
         is_whole = np.isfinite(z).all(axis=0)
@@ -88,12 +90,13 @@ class PlotLikelihood:
         is_used[0] = False  # it starts the track
         second_whole = int(is_whole[1:].argmax()) + 1 if is_whole[1:].any() else 0
         z, t = np.where(np.isfinite(z), z, 0.0), t - t[0]
-        problem = _TrackProblem(track, rows, F, Q, z, is_used, t, rates, second_whole, first_scored_row)
+        numbers = np.array([len(t)]), np.array([second_whole]), np.array([first_scored_row])
+        problem = _TracksProblem([(track, rows)], F, Q, z, is_used, t, rates[None], *numbers)
         _, directions, variance = self._numbers(problem, self.stated[:C])  # the stated errors, whatever is tried
         position_sigma = np.sqrt(np.diag(directions[0].T @ np.diag(variance[0]) @ directions[0]))
-        return problem._replace(rates=np.outer(rates, position_sigma))
+        return problem._replace(rates=np.outer(rates, position_sigma)[None])
 
-    def _numbers(self, problem: "_TrackProblem", sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _numbers(self, problem: "_TracksProblem", sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions (n, C) in the frame of the filters, independent directions, and variances (n, C) along these.
 
         The directions (n, C, C) are rows."""
@@ -111,10 +114,28 @@ class PlotLikelihood:
             variance[:, :2], directions[:, :2, :2] = np.maximum(values, 0.0), np.swapaxes(vectors, 1, 2)
         return positions, directions, variance
 
-    def _track_score(
-        self, problem: "_TrackProblem", values: np.ndarray, law: ErrorLaw
+    def _start(
+        self, problem: "_TracksProblem", sigma: np.ndarray, outliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The log-densities (n, C) of a track's numbers, and their probabilities to be no outliers."""
+        """The states (T, d) at the first rows of tracks, and their covariances (T, d, d)."""
+        C, size, firsts = self.coordinates, self.size, problem.first_rows
+        positions, directions, variance = self._numbers(problem, sigma)
+        x, P = np.zeros((len(firsts), C * size)), np.zeros((len(firsts), C * size, C * size))
+        x[:, ::size] = positions[firsts]
+        has_rate = problem.second_whole > 0
+        seconds = (firsts + problem.second_whole)[has_rate]
+        x[has_rate, 1::size] = (positions[seconds] - positions[firsts[has_rate]]) / problem.t[seconds, None]
+        factors = np.sqrt([start_factor(row) for row in outliers])
+        start = np.einsum("tij,ti,tik->tjk", directions[firsts], variance[firsts], directions[firsts])
+        P[:, ::size, ::size] = start * np.outer(factors, factors)
+        for i in range(1, size):
+            P[:, np.arange(C) * size + i, np.arange(C) * size + i] = problem.rates[:, i - 1] ** 2
+        return x, P
+
+    def _tracks_score(
+        self, problem: "_TracksProblem", values: np.ndarray, law: ErrorLaw
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The log-densities (n, C) of the numbers of some tracks, and their probabilities to be no outliers."""
         sigma, C, size = values[: self.coordinates], self.coordinates, self.size
         outliers, correlation = law.outlier_rows(C), law.correlation
         manoeuvre = float(values[C]) if len(values) > C else 0.0
@@ -122,34 +143,27 @@ class PlotLikelihood:
         H = np.zeros((*directions.shape[:2], C * size))
         H[:, :, ::size] = directions
         z = np.einsum("nij,nj->ni", directions, positions)
-        x, P = np.zeros(C * size), np.zeros((C * size, C * size))
-        x[::size] = positions[0]
-        if problem.second_whole:
-            x[1::size] = (positions[problem.second_whole] - positions[0]) / problem.t[problem.second_whole]
-        start = directions[0].T @ np.diag(variance[0]) @ directions[0]
-        factors = np.sqrt([start_factor(row) for row in outliers])
-        P[::size, ::size] = start * np.outer(factors, factors)
-        for i, rate in enumerate(problem.rates, start=1):
-            P[np.arange(C) * size + i, np.arange(C) * size + i] = rate**2
+        x, P = self._start(problem, sigma, outliers)
         model, scale, white = (x, P, problem.F, problem.Q, H), manoeuvre, 1.0
         if correlation:
             error_loading = np.zeros((C * size, C))
             coordinates = np.arange(C)
             error_loading[coordinates * size, coordinates] = -sigma
-            lasting = correlation ** (np.diff(problem.t, prepend=0.0) / self.usual_s)
+            intervals = np.diff(problem.t, prepend=0.0)
+            intervals[problem.first_rows] = 0.0
+            lasting = correlation ** (intervals / self.usual_s)
             model = with_lasting_errors(x, P, error_loading, problem.F, manoeuvre * problem.Q, H, variance, lasting)
             scale, white = 1.0, 0.0
         score, soundness = np.empty((2, *z.shape))
-        errors = outliers, problem.first_scored_row, law.manoeuvres, self.span, white
-        log_likelihood(*model, z, variance, problem.is_used, scale, *errors, score, soundness)
+        errors = outliers, problem.first_scored_rows, law.manoeuvres, self.span, white
+        log_likelihood_of_tracks(
+            problem.lengths, *model, z, variance, problem.is_used, scale, *errors, score, soundness
+        )
         return score, soundness
 
     def _score(self, values: np.ndarray, law: ErrorLaw) -> float:
         """The sum over all tracks; the first plots, which find the state, are left out."""
-        return sum(
-            float(self._track_score(problem, values, law)[0][problem.first_scored_row :].sum())
-            for problem in self.problems
-        )
+        return sum(float(self._tracks_score(batch, values, law)[0][batch.is_scored].sum()) for batch in self.batches)
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The logarithm of the likelihood; a bias is not part of the model."""
@@ -158,11 +172,12 @@ class PlotLikelihood:
     def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
         """The probability of each number that it is no outlier; in x and y of range and bearing together."""
         judged = []
-        for problem in self.problems:
-            soundness = self._track_score(problem, values, law)[1]
+        for batch in self.batches:
+            soundness = self._tracks_score(batch, values, law)[1]
             if self.spec.frame != "polar":
                 soundness[:, :2] = soundness[:, :2].min(axis=1, keepdims=True)
-            judged.append((problem.track, problem.rows, soundness))
+            parts = np.split(soundness, batch.first_rows[1:])
+            judged += [(*track_and_rows, part) for track_and_rows, part in zip(batch.tracks, parts, strict=True)]
         return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
@@ -170,19 +185,38 @@ class PlotLikelihood:
         return {"plot": self._score(values, STATED_ERRORS)}
 
 
-class _TrackProblem(NamedTuple):
-    """A recorded track as the kernel needs it, from its first complete plot on."""
+class _TracksProblem(NamedTuple):
+    """Recorded tracks as the kernel needs them, one after the other, each from its first complete plot on."""
 
-    track: int  #: its number
-    rows: np.ndarray  #: (n,) of the track
+    tracks: list[tuple[int, np.ndarray]]  #: of each its number, and which of its rows these are
     F: np.ndarray  #: (n, d, d) transitions
     Q: np.ndarray  #: (n, d, d) process noise of unit variance
     z: np.ndarray  #: (C, n) values as measured
     is_used: np.ndarray  #: (n, C) which values update the state
-    t: np.ndarray  #: (n,) from the first plot
-    rates: np.ndarray  #: (size - 1, C) σ of the rates of each order before the first plot
-    second_whole: int  #: row of the second complete plot, 0 if there is none
-    first_scored_row: int  #: row from which the state is known
+    t: np.ndarray  #: (n,) from the first plot of a track
+    rates: np.ndarray  #: (tracks, size - 1, C) σ of the rates of each order before the first plot
+    lengths: np.ndarray  #: (tracks,) the numbers of rows
+    second_whole: np.ndarray  #: (tracks,) row of the second complete plot in a track, 0 if there is none
+    first_scored_rows: np.ndarray  #: (tracks,) row in a track from which the state is known
+
+    @property
+    def first_rows(self) -> np.ndarray:
+        """The first row (tracks,) of each track."""
+        return np.cumsum(self.lengths) - self.lengths
+
+    @property
+    def is_scored(self) -> np.ndarray:
+        """Whether the state is known before a row (n,)."""
+        return np.arange(len(self.t)) >= np.repeat(self.first_rows + self.first_scored_rows, self.lengths)
+
+
+def _joined(problems: Sequence[_TracksProblem]) -> _TracksProblem:
+    """The tracks of several problems as one."""
+    first, F, Q, z, *arrays = zip(*problems, strict=True)
+    return _TracksProblem(
+        list(itertools.chain(*first)), np.concatenate(F), np.concatenate(Q), np.concatenate(z, axis=1),
+        *map(np.concatenate, arrays),
+    )  # fmt: skip
 
 
 def likelihood(
