@@ -87,7 +87,7 @@ def test_figures_show_the_paper_and_the_locks(made):
     assert made.figures == ("locks", "accuracy", "residuals")
     panels = made._figures_by_name["residuals"].panels
     assert len(panels) == 6
-    assert [mark.label for mark in panels[1].marks] == ["median", "3σ", "one burst"]
+    assert [mark.label for mark in panels[1].marks] == ["median, 5 to 95 % of bursts", "3σ", "one burst"]
 
 
 def test_the_burst_that_is_drawn_is_the_first_of_the_run():

@@ -161,7 +161,7 @@ def test_what_does_not_change_over_a_sweep_is_said_and_rare_ends_are_drawn():
     least, most = (
         wording.number(float(end), 3) for end in (table["time_to_confirm_s"].min(), table["time_to_confirm_s"].max())
     )
-    assert f"does not change over the sweep: time to confirmation ({least}–{most} s)" in figure.caption
+    assert f"Constant over the sweep: time to confirmation ({least}–{most} s)" in figure.caption
     rare = result.tables["rare"]
     ended = rare[rare["sought"] & (rare["filter"] == "PDA")]
     line = next(mark for mark in figure.panels[0].marks if mark.label == "PDA")
