@@ -27,6 +27,7 @@ def test_logarithmic_ticks_are_decades_and_few_multiples():
     assert len(Scale(True, 1e-12, 1e12, 0, 100).ticks(5)) <= 8
     raised = [text for _, text in Scale(True, 2e-5, 8, 0, 100).ticks(4)]
     assert raised == ["2·10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "1", "5"]  # one notation
+    assert next(text for _, text in Scale(True, 12, 3e6, 0, 100).ticks(4)) == "20"
     written = [text for _, text in Scale(True, 4e-4, 300, 0, 100).ticks(4)]
     assert written == ["0.001", "0.01", "0.1", "1", "10", "100"]  # 0.0005 and 200 would stand too near
     inside = [v for v, _ in Scale(True, 20, 90, 0, 100).ticks(5)]

@@ -62,7 +62,7 @@ def steps(low: float, high: float, count: int) -> list[float]:
 def decades(low: float, high: float, count: int) -> list[tuple[float, str]]:
     """Powers of ten, and 2 and 5 times these if that gives not many more than `count`, else only at ends far from them.
 
-    All are written out where each is short, else all raised except 1 to 10."""
+    All are written out where each is short, else all raised except 1 to 50."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     stride = max(1, -(-(last - first + 1) // MAX_DECADES))
     exponents = range(first, last + 1, stride)
@@ -79,7 +79,7 @@ def decades(low: float, high: float, count: int) -> list[tuple[float, str]]:
 
 def _decade_text(multiple: int, exponent: int, short: bool) -> str:
     """The number of a tick, a multiple of a power of ten."""
-    if short or exponent == 0 or (multiple, exponent) == (1, 1):
+    if short or exponent in (0, 1):
         return tick_text(multiple * 10.0**exponent)
     return power_of_ten(exponent) if multiple == 1 else f"{multiple}·{power_of_ten(exponent)}"
 
