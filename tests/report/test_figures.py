@@ -1,6 +1,7 @@
 """Figures: what is drawn is what is described, in the same bytes each time, and no user's name breaks them."""
 
 import gc
+import warnings
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -66,6 +67,10 @@ def test_whiskers_of_a_lone_point_are_off_the_axis():
     lone = Line(np.arange(4.0), y, "a", lo=y - 1, hi=y + 1)
     ends = [drawn(one(line)).get_xlim()[0] for line in (lone, replace(lone, y=y[[0, 2, 2, 2]]))]
     assert ends[0] < -0.15 < ends[1] < 0
+    nowhere = np.full(4, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        drawn(one(lone, Line(nowhere, nowhere, "b")))
 
 
 def test_a_title_is_not_broken_before_a_unit():

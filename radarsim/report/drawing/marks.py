@@ -84,10 +84,10 @@ def _draw_mark(axes: Axes, mark: Mark, panel: Panel, map_colours: MapColours) ->
 
 def _side_margin(panel: Panel) -> float:
     """The share of an axis of x beside its marks; more where the whiskers of a lone point would lie upon the axis."""
-    lines = [mark for mark in panel.marks if isinstance(mark, Line) and len(mark.x)]
-    ends = [end for line in lines for end in (np.nanmin(line.x), np.nanmax(line.x))]
-    outer = {min(ends, default=0.0), max(ends, default=0.0)}
-    has_whiskers = any(line.lo is not None and line.x[i] in outer for line in lines for i in lone_points(line))
+    lines = [mark for mark in panel.marks if isinstance(mark, Line)]
+    x = [float(x) for line in lines for x in line.x if np.isfinite(x)]
+    ends = (min(x), max(x)) if x else ()
+    has_whiskers = any(line.lo is not None and line.x[i] in ends for line in lines for i in lone_points(line))
     return WHISKER_MARGIN if has_whiskers else MARGIN
 
 
