@@ -23,6 +23,7 @@ MAX_PLAIN_DIGITS = 6  # digits before the point that are still written out
 MAX_SHARE_DIGITS = 12  # digits of a share near one
 MIN_PLAIN_EXPONENT = -3  # of ten, from which a value with its interval is still written out
 MAX_MORE_DECIMALS = 3  # of a value with its interval, where fewer do not tell them apart
+MIN_SHOWN_WIDTH = 1e-4  # of the power of ten below a value: a narrower interval is the rounding of numbers
 NEARLY_ONE = 1e-3  # under one, from which more digits are written
 
 
@@ -88,8 +89,11 @@ def _aligned(numbers: tuple[float, ...], form: str) -> list[str]:
         mantissa = f"{flags.replace(',', '')}.{int(digits) - 1}e"
         return [format(number, mantissa if math.isfinite(number) and number else "g") for number in numbers]
     decimals = int(digits) if kind == "f" else int(digits) - 1 - exponent
-    if kind == "g" and 0 < numbers[2] - numbers[1] < math.inf:  # one digit of the interval's width at least
-        width_decimals = -math.floor(math.log10(numbers[2] - numbers[1]))
+    width = numbers[2] - numbers[1]
+    if (
+        kind == "g" and MIN_SHOWN_WIDTH * 10.0**exponent < width < math.inf
+    ):  # one digit of the interval's width at least
+        width_decimals = -math.floor(math.log10(width))
         decimals = max(decimals, min(width_decimals, decimals + MAX_MORE_DECIMALS))
     if decimals < 0:
         numbers, decimals = tuple(round(n, decimals) if math.isfinite(n) else n for n in numbers), 0
@@ -101,12 +105,10 @@ def _aligned(numbers: tuple[float, ...], form: str) -> list[str]:
 
 
 def _are_blurred(numbers: Sequence[float], texts: Sequence[str]) -> bool:
-    """Whether rounding makes the ends equal, an end nought, or a number a little under one one."""
+    """Whether rounding makes an end nought, or a number a little under one one."""
     read = [float(text.replace(",", "")) for text in texts]
-    return (
-        (read[1] == read[2] and numbers[1] != numbers[2])
-        or any(number and not shown for number, shown in zip(numbers[1:], read[1:], strict=True))
-        or any(0 < 1 - number < NEARLY_ONE and shown == 1 for number, shown in zip(numbers, read, strict=True))
+    return any(number and not shown for number, shown in zip(numbers[1:], read[1:], strict=True)) or any(
+        0 < 1 - number < NEARLY_ONE and shown == 1 for number, shown in zip(numbers, read, strict=True)
     )
 
 
