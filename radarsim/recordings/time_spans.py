@@ -51,7 +51,8 @@ def meeting_text(plots: TimeSpan, positions: TimeSpan) -> str:
         if _overlap(plots, positions, sign * ROLLOVER_S):
             late_file = "positions" if sign > 0 else "plots"
             return f"{text}: they meet if the {late_file} are 1024 weeks later (a receiver that missed a rollover)"
-    for zero, offset_s in CLOCK_ZEROS.items():
+    are_dated = plots.has_clock and positions.has_clock and min(plots.first_s, positions.first_s) >= MIN_DATED_S
+    for zero, offset_s in CLOCK_ZEROS.items() if are_dated else ():
         for shift_s, late_file in ((-offset_s, "positions"), (offset_s, "plots")):
             if _overlap(plots, positions, shift_s):
                 return f"{text}: they meet if the times of the {late_file} count from {zero}"
