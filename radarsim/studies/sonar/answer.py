@@ -20,6 +20,7 @@ from radarsim.report import (
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
 from radarsim.studies.counted_scans import CountedScans
+from radarsim.studies.sonar import missed_plot_answer
 from radarsim.studies.sonar.axes import SonarAxes
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 from radarsim.studies.sonar.config import Keys
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 
 SIGMA_DECIMALS, EQUAL_RATIOS = 9, 1e-9  # to which filters are of equal accuracy
+PART = "smoothing"
+RANGE_AND_BEARING = "r", "b"
 MIN_OPTIMISM = 1.05  # true over believed σ, by the interval, from which a filter is called optimistic
 
 
@@ -41,8 +44,7 @@ def question(specs: Sequence[Keys]) -> str:
         )
     if _has_correlated_errors(specs):
         return tr("What does it cost to ignore that the errors of neighbouring plots are correlated?")
-    misses_plots = any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs)
-    if misses_plots and not any(spec.sensor.further for spec in specs):
+    if _misses_plots(specs):
         return tr("What does a missed plot cost?")
     names = list(dict.fromkeys(f.name for spec in specs for f in spec.filters))
     return tr("How accurate are smoothed range and bearing ({filters})?", filters=list_filters(names))
@@ -52,21 +54,39 @@ def _has_correlated_errors(specs: Sequence[Keys]) -> bool:
     return any(coordinate_correlation(spec.sensor.error_correlation, c) for spec in specs for c in range(3))
 
 
+def _misses_plots(specs: Sequence[Keys]) -> bool:
+    misses_plots = any(spec.sensor.detection_probability < 1 or spec.sensor.missed_scans for spec in specs)
+    return misses_plots and not any(spec.sensor.further for spec in specs)
+
+
+def _asks_for_accuracy(specs: Sequence[Keys]) -> bool:
+    """Whether nothing is asked but how accurate smoothed range and bearing are."""
+    is_plain = all(spec.frame == "polar" and spec.parts == (PART,) for spec in specs)
+    return is_plain and not _has_correlated_errors(specs) and not _misses_plots(specs)
+
+
 def answer(
     results: Sequence[CaseResult[SonarAxes]],
     tables_by_name: "Mapping[str, pd.DataFrame]",
     scans: Mapping[str, CountedScans],
 ) -> list[Sentence]:
-    """Sentences with 95 % intervals: σ of the first coordinate at the end, and the most optimistic filter at the scans
-    that count, which are given by case.
+    """Sentences with 95 % intervals: σ of the first coordinate at the end, of the bearing too where that is asked, and
+    the most optimistic filter at the scans that count, which are given by case.
 
-    First what the question is about: the bias of the conversion, or what correlated errors do to a filter's own σ."""
+    First what the question is about: the bias of the conversion, what correlated errors do to a filter's own σ, or what
+    missed plots cost."""
+    specs = [result.spec for result in results]
     reported, remark = case_selection.select_reported(results)
-    sigma = [_final_sigma(result, tables_by_name) for result in reported]
+    sigma = [
+        _final_sigma(result, tables_by_name, component)
+        for result in reported
+        for component in (RANGE_AND_BEARING if _asks_for_accuracy(specs) else [result.axes.components[0][0]])
+    ]
     optimistic = _most_optimistic(results, tables_by_name, scans)
-    if _has_correlated_errors([result.spec for result in results]):
+    if _has_correlated_errors(specs):
         return [*optimistic, *sigma, *map(Sentence, remark)]
-    return [*_bias_of_conversion(results, tables_by_name), *sigma, *optimistic, *map(Sentence, remark)]
+    missed = missed_plot_answer.cost_sentences(results, reported, tables_by_name) if _misses_plots(specs) else []
+    return [*_bias_of_conversion(results, tables_by_name), *missed, *sigma, *optimistic, *map(Sentence, remark)]
 
 
 def _bias_of_conversion(
@@ -95,9 +115,10 @@ def _bias_of_conversion(
     return [Sentence(f"{text}.", sentences.intervals("conversion", "bias_m", worst))]
 
 
-def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd.DataFrame]") -> Sentence:
+def _final_sigma(
+    result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd.DataFrame]", component: str
+) -> Sentence:
     """The filters with the least and the largest σ at the end of a case, unless noise decides which they are."""
-    component = result.axes.components[0][0]
     rows = tables.select_rows(tables_by_name["curves"], case=result.name, component=component)
     final = rows[rows["k"] == rows["k"].max()]
     # By exact values where all are known, so that filters of equal accuracy are not ranked by their noise.
@@ -108,12 +129,14 @@ def _final_sigma(result: CaseResult[SonarAxes], tables_by_name: "Mapping[str, pd
     values = [
         compared_value.sigma_value(rows.iloc[0], tables_by_name).chosen_among(looks) for rows in (lowest, highest)
     ]
+    is_of_both = all(value.choice_remark() for value in values)
+    remarks = ["" if is_of_both else value.choice_remark() for value in values]
     fields = {
         "quantity": COMPONENTS_BY_NAME[component].words,
         "t_s": final["t_s"].iloc[0],
-        "chosen": compared_value.choice_remark(values),
-        "least": _filters_and_sigma(lowest, values[0]),
-        "most": _filters_and_sigma(highest, values[1]),
+        "chosen": values[0].choice_remark() if is_of_both else "",
+        "least": _filters_and_sigma(lowest, values[0]) + remarks[0],
+        "most": _filters_and_sigma(highest, values[1]) + remarks[1],
     }
     if order.nunique() == 1:
         text = tr("RMS error of the {quantity} after {t_s:g} s{chosen}: {least}.", **fields)

@@ -53,6 +53,26 @@ def test_filters_of_equal_accuracy_are_named_together(results):
     assert "least with “augmented” and “differenced”, " in second
 
 
+def test_the_answer_on_missed_plots_has_what_they_cost(results):
+    """At half of the plots against all; the scans without a plot miss it in both."""
+    first, note, *_ = results["sonar_missed"].answer
+    curves = results["sonar_missed"].curves.query("component == 'r'")
+    final = curves[curves["k"] == curves["k"].max()].pivot(
+        index="filter", columns="case", values=["sigma", "exact_sigma"]
+    )
+    ends = [f"sonar_missed sensor.detection_probability={p}" for p in ("0.5", "1")]
+    ratios = final["sigma"][ends[0]] / final["exact_sigma"][ends[1]]
+    assert first.startswith("P_D = 0.5, RMS error of the range after 95 s relative to that at P_D = 1 (95 % for all ")
+    assert f": {ratios.min():.2f} [" in first
+    assert f"] (“{ratios.idxmin()}”) to {ratios.max():.2f} [" in first
+    assert note == "Scans 8, 9, 10 are always missed, at P_D = 1 too."
+
+
+def test_the_answer_on_accuracy_has_range_and_bearing(results):
+    starts = [sentence.partition(" after ")[0] for sentence in results["sonar_smoothing"].answer[:2]]
+    assert starts == ["RMS error of the range", "RMS error of the bearing"]
+
+
 def test_the_answer_on_conversion_is_the_largest_bias_and_its_figure_has_several(results):
     table = results["sonar_conversion"].tables["conversion"]
     plain = table[table["frame"] == "cartesian"]

@@ -41,8 +41,12 @@ def answer(results: Sequence[CaseResult[ClutterAxes]], tables_by_name: "Mapping[
         )
         case = key_labels.without_markup(key_labels.swept_description(result))
         answer.append(clauses.with_text(f"{case}: {clauses.text}." if case else f"{clauses.text}."))
-        answer += _sentences_on_rare_events(sought)
-    return [*answer, *map(Sentence, remark)]
+        answer += [
+            sentence.with_text(case_selection.after_swept_values(result, sentence.text))
+            for sentence in _sentences_on_rare_events(sought)
+        ]
+    note = tr("Note: the target's track is a confirmed one near the target, whichever plots it uses.")
+    return [*answer, Sentence(note), *map(Sentence, remark)]
 
 
 def _sentences_on_rare_events(sought: "pd.DataFrame | None") -> list[Sentence]:
@@ -60,8 +64,8 @@ def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None", run_s:
         return Sentence(tr("{filter} confirms no track", filter=quote_name(row["filter"])))
     life = _life_clause(row, sought, run_s)
     text = tr(
-        "{filter} confirms {confirmed} of the tracks, after {time} on average, {life}, with {rate} false tracks per "
-        "hour",
+        "{filter} confirms the target's track in {confirmed} of realisations, after {time} on average, {life}, with "
+        "{rate} false tracks per hour",
         filter=quote_name(row["filter"]),
         confirmed=wording.share(
             *(100 * row[key] for key in ("confirmed_share", "confirmed_share_lo", "confirmed_share_hi"))
@@ -88,16 +92,16 @@ def _life_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None", run_s: fl
         if len(ended):
             rates = (100 * ended.iloc[0][key] for key in ("event_rate", "event_rate_lo", "event_rate_hi"))
             share = wording.estimate(rates, "%", ".2g")
-            text = tr("loses {share} of them by the last scan", share=share)
+            text = tr("loses {share} of these by the last scan", share=share)
             return Sentence(text, sentences.intervals("rare", "event_rate", ended.iloc[0]))
     if not row["ends_per_hour"]:
         return Sentence(tr("loses none"))
     fields = {"life": _estimate(row, "life_s", tr("s"))}
     is_extrapolated = row["life_s"] > run_s
     text = (
-        tr("keeps a track for {life} (extrapolated)", **fields)
+        tr("keeps it for {life} (extrapolated from {run_s:g} s)", run_s=run_s, **fields)
         if is_extrapolated
-        else tr("keeps a track for {life}", **fields)
+        else tr("keeps it for {life}", **fields)
     )
     return Sentence(text, _tracking_interval(row, "life_s"))
 

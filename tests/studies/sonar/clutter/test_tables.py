@@ -45,7 +45,9 @@ def estimate_text(row, column, unit=""):
 def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
     rows, run_s = result.tables["tracking"], result.cases[0].axes.t_s[-1]
     by_case = {}
-    for sentence in result.answer:
+    *on_cases, note = result.answer
+    assert note == "Note: the target's track is a confirmed one near the target, whichever plots it uses."
+    for sentence in on_cases:
         by_case.setdefault(sentence.partition(": ")[0], []).append(sentence)
     assert len(by_case) == rows["case"].nunique()
     for (subject, of_case), (_, case_rows) in zip(by_case.items(), rows.groupby("case", sort=False), strict=True):
@@ -53,9 +55,9 @@ def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
         sentence = " ".join(of_case)
         for row in case_rows.to_dict("records"):
             assert f"{quote_name(row['filter'])} confirms " in sentence
-            assert f", keeps a track for {estimate_text(row, 'life_s', 's')}" in sentence
+            assert f", keeps it for {estimate_text(row, 'life_s', 's')}" in sentence
             assert (
-                "] (extrapolated)"
+                f"] (extrapolated from {run_s:g} s)"
                 in sentence.partition(f"{quote_name(row['filter'])} confirms ")[2].partition("false tracks")[0]
             ) == (row["life_s"] > run_s)
             assert f" {estimate_text(row, 'false_tracks_per_hour')}" in sentence

@@ -8,7 +8,7 @@ from radarsim.api import result_content
 from radarsim.api.configs import load
 from radarsim.papers.sonar.manoeuvre import measures as measured
 from radarsim.papers.verdict_rule import REFUTED
-from radarsim.report import case_selection
+from radarsim.report import case_selection, wording
 from radarsim.report.drawing import canvas
 from radarsim.report.drawing.model import Reference
 from radarsim.studies.sonar import STUDY
@@ -180,12 +180,34 @@ def test_words(result, tables):
     assert STUDY.question(result.experiment).startswith("How soon and how surely is a manoeuvre detected")
     assert any("10 plots" in sentence for sentence in told)
     assert any(
-        sentence.startswith(
-            "RMS errors of quantities derived from the track over their σ from its covariance (“growing”, "
-        )
+        sentence.startswith("Ratio of the RMS error to that predicted by the track's covariance (“growing”, ")
         for sentence in told
     )
     assert all(sentence.endswith(".") for sentence in told)
+
+
+def test_the_answer_has_the_time_to_an_alarm_and_that_of_false_ones(result, tables):
+    """Against the rows that the figure `delay` draws."""
+    told = answer_texts(STUDY, result.cases, tables)
+    delays = tables["delays"]
+    rows = delays[(delays["component"] == "r") & np.isclose(delays["false_alarm_probability"], 0.01)]
+    strongest = rows[rows["case"] == result.cases[-1].name].groupby(["event", "filter"])
+    (before,) = [
+        sentence for sentence in told if sentence.startswith("False alarm within the 100 s before the manoeuvre")
+    ]
+    (during,) = [
+        sentence for sentence in told if sentence.startswith("a = 0.8 m/s², alarm by the end of the manoeuvre")
+    ]
+    for name in ("10 plots", "4 plots"):
+        alarms, false = (strongest.get_group((event, name)) for event in ("alarm", "false alarm"))
+        half_s = alarms.loc[alarms["probability"] >= 0.5, "delay_s"].iloc[0]
+        assert f"“{name}” in {share_text(alarms)} of realisations, in half of them within {half_s:g} s" in during
+        assert f"“{name}” in {share_text(false)} of realisations" in before
+
+
+def share_text(rows):
+    """The share at the last scan, as sentences write it."""
+    return wording.share(*(100 * rows.iloc[-1][f"probability{end}"] for end in ("", "_lo", "_hi")))
 
 
 def test_of_many_cases_the_ends_are_shown():
