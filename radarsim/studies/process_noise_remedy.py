@@ -114,8 +114,7 @@ def _sentence(study: Study, result: CaseResult[Any], index: int, groups: Sequenc
         trial = _trial(study, result.spec, index, best, count) if trials[best].least > MIN_GAIN else trials[best]
         if trial.least > MIN_GAIN:
             text = tr(
-                "{case}, {filter}: what helps (tried on {count} realisations; add to the command, with --out cured): "
-                "{settings}; {gains}.",
+                "{case}, {filter}: the options {settings} --out cured help: {gains} (tried on {count} realisations).",
                 settings=" ".join(f"--set {key}={_option_text(value)}" for key, value in best),
                 gains=_gains_text(trial),
                 **fields,
@@ -138,7 +137,7 @@ def _option_text(value: Any) -> str:
 
 
 def _gains_text(trial: Trial) -> str:
-    last = tr("then the gain is {gain} % at the last scan", gain=numeral(f"{trial.last:.0f}"))
+    last = tr("the gain is {gain} % at the last scan", gain=numeral(f"{trial.last:.0f}"))
     if math.isnan(trial.worst):
         return last
     return tr("{last}, {gain} % at worst from the manoeuvre on", last=last, gain=numeral(f"{trial.worst:.0f}"))

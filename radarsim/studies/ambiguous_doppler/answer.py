@@ -355,7 +355,7 @@ def _excess_clause(final: "pd.Series[Any]", looks: int) -> Sentence:
     else:
         text = tr(
             "the RMS velocity error differs by {above} from that of unfolded velocity at scan {k}, the last{chosen}: "
-            "perhaps within {percent:g} %",
+            "undecided whether within {percent:g} %",
             above=above.text("%", "+.3g"),
             percent=AS_GOOD_PERCENT,
             **fields,

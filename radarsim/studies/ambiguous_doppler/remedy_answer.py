@@ -70,8 +70,8 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
         return [
             Sentence(
                 tr(
-                    "{case}, {filter}: what helps (tried on {count} realisations; add to the command, with --out "
-                    "cured): {settings}; {gains}.",
+                    "{case}, {filter}: the options {settings} --out cured help: {gains} (tried on {count} "
+                    "realisations).",
                     settings=settings,
                     gains=_trial_text(trial),
                     **fields,
@@ -85,9 +85,9 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
 def _trial_text(trial: Trial) -> str:
     share = numeral(f"{100 * trial.share:.2g}")
     if math.isnan(trial.gain):
-        return tr("then {share} % are lost", share=share)
+        return tr("{share} % are lost", share=share)
     gain = numeral(f"{trial.gain:.0f}")
-    return tr("then {share} % are lost, the gain over range alone is {gain} % in range", share=share, gain=gain)
+    return tr("{share} % are lost, the gain over range alone is {gain} % in range", share=share, gain=gain)
 
 
 def is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:
