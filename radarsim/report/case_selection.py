@@ -30,11 +30,21 @@ def after_swept_values(result: CaseResult, sentence: str) -> str:
     """A sentence on a case, preceded by its swept values where there are several.
 
     What a list is of (`RMS error: least with a; largest with b`) belongs to each of its parts, with these values."""
-    where = without_markup(swept_description(result))
-    if not where or ": " not in sentence:
-        return f"{where}: {sentence}" if where else sentence
+    return after_case_name(without_markup(swept_description(result)), sentence)
+
+
+def after_case_name(name: str, sentence: str) -> str:
+    """A sentence on a case, preceded by the case's name, as `after_swept_values` by its values; unchanged without one.
+
+    >>> after_case_name("D = 15 m/s", "RMS error: least with a; largest with b")
+    'D = 15 m/s, RMS error: least with a; largest with b'
+    >>> after_case_name("RLS 4", "Least RMS error: a, 15 m"), after_case_name("RLS 4", "a is best")
+    ('RLS 4, least RMS error: a, 15 m', 'RLS 4: a is best')
+    """
+    if not name or ": " not in sentence:
+        return f"{name}: {sentence}" if name else sentence
     first = sentence[0].lower() if sentence[1].islower() else sentence[0]
-    return f"{where}, {first}{sentence[1:]}"
+    return f"{name}, {first}{sentence[1:]}"
 
 
 def select_reported(results: Sequence[CaseResult], max_cases: int = 3) -> tuple[list[CaseResult], list[str]]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import tr
+from radarsim.language.translate import plural, tr
 from radarsim.report import exact_marks, sentences, statistics, tables, wording
 from radarsim.report.quantities import GAIN, SIGMA, Quantity
 from radarsim.report.statistics import Estimate
@@ -61,16 +61,39 @@ class ComparedValue:
         value = numeral(format(self.value, form)).replace("inf", "∞")
         return exact_marks.exact_text(" ".join(filter(None, (value, unit))))
 
-    def choice_remark(self) -> str:
-        """In brackets, for how many measured values its interval holds; empty where it was not chosen, or has none."""
+    def choice_remark(self, together: Callable[[int], str] | None = None) -> str:
+        """In brackets, for how many measured values its interval holds; empty where it was not chosen, or has none.
+
+        together: words that say what these are, such as `filters_together`; default: `simultaneity_text`."""
         if self.looks < 2 or np.isnan(self.estimate.lo):
             return ""
-        return f" ({simultaneity_text(self.looks)})"
+        return f" ({(together or simultaneity_text)(self.looks)})"
 
 
 def simultaneity_text(count: int) -> str:
-    """That intervals hold for so many values at once, and how surely."""
+    """That intervals hold for so many values at once, and how surely; where the sentence names what these are."""
     return tr("95 % for both together") if count == 2 else tr("95 % for all {count} together", count=count)
+
+
+def filters_together(count: int) -> str:
+    """That intervals hold for so many filters at once."""
+    if count == 2:
+        return tr("95 % for both filters together")
+    return plural("95 % for {count} filter", "95 % for all {count} filters together", count)
+
+
+def scans_together(count: int) -> str:
+    """That intervals hold for so many scans at once."""
+    if count == 2:
+        return tr("95 % for both scans together")
+    return plural("95 % for {count} scan", "95 % for all {count} scans together", count)
+
+
+def comparisons_together(count: int) -> str:
+    """That intervals hold for so many comparisons at once."""
+    if count == 2:
+        return tr("95 % for both comparisons together")
+    return plural("95 % for {count} comparison", "95 % for all {count} comparisons together", count)
 
 
 def choice_remark(values: Sequence[ComparedValue]) -> str:

@@ -37,11 +37,12 @@ def _in_percent(x):
     return 100 * x
 
 
-CHANGES = (  # how sentences write a column: itself, in per cent, of a gain the loss and the factor
+CHANGES = (  # how sentences write a column: itself, in per cent, of a gain loss and factor, of a ratio the excess
     lambda x: x,
     _in_percent,
     lambda x: -x,
     lambda x: 1 - x / 100,
+    lambda x: 100 * (x - 1),
 )
 WORDS = {  # of components in English, which does not inflect them
     **{component.name: component.words for component in (*RADIAL, *COMPONENTS_BY_NAME.values())},

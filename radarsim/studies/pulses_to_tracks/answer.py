@@ -1,7 +1,7 @@
 """What the report of the chain asks and answers, in sentences."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.config.experiment import Experiment
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, quote_name, term, tr
-from radarsim.report import case_selection, compared_value, key_labels, sentences, tables, wording
+from radarsim.report import case_selection, compared_value, key_labels, sentences, statistics, tables, wording
 from radarsim.report.quantities import LOCK, Quantity
 from radarsim.report.sentences import Sentence
 from radarsim.studies.pulses_to_tracks.tables import Result
@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 
 
 TablesByName = Mapping[str, "pd.DataFrame"]
+RatioKeys = Collection[tuple[str, str]]  # cases and filters
 RATIO_DECIMALS = 3
 RATIO = Quantity("over_ideal", term("σ over that of the idealisation"), "idealisations", "paired_over_ideal")
 MAX_RATIO_OF_IDEAL = 1.05  # σ over its idealisation's, up to which the idealisation holds
+MAX_RATIO_IN_PERCENT = 2.0  # from which on a ratio is not written in per cent above one
 
 
 def warnings(experiment: Experiment) -> list[str]:
@@ -58,15 +60,15 @@ def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sent
     """Sentences on σ over that of the filters' idealisations.
 
     Of several cases, first each filter where it is furthest from its idealisation. For each case: the filters nearest
-    to their idealisation and furthest from it; the locks and σ of each; the burst."""
+    to their idealisation and furthest from it; the locks and σ of each, and what a failed burst costs; the burst."""
     reported, remark = case_selection.select_reported(results, 3)
-    worst = _worst_of_all_cases(results, tables_by_name) if len(results) > 1 else []
-    of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name)]
+    worst, keys = _worst_of_all_cases(results, tables_by_name) if len(results) > 1 else ([], ())
+    of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name, keys)]
     return [*worst, *of_cases, *map(Sentence, remark)]
 
 
-def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
-    """The largest σ of the range of each filter at the last scan over its idealisation's; none without any."""
+def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName) -> tuple[list[Sentence], RatioKeys]:
+    """The largest σ of the range of each filter at the last scan over its idealisation's, and whose; none without."""
     final = tables.select_rows(tables_by_name["idealisations"], component="r")
     final = final.groupby(["case", "filter"], sort=False).tail(1)
     case_names = dict(
@@ -75,7 +77,7 @@ def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName)
     final = final[final["case"].isin(case_names)].dropna(subset=[RATIO.value])
     worst = final.sort_values(RATIO.value, kind="stable").groupby("filter", sort=False).tail(1)
     if not len(worst):
-        return []
+        return [], ()
     ratios = [
         f"{quote_name(row['filter'])} {_ratio(row, looks=len(results))} ({case_names[row['case']]})"
         for row in worst.to_dict("records")
@@ -86,24 +88,31 @@ def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName)
         together=compared_value.simultaneity_text(len(results)),
         found="; ".join(ratios),
     )
-    return [Sentence(text, _ratio_intervals(worst))]
+    return [Sentence(text, _ratio_intervals(worst))], _ratio_keys(worst)
 
 
-def _case_sentences(result: Result, tables_by_name: TablesByName) -> list[Sentence]:
+def _case_sentences(result: Result, tables_by_name: TablesByName, ratio_keys: RatioKeys) -> list[Sentence]:
+    """The filters nearest to their idealisation and furthest from it, the locks, σ and losses of each; the burst.
+
+    ratio_keys: of the ratios that an earlier sentence gives; each number stands once, with one interval."""
     axes = result.axes
     bound = axes.bound[..., 0][np.isfinite(axes.bound[..., 0])]
     if not bound.size:
         return []
     case = key_labels.plain_case_label(result)
     filters = [name for f, name in enumerate(axes.filters) if axes.ideal[f] >= 0]
-    case_sentences = []
-    if len(filters) > 1:
-        for clause in _nearest_and_furthest(result, tables_by_name, filters):
-            case_sentences.append(clause.with_text(f"{case}, {clause.text}."))
+    case_sentences: list[Sentence] = []
+    if len(filters) > 1 and not any(case_name == result.name for case_name, _ in ratio_keys):
+        case_sentences, ratio_keys = _nearest_and_furthest(result, tables_by_name, filters, case)
     for name in filters:
-        clause = _locks_and_ratio(result, tables_by_name, name)
+        clauses = [
+            _locks(result, tables_by_name, name),
+            *([] if (result.name, name) in ratio_keys else [_ratio_of_ideal(result, tables_by_name, name)]),
+            *_cost_of_failure(result, tables_by_name, name),
+        ]
+        clause = sentences.join("; ", clauses)
         case_sentences.append(clause.with_text(f"{case}, {quote_name(name)}: {clause.text}."))
-    return [*case_sentences, _burst_sentence(result, case, bound.min())]
+    return [*case_sentences, *_few_failures(result, tables_by_name, case), _burst_sentence(result, case, bound.min())]
 
 
 def _burst_sentence(result: Result, case: str, sigma: float) -> Sentence:
@@ -123,8 +132,10 @@ def _burst_sentence(result: Result, case: str, sigma: float) -> Sentence:
     return Sentence(text)
 
 
-def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters: Sequence[str]) -> list[Sentence]:
-    """The filters whose last σ of the range is nearest to their idealisation's and furthest from it.
+def _nearest_and_furthest(
+    result: Result, tables_by_name: TablesByName, filters: Sequence[str], case: str
+) -> tuple[list[Sentence], RatioKeys]:
+    """The filters whose last σ of the range is nearest to their idealisation's and furthest from it, and whose.
 
     None where they cannot be distinguished."""
     final = tables.select_rows(tables_by_name["idealisations"], case=result.name, component="r")
@@ -133,7 +144,7 @@ def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters:
     nearest, furthest = final.to_dict("records")
     values = [compared_value.row_value(row, RATIO).chosen_among(len(filters)) for row in (nearest, furthest)]
     if not compared_value.are_distinguished(*values):
-        return []
+        return [], ()
     text = tr(
         "RMS range error at the last scan over that of ideal bursts{chosen}: least with {best}, {near}; greatest with "
         "{worst}, {far}",
@@ -141,35 +152,87 @@ def _nearest_and_furthest(result: Result, tables_by_name: TablesByName, filters:
         near=_ratio(nearest, looks=len(filters)),
         worst=quote_name(furthest["filter"]),
         far=_ratio(furthest, looks=len(filters)),
-        chosen=values[0].choice_remark(),
+        chosen=values[0].choice_remark(compared_value.filters_together),
     )
-    return [Sentence(text, _ratio_intervals(final))]
+    return [Sentence(f"{case}, {text}.", _ratio_intervals(final))], _ratio_keys(final)
 
 
-def _locks_and_ratio(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:
-    """The least share of a scan's bursts that lock, and σ of the range at the last scan over its idealisation's."""
+def _locks(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:
+    """The least share of a scan's bursts that lock."""
     locks = tables.select_rows(tables_by_name["locks"], case=result.name, filter=name)
     _, least = compared_value.extreme(locks, LOCK, largest=False)
     if least.value == 1:
-        low = numeral(f"{math.floor(1e4 * least.estimate.lo) / 100:.2f}")
-        locked = tr(
-            "all {count:,} bursts lock (at every scan {low} % or more{chosen})",
+        text = tr(
+            "none of {count:,} bursts failed to lock (at each scan {low} % or more lock{chosen})",
             count=int(locks["n"].sum()),
-            low=low,
-            chosen=f"; {compared_value.simultaneity_text(least.looks)}" if least.looks > 1 else "",
+            low=numeral(f"{math.floor(1e4 * least.estimate.lo) / 100:.2f}"),
+            chosen=f", {compared_value.scans_together(least.looks)}" if least.looks > 1 else "",
         )
     else:
         share = wording.share(*(100 * end for end in least.estimate))
-        locked = tr("at the worst scan {share} of the bursts lock", share=share) + least.choice_remark()
+        text = tr("at the worst scan {share} of the bursts lock", share=share)
+        text += least.choice_remark(compared_value.scans_together)
+    return Sentence(text, least.intervals)
+
+
+def _ratio_of_ideal(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:
+    """σ of the range at the last scan over its idealisation's; the same, or more, only as its interval has it."""
     ratios = tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r")
     final = ratios.iloc[-1]
-    if final[RATIO.ends[1]] <= MAX_RATIO_OF_IDEAL:
-        ratio = tr(
-            "the RMS range error at the last scan is as with ideal bursts, {ratio} times", ratio=_ratio(final, ".4g")
-        )
+    value, low, high = (round(float(final[column]), RATIO_DECIMALS) for column in (RATIO.value, *RATIO.ends))
+    if low <= 1 <= high <= MAX_RATIO_OF_IDEAL:
+        ratio = _ratio(final, ".4g")
+        text = tr("the RMS range error at the last scan is as with ideal bursts, {ratio} times", ratio=ratio)
+    elif low > 1 and value < MAX_RATIO_IN_PERCENT:
+        percent = wording.estimate((100 * (end - 1) for end in (value, low, high)), "%", ".2g")
+        text = tr("the RMS range error at the last scan is {percent} above that with ideal bursts", percent=percent)
     else:
-        ratio = tr("the RMS range error at the last scan is {ratio} times that of ideal bursts", ratio=_ratio(final))
-    return Sentence(f"{locked}; {ratio}", (*least.intervals, *_ratio_intervals(final)))
+        text = tr("the RMS range error at the last scan is {ratio} times that of ideal bursts", ratio=_ratio(final))
+    return Sentence(text, _ratio_intervals(final))
+
+
+def _cost_of_failure(result: Result, tables_by_name: TablesByName, name: str) -> list[Sentence]:
+    """σ of the range at the last scan where its burst failed, beside that of ideal bursts; none where few failed."""
+    losses = _last_failures(result, tables_by_name)
+    losses = losses[(losses["filter"] == name) & (losses["n"] >= statistics.MIN_EVENTS)]
+    if not len(losses):
+        return []
+    row, unit = losses.iloc[0], key_labels.unit_label(losses.iloc[0]["unit"])
+    ideal = result.axes.filters[result.axes.ideal[list(result.axes.filters).index(name)]]
+    curves = tables.select_rows(tables_by_name["curves"], case=result.name, filter=ideal, component="r", k=row["k"])
+    text = tr(
+        "where the burst of the last scan failed ({count:,} realisations) the RMS range error there is {sigma}, with "
+        "ideal bursts ({ideal}) {ideal_sigma}",
+        count=int(row["n"]),
+        sigma=compared_value.row_value(row).text(unit, ",.3g"),
+        ideal=quote_name(ideal),
+        ideal_sigma=compared_value.row_value(curves.iloc[0]).text(unit),
+    )
+    return [Sentence(text, sentences.intervals("losses", "sigma", row))]
+
+
+def _few_failures(result: Result, tables_by_name: TablesByName, case: str) -> list[Sentence]:
+    """That too few bursts of the last scan failed, where some of a case failed; none where a filter has enough."""
+    locks, losses = (
+        tables.select_rows(tables_by_name["locks"], case=result.name),
+        _last_failures(result, tables_by_name),
+    )
+    if (locks["lock_rate"] == 1).all() or (losses["n"] >= statistics.MIN_EVENTS).any():
+        return []
+    text = tr(
+        "{case}: too few bursts failed at the last scan to say what one costs (under {fewest} of {count:,}).",
+        case=case,
+        fewest=statistics.MIN_EVENTS,
+        count=result.count,
+    )
+    return [Sentence(text)]
+
+
+def _last_failures(result: Result, tables_by_name: TablesByName) -> "pd.DataFrame":
+    """The rows of `losses` on the range at the last scan of the realisations whose burst failed there."""
+    return tables.select_rows(
+        tables_by_name["losses"], case=result.name, component="r", since_loss=0, k=int(result.axes.k[-1])
+    )
 
 
 def _ratio(row: "Mapping[Any, Any] | pd.Series[Any]", form: str = ".3g", looks: int = 1) -> str:
@@ -179,3 +242,7 @@ def _ratio(row: "Mapping[Any, Any] | pd.Series[Any]", form: str = ".3g", looks: 
 
 def _ratio_intervals(rows: "pd.DataFrame | pd.Series[Any]") -> tuple[sentences.MeasuredInterval, ...]:
     return sentences.intervals("idealisations", "paired_over_ideal", rows)
+
+
+def _ratio_keys(rows: "pd.DataFrame") -> RatioKeys:
+    return set(zip(rows["case"], rows["filter"], strict=True))

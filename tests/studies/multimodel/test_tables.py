@@ -132,7 +132,7 @@ def test_all_stages_are_named_and_their_names_do_not_overlap():
 
 
 def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
-    first, height, climb = answer_texts(answer, result.cases, result.tables)
+    first, following, height, climb = answer_texts(answer, result.cases, result.tables)
     for stage in ("start", "ballistic", "manoeuvre", "after"):
         assert stage in height
         assert stage in climb
@@ -142,14 +142,17 @@ def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     above = 100 * (wide.div(wide.min(axis=1), axis=0) - 1)
     (best, smallest), (second, more) = above.max().sort_values().iloc[:2].items()
     stage, looks = above[best].idxmax(), wide.size
-    assert first.startswith("Smallest worst excess of the RMS height error over the best filter of each stage ")
-    assert f" (95 % for all {looks} together): {best}, {smallest:#.3g} % [" in first
-    assert f"] ({stage}, where {wide.loc[stage].idxmin()} is best); next is {second}, {more:#.3g} % [" in first
-    assert first.endswith(f"] ({above[second].idxmax()}).")
+    together = f"95 % for all {looks} comparisons together"
+    least = "above the least of a stage ("
+    assert first.startswith(f"{best} is best overall: its RMS height error is never more than {smallest:#.3g} % [")
+    assert first.endswith(f"] {least}{stage}, where {wide.loc[stage].idxmin()} is best; {together}).")
+    assert following.startswith(f"Next is {second}, whose RMS height error is up to {more:#.3g} % [")
+    assert following.endswith(f"] {least}{above[second].idxmax()}; {together}).")
     gain = stage_ranking.paired_gain(result.cases[0], stage, best, wide.loc[stage].idxmin())
-    low, high = (float(end) for end in re.search(r"together\): .*? % \[(.*?), (.*?)\]", first).groups())
+    low, high = (float(end) for end in re.search(r" % \[(.*?), (.*?)\]", first).groups())
     assert low < -gain.hi < -gain.lo < high  # paired on the same noise, and wider, as it was chosen
-    assert height.startswith(f"Least RMS error of the height by stage (95 % for all {wide.shape[1]} together): start: ")
+    every = f"95 % for all {wide.shape[1]} filters together"
+    assert height.startswith(f"Least RMS error of the height by stage ({every}): start: ")
 
 
 def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
@@ -167,7 +170,7 @@ def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
     assert stage_ranking.least_filters(case, stages, stages.iloc[0]) == ("a = “same”", "“near”")
     sentence, *_ = answer_texts(answer, [case], {"stages": stages})
     assert sentence.startswith(
-        "Least RMS error of the height by stage (95 % for all 3 together): start: a = “same”, 10 m ["
+        "Least RMS error of the height by stage (95 % for all 3 filters together): start: a = “same”, 10 m ["
     )
     assert sentence.endswith("] (not distinguished from “near”).")
 
@@ -175,7 +178,7 @@ def test_least_of_what_noise_orders_is_not_ranked(monkeypatch):
     assert sentence == "RMS error of the height by stage: start: a = “same”, 10.0 m [1.0, 99.0]."  # nothing is least
 
 
-def test_answer_on_several_cases_is_one_sentence(monkeypatch):
+def test_answer_on_several_cases_names_the_best_overall(monkeypatch):
     """Of the filters that all cases have; one that is best everywhere is never above the least."""
     rows = [  # a is 10 % above the least, b up to 100 %
         *(("one", "start", "a", 11.0), ("one", "start", "b", 10.0), ("one", "start", "only here", 1.0)),
@@ -191,22 +194,50 @@ def test_answer_on_several_cases_is_one_sentence(monkeypatch):
         return Estimate(gain, gain - 1, gain + 1)
 
     monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
-    (sentence,) = answer_texts(answer, cases, {"stages": stages})
-    assert sentence == (
-        "Smallest worst excess of the RMS height error over the best filter of each stage (95 % for all 4 "
-        "together): a, 10.0 % [8.7, 11.3] (one, start, where b is best); next is b, 100 % [99, 101] (two, start)."
-    )
+    assert answer_texts(answer, cases, {"stages": stages}) == [
+        "a is best overall: its RMS height error is never more than 10.0 % [8.7, 11.3] above the least of a stage "
+        "(one, start, where b is best; 95 % for all 4 comparisons together).",
+        "Next is b, whose RMS height error is up to 100 % [99, 101] above the least of a stage (two, start; 95 % for "
+        "all 4 comparisons together).",
+    ]
     single_answer = answer_texts(answer, cases, {"stages": stages[stages["filter"] == "b"]})
-    assert [line.rpartition("start: ")[2] for line in single_answer] == [
-        "b, 10.0 m [1.0, 99.0].",
-        "b, 20.0 m [1.0, 99.0].",
+    assert single_answer == [
+        "one, RMS error of the height by stage: start: b, 10.0 m [1.0, 99.0].",
+        "two, RMS error of the height by stage: start: b, 20.0 m [1.0, 99.0].",
     ]
     vy_stages = pd.concat([stages[3:], stages[3:].assign(component="vy")], ignore_index=True)
     sentence, *_ = answer_texts(answer, cases[1:], {"stages": vy_stages})
     assert sentence == (
-        "Least RMS height error in every stage: a; next is b, at most 100 % [99, 101] above it (start; 95 % for "
-        "both together)."
+        "a is best overall: its RMS height error is the least in every stage; that of the next, b, is up to 100 % "
+        "[99, 101] above it (start; 95 % for both comparisons together)."
     )
+
+
+def test_answer_names_the_filters_among_which_noise_decides(monkeypatch):
+    """Of several cases the stages of each follow, after the name of the case."""
+    sigma = {("one", "a"): 10.0, ("one", "b"): 12.0, ("two", "a"): 12.1, ("two", "b"): 10.0}
+    rows = [(case, "start", name, size) for (case, name), size in sigma.items()]
+    columns = {"sigma_lo": 1.0, "sigma_hi": 99.0, "component": "y", "unit": "m"}
+    stages = pd.DataFrame(rows, columns=["case", "stage", "filter", "sigma"]).assign(**columns)
+
+    def paired_gain(result, stage, name, other, component="y"):
+        gain = 100 * (1 - sigma[result.name, name] / sigma[result.name, other])
+        return Estimate(gain, gain - 30, gain + 30)
+
+    monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
+    cases = [SimpleNamespace(name=name, swept_values=(), spec=SimpleNamespace(device="")) for name in ("one", "two")]
+    undecided, least, *of_cases = answer_texts(answer, cases, {"stages": stages})
+    assert undecided == (
+        "No filter is surely best overall in RMS height error: b and a are not distinguished (95 % for all 4 "
+        "comparisons together)."
+    )
+    assert least.startswith("The RMS height error of b is never more than 20.0 % [")
+    assert least.endswith(
+        "] above the least of a stage (one, start, where a is best; 95 % for all 4 comparisons together)."
+    )
+    assert [text.partition(" by stage")[0] for text in of_cases] == [
+        f"{name}, least RMS error of the height" for name in ("one", "two")
+    ]
 
 
 def test_time_per_update_is_only_in_the_record_and_the_report(tmp_path):
