@@ -186,6 +186,15 @@ def _log_ratio(name: str, baseline: str, gain_rows: Mapping[str, Row]) -> Estima
         return Estimate(*(float(np.log1p(-gain[i] / 100)) for i in (0, 2, 1)))
 
 
+def value_ratio(value: ComparedValue, baseline: ComparedValue) -> ComparedValue:
+    """The ratio of two positive values of which neither depends on the other's noise."""
+    if baseline.is_exact:
+        return value.mapped(lambda sigma: sigma / baseline.value)
+    logs = (Estimate(*np.log(np.asarray(each.estimate, dtype=float))) for each in (value, baseline))
+    ratio = Estimate(*(float(np.exp(end)) for end in statistics.difference(*logs)))
+    return ComparedValue(ratio, False, (*value.intervals, *baseline.intervals))
+
+
 def extreme(rows: "pd.DataFrame", quantity: Quantity, largest: bool = True) -> "tuple[pd.Series[Any], ComparedValue]":
     """The row with the largest or the smallest value, exact values first, and its value.
 

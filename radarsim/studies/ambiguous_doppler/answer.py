@@ -1,6 +1,6 @@
 """What the report of folded Doppler asks and answers, in sentences."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from radarsim.language.numerals import numeral
 from radarsim.language.translate import join_names, list_filters, plural, quote_name, tr
 from radarsim.report import case_selection, compared_value, key_labels, rare_events, sentences, tables, wording
 from radarsim.report.compared_value import ComparedValue, is_equal
+from radarsim.report.quantities import RADIAL
 from radarsim.report.sentences import Sentence
 from radarsim.report.statistics import Estimate
 from radarsim.studies.ambiguous_doppler import remedy_answer
@@ -67,11 +68,11 @@ def answer(
     reported, remark = case_selection.select_reported(results, 6)
     if noise.cases:
         reported, remark = [result for result in results if result.name in noise.cases], []
-    of_all_cases = [*_least_error_of_all(results, tables_by_name, scans), *_as_good_in_cases(results, tables_by_name)]
+    of_all_cases = _orders_over_cases(results, tables_by_name, scans) or _as_good_in_cases(results, tables_by_name)
     of_cases = [sentence for result in reported for sentence in _case_sentences(result, tables_by_name, scans)]
     filters = [(result, name) for result in reported for name in _reported_filters(result)]
     remedies = remedy_answer.remedy_sentence(filters, tables_by_name)
-    if not (answered := [*noise.sentences, *of_all_cases[:1], *of_cases, *remedies]):
+    if not (answered := [*noise.sentences, *of_all_cases, *of_cases, *remedies]):
         return list(map(Sentence, remark))
     mentions_span = any("D = " in sentence.text or "D/2" in sentence.text for sentence in answered)
     return [*answered, _prior_note(results, mentions_span), *map(Sentence, remark)]
@@ -147,28 +148,90 @@ def _scans_remark(rows: "Iterable[pd.Series[Any]]") -> str:
     return " " + tr("(95 % for all scans together)") if any(_largest_sigma(row).looks > 1 for row in rows) else ""
 
 
-def _least_error_of_all(
+def _orders_over_cases(
     results: Sequence[Result], tables_by_name: TablesByName, scans: Mapping[str, CountedScans]
 ) -> list[Sentence]:
+    """The filters of the least error in all cases, with the weak point of the first of them; and the best single order
+    of each case."""
+    combining = [result for result in results if result.axes.combines.any()]
+    worst = {result.name: _largest_errors(result, tables_by_name, scans[result.name]) for result in combining}
+    if not (best := _least_error_of_all(combining, worst, scans)):
+        return []
+    (name, sentence), singles = best, {f.name for result in combining for f in result.spec.filters if f.combine is None}
+    labels = dict(zip(worst, case_selection.distinct_case_names(combining), strict=True))
+    case_orders: list[str] = []
+    intervals: list[sentences.MeasuredInterval] = []
+    for result in combining:
+        rows = worst[result.name][worst[result.name]["filter"].isin(singles)]
+        if len(rows):
+            row = rows.iloc[int(rows["decides"].to_numpy().argmin())]
+            case_orders.append(f"{quote_name(row['filter'])}, {_sigma_m(row)} ({labels[result.name]})")
+            intervals += _largest_sigma(row).intervals
+    text = tr("Best single model order of each case, by the same error: {orders}.", orders="; ".join(case_orders))
+    return [sentence, Sentence(text, tuple(intervals)), *_weak_point(name, singles, labels, tables_by_name, scans)]
+
+
+def _weak_point(
+    name: str,
+    singles: Collection[str],
+    labels: Mapping[str, str],
+    tables_by_name: TablesByName,
+    scans: Mapping[str, CountedScans],
+) -> list[Sentence]:
+    """Where σ of any component exceeds that of the best single order the most, over the scans that count; none where
+    it nowhere does noticeably, or the filter is of a single order. labels: of the cases, by name."""
+    curves = tables_by_name["curves"]
+    first_scan = curves["case"].map({case: scans[case].k for case in labels})
+    curves = curves[(curves["k"] >= first_scan) & (curves["n"] > 0)]
+    curves = curves.assign(decides=tables.exact_first(curves, "sigma", "exact_sigma"))
+    keys, values = ["case", "component", "k"], ["row", "decides", "exact_sigma"]
+    curves["row"] = curves.index
+    orders = curves[curves["filter"].isin(singles)]
+    least = orders.loc[orders.groupby(keys)["decides"].idxmin()]
+    pairs = curves[curves["filter"] == name].merge(least[keys + values], on=keys, suffixes=("", "_order"))
+    if name in singles or not len(pairs):
+        return []
+    pair = pairs.iloc[int((pairs["decides"] / pairs["decides_order"]).to_numpy().argmax())]
+    worst, order = (curves.loc[[pair[row]]].iloc[0] for row in ("row", "row_order"))
+    looks = int((pairs["exact_sigma"].isna() | pairs["exact_sigma_order"].isna()).sum())
+    ratio = compared_value.value_ratio(*map(compared_value.row_value, (worst, order))).chosen_among(looks)
+    if not ratio.estimate.lo > 1 + compared_value.EQUAL:
+        return []
+    text = tr(
+        "Weak point of {filter}: the RMS error of the {quantity} is up to {ratio} times that with {order}{chosen} "
+        "({case}, scan {k}).",
+        filter=quote_name(name),
+        quantity=next(component.words for component in RADIAL if component.name == worst["component"]),
+        ratio=ratio.text(form=".3g"),
+        order=quote_name(order["filter"]),
+        chosen=ratio.choice_remark(),
+        case=labels[worst["case"]],
+        k=worst["k"],
+    )
+    return [Sentence(text, ratio.intervals)]
+
+
+def _least_error_of_all(
+    combining: Sequence[Result], worst: Mapping[str, "pd.DataFrame"], scans: Mapping[str, CountedScans]
+) -> tuple[str, Sentence] | None:
     """The filters whose largest σ of range in any case is least, and the best of the other kind: one order, or several.
 
     None where no filter combines orders, or none had a plot."""
-    combining = [result for result in results if result.axes.combines.any()]
     combinations = {f.name for result in combining for f in result.spec.filters if f.combine is not None}
     worst_rows: dict[str, tuple[pd.Series[Any], Result]] = {}
     for result in combining:
-        for _, row in _largest_errors(result, tables_by_name, scans[result.name]).iterrows():
+        for _, row in worst[result.name].iterrows():
             name = row["filter"]
             if name not in worst_rows or row["decides"] > worst_rows[name][0]["decides"]:
                 worst_rows[name] = row, result
     ranked = sorted(worst_rows, key=lambda name: worst_rows[name][0]["decides"])
     other_kind = [name for name in ranked if (name in combinations) != (ranked[0] in combinations)]
     if not other_kind:
-        return []
+        return None
     best_row, _ = worst_rows[ranked[0]]
     other_row, other_case = worst_rows[other_kind[0]]
     if not compared_value.are_distinguished(_largest_sigma(best_row), _largest_sigma(other_row)):
-        return []
+        return None
     best_value = _largest_sigma(best_row)
     same_kind = [name for name in ranked if name not in other_kind]
     equal = [name for name in same_kind if is_equal(_largest_sigma(worst_rows[name][0]), best_value)]
@@ -188,7 +251,8 @@ def _least_error_of_all(
         where=key_labels.plain_case_label(other_case),
         scans=_scans_remark((best_row, other_row)),
     )
-    return [Sentence(text, (*_largest_sigma(best_row).intervals, *_largest_sigma(other_row).intervals))]
+    intervals = (*_largest_sigma(best_row).intervals, *_largest_sigma(other_row).intervals)
+    return ranked[0], Sentence(text, intervals)
 
 
 def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: CountedScans) -> list[Sentence]:
@@ -212,14 +276,19 @@ def _orders_sentence(result: Result, tables_by_name: TablesByName, counted: Coun
     if np.isfinite(best_order) and np.isfinite(best_combination):
         clauses.append(
             tr(
-                "with the trajectory known, the best order of each scan gives {best:.4g} m, the best combination "
-                "{whole:.4g} m",
+                "lower limit, if the trajectory were known: {best:.4g} m with the best order of each scan, "
+                "{whole:.4g} m with the best combination",
                 best=best_order,
                 whole=best_combination,
             )
         )
     elif np.isfinite(best_order):
-        clauses.append(tr("with the trajectory known, the best order of each scan gives {best:.4g} m", best=best_order))
+        clauses.append(
+            tr(
+                "lower limit, if the trajectory were known: {best:.4g} m with the best order of each scan",
+                best=best_order,
+            )
+        )
     subject = tr("largest RMS range error {since}", since=wording.since(*counted))
     text = f"{key_labels.plain_case_label(result)}, {subject}: {'; '.join(clauses)}."
     intervals = [interval for _, row in worst.iterrows() for interval in _largest_sigma(row).intervals]

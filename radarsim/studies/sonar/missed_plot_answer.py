@@ -3,14 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import list_filters, tr
-from radarsim.report import case_selection, compared_value, key_labels, statistics, tables, wording
+from radarsim.report import case_selection, compared_value, key_labels, tables, wording
 from radarsim.report.compared_value import ComparedValue
 from radarsim.report.sentences import Sentence
-from radarsim.report.statistics import Estimate
 from radarsim.studies.sonar.axes import SonarAxes
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 
@@ -77,19 +74,12 @@ def _ratios(
         {row["filter"]: row for _, row in curves[curves["case"] == case.name].iterrows()} for case in (result, baseline)
     )
     return {
-        name: _ratio(*(compared_value.sigma_value(row, tables_by_name) for row in (rows[name], baseline_rows[name])))
+        name: compared_value.value_ratio(
+            *(compared_value.sigma_value(row, tables_by_name) for row in (rows[name], baseline_rows[name]))
+        )
         for name in rows
         if name in baseline_rows
     }
-
-
-def _ratio(value: ComparedValue, baseline: ComparedValue) -> ComparedValue:
-    """The ratio of two σ of which neither depends on the other's noise."""
-    if baseline.is_exact:
-        return value.mapped(lambda sigma: sigma / baseline.value)
-    logs = (Estimate(*np.log(np.asarray(each.estimate, dtype=float))) for each in (value, baseline))
-    ratio = Estimate(*(float(np.exp(end)) for end in statistics.difference(*logs)))
-    return ComparedValue(ratio, False, (*value.intervals, *baseline.intervals))
 
 
 def _filters_text(ratios: Mapping[str, ComparedValue], end: ComparedValue) -> str:

@@ -89,7 +89,7 @@ def test_orders_and_their_sentence():
     assert set(table["filter"]) == {"likelihood", "expected error", "intersection"}
     assert len(result.tables["folds"]) == 0
     sentences = answer_texts(registry.study("ambiguous_doppler"), result.cases, result.tables)
-    first, *sentences, prior = sentences
+    first, by_case, weak_point, *sentences, prior = sentences
     assert prior.endswith(" m/s²."), "no D in the answer, and none explained"
     assert len(sentences) == 3
     assert all("the best combination" in sentence for sentence in sentences)
@@ -102,6 +102,18 @@ def test_orders_and_their_sentence():
     text = "Smallest worst-case RMS range error after the start of the track, over 3 cases: "
     assert first.startswith(f"{text}{quote_name(largest.idxmin())}, ")
     assert f"the best single model order, {quote_name(singles.idxmin())}, reaches " in first
+    by_filter = curves.assign(exact=curves["exact_sigma"].fillna(curves["sigma"])).groupby(["case", "filter"])["exact"]
+    singles_by_case = by_filter.max().unstack()[list(singles.index)]
+    assert (
+        by_case
+        == "Best single model order of each case, by the same error: "
+        + "; ".join(
+            f"{quote_name(row.idxmin())}, {row.min():.4g} m ({'target = ' + case.partition('=')[2].replace('_', ' ')})"
+            for case, row in singles_by_case.loc[list(scans)].iterrows()
+        )
+        + "."
+    )
+    assert weak_point.startswith(f"Weak point of {quote_name(largest.idxmin())}: the RMS error of the ")
     assert {"orders", "sigma_r"} <= set(result.figures)
 
 
