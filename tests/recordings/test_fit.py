@@ -348,6 +348,15 @@ def test_one_plot_that_is_wrong_by_any_size_leaves_the_robust_fit_as_it_was(robu
     assert len(found.outlier_rows) <= 4
 
 
+def test_outliers_that_a_first_search_over_fewer_rows_has_not_seen_are_found(robust_sigma):
+    """It ends with none: from there a share of zero had no slope, and σ rose to a thousand times its value."""
+    tracks = [recording(np.random.default_rng(seed)) for seed in range(4)]
+    tracks[2]["range_m"][30] += 1e5 * STATED["radar.sigma_range_m"]
+    found = fit.fit_keys(likelihood(*tracks), (OUTLIERS,), rough=likelihood(*tracks[:2]))
+    assert found.keys[0].value == pytest.approx(robust_sigma.value, rel=0.02)
+    assert found.outlier_rows == ((2, T * 30, "range_m"),)
+
+
 def test_advice_names_a_single_wrong_plot_before_a_sigma(tmp_path):
     columns = recording(np.random.default_rng(4))
     columns["range_m"][30] += 2.5e5

@@ -87,7 +87,11 @@ class LikelihoodSearch:
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
         self.curvature_model = Curvature(self.log_likelihood, self.steps)
         self.rival, self.rival_top, self.near_points = np.zeros(0), -math.inf, dict[int, np.ndarray]()
-        self.best, self.top = self.climb(start if start_point is None else start_point, None, ROUGH_TOLERANCE)
+        if start_point is not None:
+            # Fewer rows may have been without the outliers of all: a share that is zero has no slope.
+            start[: len(likelihood.stated)] = start_point[: len(likelihood.stated)]
+            start = np.where(start_point > self.lowest, start_point, start)
+        self.best, self.top = self.climb(start, None, ROUGH_TOLERANCE)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
         for climb_count, factor in enumerate((0.1, 10.0) if start_point is None else (), 1):
             self.maximum_cost = max(self.maximum_cost, self.evaluations * 3 // climb_count)
