@@ -51,8 +51,8 @@ nitpick_ignore_regex = [
     ("py:class", r"radarsim\.config\.\w+\..*|radarsim\.studies\..*\.(config|\w+_keys)\..*|(radarsim\..*\.)?(All)?Keys"),
     ("py:class", r"radarsim\.errors\..*"),  # exceptions are described where they are raised
     ("py:class", r"FieldInfo|NoneType|Markup"),  # of unions, as pydantic and jinja2 spell them
-    ("py:class", r"(radarsim\..*\.)?(A_co|Item|M|Maker|Part|Asked|CaseOrResult|ClutterPlan|Row)|Inventory|Table|Shipped"),
-    ("py:class", r"(radarsim\..*\.)?(Name|V)|DrawPlots|GivenGains|Sample|Settings|Source|Stop"),
+    ("py:class", r"(radarsim\..*\.)?(A_co|Item|M|Maker|Part|Asked|CaseOrResult|ClutterPlan|Row)|Inventory|Table"),
+    ("py:class", r"(radarsim\..*\.)?(Name|V)|DrawPlots|GivenGains|Sample|Settings|Shipped|Source|Stop"),
     ("py:class", r"radarsim\.(extensions|papers)\..*"),  # what is optional
     ("py:class", r"(radarsim\.report\.)?notes\.Answer"),
     ("py:(class|obj)", r"(dict|list|tuple|typing\.Literal)\[.*"),  # a subscript that autodoc takes for a name
