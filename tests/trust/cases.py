@@ -34,7 +34,7 @@ DETECTORS = "{name: a, plots: 5, threshold_k: [1, 2]}, {name: b, plots: 4, test_
 MANOEUVRE = ("sweep.target.acceleration_mps2=[0.4]", "scans=30", "uses.at_s=[140]", f"detectors=[{DETECTORS}]")
 TRACKERS = ("sweep.sensor.false_plots_per_km2=[1]", "scans=12")
 EKF = "kind: extended, sigma_acceleration_mps2: 2"
-PLANE = f"filters=[{{name: a, doppler: false, {EKF}}}, {{name: b, doppler: true, {EKF}}}]"
+PLANE = f"filters=[{{name: a, doppler: false, {EKF}}}, {{name: b, doppler: true, {EKF}}}]", "baseline=a"
 CASES = {
     "range_doppler": known("range_doppler", 70_001, 10_000_001),
     "multimodel": known("multimodel", 777, 250_001),
@@ -44,7 +44,7 @@ CASES = {
     "discriminator": known("discriminator", 601, 50_001),
     "ambiguous_doppler": known("ambiguous_doppler", 4_501, 60_001),
     "pulses_to_tracks": Small("pulses", ("scans=5",), 4_501, 60_001),
-    "plane": Small("plane", (PLANE, "scans=8"), 4_501, 900_001),
+    "plane": Small("plane", (*PLANE, "scans=8"), 4_501, 900_001),
 }
 # Further kinds of run, of rare events and of plots that are missed.
 MORE = {
@@ -53,7 +53,7 @@ MORE = {
     "rare_losses": Small("discriminator_rare", ("sweep.estimators.0.lock_probability=[0.999]",), 301, 50_001),
     "rare_tracks": Small("sonar_clutter_rare", ("scans=8",), 9_001, 80_001),
     "plane_clutter": Small(
-        "plane_clutter", (PLANE, "scans=13", "sweep.radar.false_plots_per_km2=[0.1]"), 4_501, 300_001
+        "plane_clutter", (*PLANE, "scans=13", "sweep.radar.false_plots_per_km2=[0.1]"), 4_501, 300_001
     ),
     "rare_ends": Small("sonar_clutter_ends", ("scans=8",), 9_001, 80_001),
 }
