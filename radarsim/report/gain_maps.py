@@ -73,8 +73,8 @@ def _figure(name: str, grid: sweep_figures.SweptGrid, panels: Sequence[Panel]) -
     members = grid.members
     axes, (first, second) = members[0].axes, (key_labels.key_label(members[0], key).text for key in grid.keys)
     caption = tr(
-        "Gain against {base} in σ at the last scan against the {first} and the {second}, ± half the width of its 95 % "
-        "interval (none where filters are nearly alike), of {realisations} in each cell.",
+        "Gain over {base} in the RMS error at the last scan against the {first} and the {second}, ± half the width of "
+        "its 95 % interval (none where filters are nearly alike), of {realisations} in each cell.",
         base=axes.filters[axes.baseline],
         first=first,
         second=second,

@@ -99,7 +99,7 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
     if not panels_drawn:
         return None
     caption = tr(
-        "σ at the last scan against the {key}, from {realisations} each.",
+        "RMS errors at the last scan against the {key}, from {realisations} each.",
         key=key_labels.key_label(members[0], key).text,
         realisations=case_selection.realisations_text(members),
     )
@@ -200,8 +200,8 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         return None
     first, second = (key_labels.key_label(members[0], key).text for key in keys)
     caption = tr(
-        "σ of {component} at the last scan against the {first} and the {second}, from {realisations} per cell. Framed: "
-        "the least of each map.",
+        "RMS error of {component} at the last scan against the {first} and the {second}, from {realisations} per cell. "
+        "Framed: the least of each map.",
         component=component,
         first=first,
         second=second,

@@ -70,7 +70,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
         quantity=component.words,
         realisations=realisations_text(results),
     )
-    title = tr("σ of the {quantity}", quantity=component.words)
+    title = tr("RMS error of the {quantity}", quantity=component.words)
     figure = arrange_columns(Figure(name, title, caption, tuple(panels)))
     return figure
 
@@ -113,7 +113,7 @@ def gain_figure(name: str, results: Sequence[CaseResult], gains: Mapping, compon
         realisations=realisations_text(results),
     )
     y = Axis(tr("gain in $\\sigma$ of {symbol}, %", symbol=component.symbol))
-    title = tr("Gain in σ of the {quantity}", quantity=component.words)
+    title = tr("Gain in the RMS error of the {quantity}", quantity=component.words)
     has_several_gains = any(len(result.axes.filters) > 2 for result in results)
     if any(result.swept_values for result in results) or (has_several_gains and len(results) > 1):
         panels, filters = [], all_filters(results)

@@ -852,8 +852,8 @@ def test_errors_are_taken_at_the_scans_that_a_study_reports():
 def test_figures_call_components_as_the_study_does():
     result = radarsim.judge("sonar_smoothing", held, realisations=64, overrides={"frame": "cartesian"})
     drawn = case_figures(result.cases, result.tables, result.experiment)
-    assert drawn["sigma_x"].title == "σ of the distance north"
-    assert drawn["gain_x"].title == "Gain in σ of the distance north"
+    assert drawn["sigma_x"].title == "RMS error of the distance north"
+    assert drawn["gain_x"].title == "Gain in the RMS error of the distance north"
     assert list(drawn)[:2] == ["gain_x", "sigma_x"]  # before the study's own: the answer is about the judged filter
 
 
@@ -909,7 +909,7 @@ def test_axes_of_a_flight_have_their_words():
     assert (words["x"], words["y"], words["vy"]) == ("distance north", "height", "rate of climb")
     assert set(words) == {name for name, _ in flight.COMPONENTS}
     with use_language("ru"):
-        assert tr("σ of the {quantity}", quantity=words["vy"]) == "СКО вертикальной скорости"
+        assert tr("RMS error of the {quantity}", quantity=words["vy"]) == "СКО ошибки вертикальной скорости"
 
 
 @pytest.mark.parametrize(

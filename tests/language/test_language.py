@@ -59,11 +59,11 @@ def test_counts(count, english, russian):
 
 
 def test_a_word_has_the_form_that_its_place_asks_for():
-    assert tr("σ of the {quantity}", quantity=term("range")) == "σ of the range"
+    assert tr("RMS error of the {quantity}", quantity=term("range")) == "RMS error of the range"
     with use_language("ru"):
         assert tr(term("range")) == "дальность"
-        assert tr("σ of the {quantity}", quantity=term("range")) == "СКО дальности"
-        assert tr("σ of the {quantity}", quantity="range") == "СКО range"  # no word of ours
+        assert tr("RMS error of the {quantity}", quantity=term("range")) == "СКО ошибки дальности"
+        assert tr("RMS error of the {quantity}", quantity="range") == "СКО ошибки range"  # no word of ours
 
 
 def test_messages_that_differ_in_their_numbers_are_translated_once():

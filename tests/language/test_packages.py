@@ -24,7 +24,7 @@ msgctxt "genitive"
 msgid "range"
 msgstr "диапазона"
 
-msgid "σ of the {quantity}"
+msgid "RMS error of the {quantity}"
 msgstr "своё {quantity}"
 
 msgid "a question of its own"
@@ -79,7 +79,7 @@ def test_what_a_package_says_is_looked_up_in_its_catalogue_alone(packages):
     with use_language("ru"):
         assert [one.says("range") for one in packages] == ["диапазон", "range"]
         assert speaks.says("radial velocity") == "radial velocity"  # radarsim's, which it does not translate
-        assert speaks.says("σ of the {quantity}", quantity=speaks.RANGE) == "своё диапазон"
+        assert speaks.says("RMS error of the {quantity}", quantity=speaks.RANGE) == "своё диапазон"
     assert speaks.says("range") == "range"
 
 
@@ -87,9 +87,9 @@ def test_its_words_stay_its_own_in_radarsims_sentences(packages):
     speaks, silent = packages
     with use_language("ru"):
         assert tr("range") == tr(term("range")) == "дальность"
-        assert tr("σ of the {quantity}", quantity=speaks.RANGE) == "СКО диапазона"
-        assert tr("σ of the {quantity}", quantity=silent.RANGE) == "СКО range"
-        assert tr("σ of the {quantity}", quantity=term("range")) == "СКО дальности"
+        assert tr("RMS error of the {quantity}", quantity=speaks.RANGE) == "СКО ошибки диапазона"
+        assert tr("RMS error of the {quantity}", quantity=silent.RANGE) == "СКО ошибки range"
+        assert tr("RMS error of the {quantity}", quantity=term("range")) == "СКО ошибки дальности"
         assert tr(speaks.RANGE) == "диапазон"
 
 

@@ -191,4 +191,4 @@ def test_each_gain_of_a_radar_bears_its_own_sentence(tmp_path):
     assert said["gain_r"].startswith("Range: at 140 s")
     assert said["gain_Vr"].startswith("Radial velocity: at 140 s")
     assert said["gain_ar"].startswith("Radial acceleration: at 140 s")
-    assert said["sigma_r"].startswith("**σ of the range.**")
+    assert said["sigma_r"].startswith("**RMS error of the range.**")

@@ -245,7 +245,7 @@ def sigma(results: Sequence[CaseResult], curves: "pd.DataFrame", component: str)
         count=results[0].count if results else 0,
     )
     figure = _figure_of_panels(
-        f"sigma_{component}", tr("σ of {quantity}", quantity=quantity), caption, sigma_panels, 76
+        f"sigma_{component}", tr("RMS error of {quantity}", quantity=quantity), caption, sigma_panels, 76
     )
     if figure is None:
         return None
@@ -354,8 +354,8 @@ def families(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure |
                 Panel(x, y, (Heat(np.arange(4), np.arange(3), grid, label, f"{case}, {stage}", is_error=True),), title)
             )
     caption = tr(
-        "σ of the height over each stage, by family and rule of the partial merges; one bank, one set of plots. Each "
-        "map has its own scale; its least value is framed."
+        "RMS error of the height over each stage, by family and rule of the partial merges; one bank, one set of "
+        "plots. Each map has its own scale; its least value is framed."
     )
     titles = [panel.title for panel in heat_panels]
     caption += case_selection.left_out_remark(titles, case_selection.pick_evenly(titles, case_selection.MAX_PANELS))
@@ -388,8 +388,8 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
         cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     cost_panels = _with_legend(cost_panels, result, dash=None)
     caption = tr(
-        "σ of the height over each stage against arithmetic operations per update. Coinciding points: small marks on "
-        "large ones.{of_case}",
+        "RMS error of the height over each stage against arithmetic operations per update. Coinciding points: small "
+        "marks on large ones.{of_case}",
         of_case=_case_sentence(result, results),
     )
     return _figure_of_panels("cost", tr("Cost and accuracy"), caption, cost_panels, 62)

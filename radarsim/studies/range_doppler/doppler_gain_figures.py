@@ -65,9 +65,9 @@ def gain_against_time_figure(places: Sequence[RadarOnChart]) -> Figure:
             Panel(x, y, tuple(marks), tr(name), keys, legend="lower left", remark="$c$ =" if i == 0 else "")
         )
     caption = tr(
-        "From c of about 0.7 on, the larger c, the more of the first gain lasts. Gain in σ against time in units "
-        "of τ₁ = σ_r/σ_V, for lines of c = (τ₁/τ₂)², as the scan period becomes short (drawn with {fine} scans in the "
-        "shorter of τ₁ and τ₂). Markers: exact gains at the scans of real radars, whose period is not short.",
+        "From c of about 0.7 on, the larger c, the more of the first gain lasts. Gain in the RMS error against time in "
+        "units of τ₁ = σ_r/σ_V, for lines of c = (τ₁/τ₂)², as the scan period becomes short (drawn with {fine} scans "
+        "in the shorter of τ₁ and τ₂). Markers: exact gains at the scans of real radars, whose period is not short.",
         fine=SCANS_PER_TIME,
     )
     return Figure(

@@ -141,8 +141,8 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     if not panels:
         return None
     caption = tr(
-        "Exact steady σ of the range against the time to settle within 5 % of it. Grey lines join equal manoeuvre "
-        "variances. Star: the least σ that settles within ten scan periods (dotted)."
+        "Exact steady RMS error of the range against the time to settle within 5 % of it. Grey lines join equal "
+        "manoeuvre variances. Star: the least that settles within ten scan periods (dotted)."
     )
     if names := _unsettled_filters(panels):
         caption += " " + tr("Without one: {names}.", names=caption_remarks.join_few_names(map(quote_name, names)))

@@ -64,6 +64,6 @@ def sigma_figure(
         same = key_labels.swept_description(results[0], without={key for key, _ in results[0].swept_values} - shared)
         caption += " " + tr("All panels: {values}.", values=key_labels.without_markup(same))
     figure = panel_layout.arrange_columns(
-        Figure(name, tr("σ of the {name}", name=component.words), caption, tuple(figure_panels))
+        Figure(name, tr("RMS error of the {name}", name=component.words), caption, tuple(figure_panels))
     )
     return figure

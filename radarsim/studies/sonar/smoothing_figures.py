@@ -117,7 +117,7 @@ def believed_figure(
         rows = consistency_rows.loc[keys].assign(rho=rho)
         nees_lines.append(figure_lines.line_from_rows(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
     caption = tr(
-        "Left: σ of the {name} at plot {last} in σ of a plot, true (lines) and the filter's own (markers "
+        "Left: RMS error of the {name} at plot {last} in σ of a plot, true (lines) and the filter's own (markers "
         "alone, where they differ by over 5 %). Right: normalised squared error per component.",
         name=COMPONENTS_BY_NAME[component].words,
         last=last,
@@ -154,8 +154,8 @@ def missed_figure(results: Sequence[CaseResult[GivenPlotsAxes]], curves: "pd.Dat
         figure_panels.append(Panel(panel_layout.time_axis(), y, tuple(marks), f, key_title="$P_D$", direct=False))
     gap = cases[0].spec.sensor.missed_scans
     caption = tr(
-        "σ of the {name} for several detection probabilities, one panel per filter, from {count:,} realisations; "
-        "exact over all patterns of misses if these can be enumerated.",
+        "RMS error of the {name} for several detection probabilities, one panel per filter, from {count:,} "
+        "realisations; exact over all patterns of misses if these can be enumerated.",
         name=component.words,
         count=cases[0].count,
     ) + (tr(" Scans {scans} never give a plot.", scans=", ".join(map(str, gap))) if gap else "")
