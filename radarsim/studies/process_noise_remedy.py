@@ -114,7 +114,7 @@ def _sentence(study: Study, result: CaseResult[Any], index: int, groups: Sequenc
         trial = _trial(study, result.spec, index, best, count) if trials[best].least > MIN_GAIN else trials[best]
         if trial.least > MIN_GAIN:
             text = tr(
-                "{case}, {filter}: the options {settings} --out cured help: {gains} (tried on {count} realisations).",
+                "{case}, {filter}: {settings} --out cured helps: {gains} ({count} trials).",
                 settings=" ".join(f"--set {key}={_option_text(value)}" for key, value in best),
                 gains=_gains_text(trial),
                 **fields,

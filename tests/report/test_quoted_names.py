@@ -36,9 +36,12 @@ def test_symbols_need_no_quotes():
 @pytest.mark.slow_cases_except("rls2")
 @pytest.mark.parametrize("config", CONFIGS)
 def test_words_are_quoted_in_sentences_and_captions(config):
-    key, members = CONFIGS[config], getattr(load(config).cases[0].spec, CONFIGS[config])
+    case = load(config).cases[0]
+    key, members = CONFIGS[config], getattr(case.spec, CONFIGS[config])
     names = {member.name: f"lone wolf {chr(ord('a') + i)}" for i, member in enumerate(members)}
     settings = {f"{key}.{i}.name": name for i, name in enumerate(names.values())}
+    if baseline := getattr(case.spec, "baseline", None):
+        settings["baseline"] = [names[name] for name in (baseline, *case.further_baselines)]
     result = run(config, realisations=40, overrides=settings, figures=False)
     for code in language_codes():
         with use_language(code):

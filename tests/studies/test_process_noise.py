@@ -94,7 +94,7 @@ def test_a_new_config_has_the_sweep_as_a_comment_that_can_be_switched_on(tmp_pat
 def remedy(config):
     """The sentence on what helps, of a config's run."""
     result = radarsim.run(config)
-    sentences = [text for text in result.answer if "--out cured help" in text or "nothing helps" in text]
+    sentences = [text for text in result.answer if "--out cured helps" in text or "nothing helps" in text]
     return sentences[0] if sentences else ""
 
 
@@ -150,7 +150,7 @@ def test_what_is_impossible_does_not_help_nor_end_the_run():
     study = registry.study("plane")
     gains = result.tables["gains"].assign(gain_percent=-50.0, gain_lo=-60.0, gain_hi=-40.0)
     (sentence,) = remedy_sentence(study, result.cases, result.tables | {"gains": gains}, study.alternatives)
-    assert "--out cured help" in sentence.text
+    assert "--out cured helps" in sentence.text
 
 
 def test_a_rival_that_measures_no_more_is_told_nothing():

@@ -70,8 +70,7 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
         return [
             Sentence(
                 tr(
-                    "{case}, {filter}: the options {settings} --out cured help: {gains} (tried on {count} "
-                    "realisations).",
+                    "{case}, {filter}: {settings} --out cured helps: {gains} ({count} trials).",
                     settings=settings,
                     gains=_trial_text(trial),
                     **fields,
@@ -87,7 +86,7 @@ def _trial_text(trial: Trial) -> str:
     if math.isnan(trial.gain):
         return tr("{share} % are lost", share=share)
     gain = numeral(f"{trial.gain:.0f}")
-    return tr("{share} % are lost, the gain over range alone is {gain} % in range", share=share, gain=gain)
+    return tr("{share} % are lost, {gain} % gain over range alone in range", share=share, gain=gain)
 
 
 def is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:

@@ -152,8 +152,9 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
         if (case_name := key_labels.without_markup(key_labels.swept_description(result)))
     )
     text = plural(
-        "{estimator}, {count} case of {realisations}: locked in {least} to {most}.",
-        "{estimator}, {count} cases of {realisations} each ({together}): locked in {least} to {most}.",
+        "{estimator}, {count} case of {realisations}: locked at least in {least}; locked at most in {most}.",
+        "{estimator}, {count} cases of {realisations} each ({together}): locked at least in {least}; locked "
+        "at most in {most}.",
         len(cases),
         estimator=quote_name(name),
         least=lowest,

@@ -65,8 +65,8 @@ def ranking_sentences(results: Sequence[CaseResult], ranking: OverallRanking) ->
         )
         return [Sentence(text, sentences.intervals("stages", "sigma", second))]
     first_text = tr(
-        "{filter} is best overall: its RMS height error is never more than {percent} above the least of a stage "
-        "({where}, where {best} is best; {together}).",
+        "{filter} is best overall: its RMS height error is at most {percent} above the least of a stage "
+        "({where}; {together}).",
         **_worst_stage_fields(results, ranking, best),
         **fields,
     )

@@ -144,8 +144,8 @@ def test_answer_names_the_filter_closest_to_the_best_of_each_stage(result):
     stage, looks = above[best].idxmax(), wide.size
     together = f"95 % for all {looks} comparisons together"
     least = "above the least of a stage ("
-    assert first.startswith(f"{best} is best overall: its RMS height error is never more than {smallest:#.3g} % [")
-    assert first.endswith(f"] {least}{stage}, where {wide.loc[stage].idxmin()} is best; {together}).")
+    assert first.startswith(f"{best} is best overall: its RMS height error is at most {smallest:#.3g} % [")
+    assert first.endswith(f"] {least}{stage}; {together}).")
     assert following.startswith(f"Next is {second}, whose RMS height error is up to {more:#.3g} % [")
     assert following.endswith(f"] {least}{above[second].idxmax()}; {together}).")
     gain = stage_ranking.paired_gain(result.cases[0], stage, best, wide.loc[stage].idxmin())
@@ -195,8 +195,8 @@ def test_answer_on_several_cases_names_the_best_overall(monkeypatch):
 
     monkeypatch.setattr(stage_ranking, "paired_gain", paired_gain)
     assert answer_texts(answer, cases, {"stages": stages}) == [
-        "a is best overall: its RMS height error is never more than 10.0 % [8.7, 11.3] above the least of a stage "
-        "(one, start, where b is best; 95 % for all 4 comparisons together).",
+        "a is best overall: its RMS height error is at most 10.0 % [8.7, 11.3] above the least of a stage "
+        "(one, start; 95 % for all 4 comparisons together).",
         "Next is b, whose RMS height error is up to 100 % [99, 101] above the least of a stage (two, start; 95 % for "
         "all 4 comparisons together).",
     ]

@@ -64,8 +64,8 @@ def _tracker_clause(row: "pd.Series[Any]", sought: "pd.DataFrame | None", run_s:
         return Sentence(tr("{filter} confirms no track", filter=quote_name(row["filter"])))
     life = _life_clause(row, sought, run_s)
     text = tr(
-        "{filter} confirms the target's track in {confirmed} of realisations, after {time} on average, {life}, with "
-        "{rate} false tracks per hour",
+        "{filter} confirms the target's track in {confirmed} of realisations, after {time} on average, {life}; "
+        "{filter} makes {rate} false tracks per hour",
         filter=quote_name(row["filter"]),
         confirmed=wording.share(
             *(100 * row[key] for key in ("confirmed_share", "confirmed_share_lo", "confirmed_share_hi"))
