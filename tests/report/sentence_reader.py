@@ -1,9 +1,9 @@
 """Reads sentences back: every value with an interval, and every exact one, must stand in the row that is named.
 
-A value that is quoted as measured though its row has an exact one is a fault, and so is a value that no row has of what
-the sentence names: case, filter, component, stage, time and scan. An interval that is wider than its row's must be said
-to hold for all values compared. Both languages write numbers in their own way, so that the sentences of each are read
-by the same tables."""
+A ratio of two cases or filters is computed from σ of both. A value that is quoted as measured though its row has an
+exact one is a fault, and so is a value that no row has of what the sentence names: case, filter, component, stage, time
+and scan. An interval that is wider than its row's must be said to hold for all values compared. Both languages write
+numbers in their own way, so that the sentences of each are read by the same tables."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,9 +14,10 @@ import pandas as pd
 
 from radarsim.api import result_content
 from radarsim.language.translate import quote_name, tr, translate_names
-from radarsim.report import case_selection, key_labels
+from radarsim.report import case_selection, key_labels, statistics
 from radarsim.report.exact_marks import MARK
 from radarsim.report.quantities import RADIAL
+from radarsim.report.statistics import Estimate
 from radarsim.studies.multimodel.tables import stage_gain, stage_names
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 
@@ -24,12 +25,28 @@ NUMBER = r"[−+-]?(?:\d[\d,\u202f\u00a0]*(?:\.\d+)?|∞)(?:·10[⁻⁰¹²³⁴
 UNIT = r"(?:[ \u00a0](?:%|°|k?m/s²|k?m/s|k?m|s|к?м/с²|к?м/с|к?м|с|Hz\S*|Гц\S*|rad\S*|рад\S*|m²|м²))?"
 MEASURED = re.compile(rf"(?P<value>{NUMBER}){UNIT} \[(?P<low>{NUMBER}), (?P<high>{NUMBER})\]")
 EXACT = re.compile(rf"(?P<value>{NUMBER}){UNIT}{MARK}")
-FOR_ALL = re.compile(r"95[ \u00a0]% (?:for (?:all|both)|сразу для)")
+FOR_ALL = re.compile(r"95[ \u00a0]% (?:for (?:all|both)|сразу для)(?: (?:всех )?(\d+))?")
 RUSSIAN_COMMA = re.compile(r"(?<=\d),(?=\d)")
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 TIME = re.compile(rf"(?<!= )(?<![\d.,])({NUMBER})[ \u00a0][sс](?![\w/)]| \[)")  # not (20 s), from when errors count
 SCAN = re.compile(r"(?:scan|обзор\w*) (\d+)(?!\d|[.,]\d|[ \u00a0][%\[])")  # not of the worst scan 98.3 %
 LAST = re.compile(r"the last scan|последн\w+ обзор")
+PHASE = re.compile(rf"(?<!= )(?<![\d.,])({NUMBER})[ \u00a0][sс](?!\w)")  # the first: how long a phase of events is
+FALSE_ALARMS = re.compile(rf"P_(?:FA|ЛТ) ≈ ({NUMBER})")
+ABOUT = 0.11  # of the logarithm of a false alarm rate that is said to be about another one
+EVENTS = {  # words of the first alarm of a phase, in every language
+    "alarm by the end": "alarm",
+    "тревога до конца": "alarm",
+    "False alarm within": "false alarm",
+    "Ложная тревога в течение": "false alarm",
+}
+RATIOS = {  # words of a ratio of σ, by what has it: the first one named to the second
+    "case": re.compile("relative to that at|отнесённое к СКО при"),
+    "filter": re.compile("times that with|больше, чем у фильтра"),
+}
+LABELS = ["case", "filter", "component", "k"]  # of a row of curves
+SIGMA_ENDS = ("sigma", "sigma_lo", "sigma_hi")
+PAIRED_SIGMA = "paired σ"
 OF_THE_LAST = re.compile(r"^(?: \w+)?(?: \w+)? \([^)]*\)")  # in brackets behind a number: what that is of
 
 
@@ -71,6 +88,7 @@ class Table(NamedTuple):
     high: np.ndarray
     exact: np.ndarray
     labels: pd.DataFrame
+    is_joint: bool = False  # whether the ends hold for all values that the sentence says they do
 
 
 def columns_of(tables) -> Iterator[Table]:
@@ -90,7 +108,7 @@ def derived_columns(tables, results=()) -> Iterator[Table]:
     curves, gains = tables["curves"], tables["gains"]
     if "exact_sigma" not in curves:  # of a study that has bounds in its place
         curves = curves.assign(exact_sigma=np.nan)
-    ratios = [curves[name].to_numpy(float) for name in ("sigma", "sigma_lo", "sigma_hi")]
+    ratios = [curves[name].to_numpy(float) for name in SIGMA_ENDS]
     with np.errstate(divide="ignore", invalid="ignore"):
         believed = curves["believed_sigma"].to_numpy(float)
         exact = curves["exact_sigma"].to_numpy(float) / believed
@@ -107,7 +125,7 @@ def derived_columns(tables, results=()) -> Iterator[Table]:
     paired = gains.merge(exact, on=keys, how="left")
     base = paired["exact_sigma"].to_numpy(float)
     parts = [base * (1 - paired[name].to_numpy(float) / 100) for name in ("gain_percent", "gain_hi", "gain_lo")]
-    yield Table("paired σ", *parts, np.full(len(paired), np.nan), paired)
+    yield Table(PAIRED_SIGMA, *parts, np.full(len(paired), np.nan), paired)
     for result in results if "stages" in tables else ():
         if len(result.axes.filters) > 1:
             yield _paired_stages(result)
@@ -132,6 +150,39 @@ def _paired_stages(result) -> Table:
     return Table("paired gain of a stage", *gains, np.full(len(numbers), np.nan), pd.DataFrame(labels))
 
 
+def ratio_columns(sentence: str, tables, derived: Sequence[Table], names: Mapping) -> Iterator[Table]:
+    """σ of the first case or filter that a sentence compares over that of the second, neither depending on the other's
+    noise; measured only where one of them has no exact σ, with ends for as many values at once as the sentence says."""
+    together = FOR_ALL.search(sentence)
+    looks = int(together[1] or 2) if together else 1
+    for label in (label for label, words in RATIOS.items() if words.search(sentence)):
+        first, base, *_ = [*_mentions(sentence, names[label]), "", ""]
+        sigmas, keys = _sigmas(tables, derived), [name for name in LABELS if name != label]
+        pairs = sigmas[sigmas[label] == first].merge(sigmas[sigmas[label] == base], on=keys, suffixes=("", "_base"))
+        exact, exact_base = pairs["exact_sigma"], pairs["exact_sigma_base"]
+        is_exact = exact.notna() & exact_base.notna()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logs = [
+                Estimate(*np.log([known.where(~is_exact).fillna(pairs[name + suffix]) for name in SIGMA_ENDS]))
+                for known, suffix in ((exact, ""), (exact_base, "_base"))
+            ]
+            ratio = statistics.simultaneous_sizes(Estimate(*np.exp(statistics.difference(*logs))), looks)
+            known_ratio = (exact / exact_base).to_numpy(float)
+        yield Table("ratio of σ", *ratio, known_ratio, pairs[[*keys, "t_s"]], is_joint=True)
+
+
+def _sigmas(tables, derived: Sequence[Table]) -> pd.DataFrame:
+    """σ as measured, and by a paired gain, each with the exact one."""
+    curves = tables["curves"]
+    paired = [
+        table.labels[[*LABELS, "t_s"]].assign(**dict(zip(SIGMA_ENDS, table[1:4], strict=True)))
+        for table in derived
+        if table.name == PAIRED_SIGMA
+    ]
+    sigmas = pd.concat([curves[[*LABELS, "t_s", *SIGMA_ENDS]], *paired])
+    return sigmas.merge(curves[[*LABELS, "exact_sigma"]], on=LABELS)
+
+
 def names_of(results: Sequence, language: str = "en") -> dict[str, dict[str, str]]:
     """What the language in use calls cases, filters, stages and components: by column of tables, the label by name."""
     cases, of_configs = dict[str, str](), result_content.config_names(results)
@@ -148,6 +199,7 @@ def names_of(results: Sequence, language: str = "en") -> dict[str, dict[str, str
         },
         "stage": {tr(name): name for result in results for name in stage_names(result)} if has_stages else {},
         "component": {words: name for name, words in WORDS.items()} if language == "en" else {},
+        "event": EVENTS,
     }
     if language != "en":
         by_column = {
@@ -157,7 +209,9 @@ def names_of(results: Sequence, language: str = "en") -> dict[str, dict[str, str
 
 
 def _filters(result) -> list[str]:
-    return [*result.axes.filters, *(member.name for member in result.user_filters or ())]
+    """Filters, a user's ones too, and detectors, which tables call filters."""
+    members = [*(result.user_filters or ()), *getattr(result.spec, "detectors", ())]
+    return [*result.axes.filters, *(member.name for member in members)]
 
 
 def number(text: str) -> tuple[float, float]:
@@ -186,8 +240,9 @@ def read_sentence(
     any row may hold a number."""
     if language != "en":
         sentence = _as_english(sentence)
-    columns, read, faults = [*columns_of(tables), *derived], [], []
-    sentence = WITHOUT_COLUMN.split(sentence)[0]
+    sentence, read, faults = WITHOUT_COLUMN.split(sentence)[0], [], []
+    ratios = [*ratio_columns(sentence, tables, derived, names)] if names else []
+    columns = ratios or [*columns_of(tables), *derived]
     matches = sorted([*MEASURED.finditer(sentence), *EXACT.finditer(sentence)], key=lambda match: match.start())
     for i, match in enumerate(matches):
         before = sentence[matches[i - 1].end() if i else 0 : match.start()]
@@ -206,7 +261,9 @@ def read_sentence(
         rows = [
             row
             for column in columns
-            for row in _rows(column, match, bool(FOR_ALL.search(sentence)), place.rows(column, names))
+            for row in _rows(
+                column, match, bool(FOR_ALL.search(sentence)) and not column.is_joint, place.rows(column, names)
+            )
         ]
         if not rows:
             faults.append(f"{text}: in no row")
@@ -247,6 +304,11 @@ class _Place(NamedTuple):
                     chosen &= np.isin(values, list(named)) | np.isin(column.labels["baseline"], list(named))
                 elif named:
                     chosen &= np.isin(values, list(named))
+        if "false_alarm_probability" in column.labels and (rate := FALSE_ALARMS.search(self.sentence)):
+            distance = np.log(column.labels["false_alarm_probability"].to_numpy(float)) - np.log(number(rate[1])[0])
+            chosen &= np.abs(distance) <= ABOUT
+        if "delay_s" in column.labels:
+            return chosen & self._at_the_end(column.labels)
         if "t_s" in column.labels:
             times = self._numbers(TIME)
             if times:
@@ -261,6 +323,14 @@ class _Place(NamedTuple):
                 chosen &= k == column.labels.groupby("case")["k"].transform("max").to_numpy(float)
         return chosen
 
+    def _at_the_end(self, labels: pd.DataFrame) -> np.ndarray:
+        """Which rows (n,) are of the last test within a phase of events, as long as the sentence says."""
+        if not (phase := PHASE.search(self.sentence)):
+            return np.full(len(labels), True)
+        within = labels.assign(last_s=labels["delay_s"].where(labels["delay_s"] <= number(phase[1])[0]))
+        last_s = within.groupby(["case", "filter", "component", "event"])["last_s"].transform("max")
+        return (labels["delay_s"] == last_s).to_numpy()
+
     def _numbers(self, pattern: re.Pattern) -> set[float]:
         """The times or scans next to the number, else those in the sentence."""
         for part in (f"{self.before} | {self.after}", self.sentence):
@@ -270,12 +340,17 @@ class _Place(NamedTuple):
 
 
 def _named(text: str, names: Mapping[str, str]) -> set[str]:
-    """The labels whose names stand in a text; of names within others the longest."""
+    """The labels whose names stand in a text."""
+    return set(_mentions(text, names))
+
+
+def _mentions(text: str, names: Mapping[str, str]) -> list[str]:
+    """The labels whose names stand in a text, in its order; of names within others the longest."""
     if not names:
-        return set()
+        return []
     pattern = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     text = NO_COMPONENT.sub("", text)
-    return {names[match] for match in re.findall(rf"(?<![\w+])(?:{pattern})(?![\w+])", text)}
+    return [names[match] for match in re.findall(rf"(?<![\w+])(?:{pattern})(?![\w+])", text)]
 
 
 def _rows(column: Table, match: re.Match, may_be_wider: bool, chosen: np.ndarray) -> Iterator[tuple[str, float]]:

@@ -10,7 +10,7 @@ from radarsim.api.run import run
 from radarsim.config.find_files import SHIPPED
 from radarsim.language import current
 from radarsim.report.exact_marks import MARK, marking
-from tests.report.sentence_reader import derived_columns, names_of, read_sentence
+from tests.report.sentence_reader import EVENTS, derived_columns, names_of, read_sentence
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 RANGE = {"observes": ["range"], "manoeuvre_variance": 1e-3}
@@ -99,6 +99,46 @@ def test_the_reader_notices_the_number_of_another_row():
         "r: at best 6.0 m [5.0, 7.0], at 10 s; at worst 7.0 m [6.0, 8.0], at 20 s": False,
     }.items():
         assert (read_sentence(sentence, {"curves": curves}, names=names).faults == []) is is_right, sentence
+
+
+def test_the_reader_notices_a_ratio_of_others():
+    """Of the cases, or filters, in the other order, with an interval of another level, or measured though exact."""
+    rows = [("one", "A", 8.0, np.nan), ("one", "B", 6.0, 6.0), ("two", "A", 2.0, 2.0)]
+    curves = pd.DataFrame(rows, columns=["case", "filter", "sigma", "exact_sigma"]).assign(component="r", k=1, t_s=10.0)
+    curves = curves.assign(sigma_lo=curves["sigma"] * 0.9, sigma_hi=curves["sigma"] / 0.9)
+    names = {"case": {"a = 1": "one", "a = 2": "two"}, "filter": {"A": "A", "B": "B"}}
+    other = "a = 1, σ relative to that at a = 2"
+    for sentence, is_right in {
+        f"{other}: 4.00 [3.60, 4.44] (A)": True,
+        f"{other} (95 % for all 4 together): 4.00 [3.50, 4.57] (A)": True,
+        f"{other} (95 % for all 4 together): 4.00 [3.60, 4.44] (A)": False,
+        f"{other} (95 % for all 4 together): 4.00 [3.00, 5.30] (A)": False,
+        "a = 2, σ relative to that at a = 1: 4.00 [3.60, 4.44] (A)": False,
+        "A: σ is up to 1.33 [1.20, 1.48] times that with B (a = 1, scan 1)": True,
+        "B: σ is up to 1.33 [1.20, 1.48] times that with A (a = 1, scan 1)": False,
+        "B: σ is up to 0.75 [0.68, 0.83] times that with A (a = 1, scan 1)": True,
+        f"B: σ is up to 0.75{MARK} times that with A (a = 1, scan 1)": False,
+    }.items():
+        assert (read_sentence(sentence, {"curves": curves}, names=names).faults == []) is is_right, sentence
+
+
+def test_the_reader_reads_the_share_at_the_end_of_a_phase():
+    rows = [("alarm", 20.0, 0.3), ("alarm", 35.0, 0.5), ("alarm", 45.0, 0.7), ("false alarm", 35.0, 0.1)]
+    delays = pd.DataFrame(rows, columns=["event", "delay_s", "probability"])
+    delays = delays.assign(probability_lo=delays["probability"] - 0.1, probability_hi=delays["probability"] + 0.1)
+    delays = delays.assign(case="one", filter="10 plots", component="x", t_s=100.0, false_alarm_probability=0.01)
+    names = {"filter": {"10 plots": "10 plots"}, "event": EVENTS}
+    tables = {"delays": delays, "curves": pd.DataFrame()}
+    for share, rate, is_right in (
+        ("50 % [40, 60]", 0.01, True),
+        ("30 % [20, 40]", 0.01, False),
+        ("50 % [40, 60]", 0.1, False),
+    ):
+        text = f"alarm by the end of the manoeuvre (40 s), P_FA ≈ {rate}: 10 plots in {share}, in half within 20 s."
+        assert (read_sentence(text, tables, names=names).faults == []) is is_right, text
+    assert read_sentence(
+        "False alarm within the 40 s, P_FA ≈ 0.01: 10 plots in 50 % [40, 60]", tables, names=names
+    ).faults
 
 
 @pytest.mark.parametrize("odd", ODD)

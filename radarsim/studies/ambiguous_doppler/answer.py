@@ -198,13 +198,13 @@ def _weak_point(
     if not ratio.estimate.lo > 1 + compared_value.EQUAL:
         return []
     text = tr(
-        "Weak point of {filter}: the RMS error of the {quantity} is up to {ratio} times that with {order}{chosen} "
-        "({case}, scan {k}).",
+        "Weak point of {filter}: the RMS error of the {quantity} is up to {ratio} times that with {order} "
+        "({case}, scan {k}{chosen}).",
         filter=quote_name(name),
         quantity=next(component.words for component in RADIAL if component.name == worst["component"]),
         ratio=ratio.text(form=".3g"),
         order=quote_name(order["filter"]),
-        chosen=ratio.choice_remark(),
+        chosen=f"; {compared_value.simultaneity_text(looks)}" if ratio.looks > 1 else "",
         case=labels[worst["case"]],
         k=worst["k"],
     )
