@@ -20,6 +20,7 @@ from pathlib import Path
 import radarsim
 from radarsim.api import result_content
 from radarsim.api.doppler_chart import describe_chart
+from radarsim.config.find_files import SHIPPED
 from radarsim.report import caption_remarks
 from radarsim.report.drawing import canvas
 from radarsim.report.drawing.model import Figure
@@ -63,7 +64,7 @@ def figures_of(config: str, results: Path) -> dict[str, Figure]:
     """The figures of a stored result by their name; ConfigError, with the command, where it is not there."""
     if config == CHART:
         return dict(describe_chart([]).figures)
-    result = radarsim.load(config, out=results)
+    result = radarsim.load(SHIPPED / "configs" / f"{config}.yaml", out=results)
     return result_content.case_figures(result.cases, result.tables, result.experiment)
 
 

@@ -39,7 +39,7 @@ def claim_value(stem: str, claim: str, part_name: str, unit: str = " %") -> Call
     """The measured value of one part of a claim."""
 
     def text(results: Results) -> str:
-        row = select_rows(results, stem, "claims", claim=claim, what=part_name).iloc[0]
+        row = select_rows(results, stem, "claims", claim=claim, quantity=part_name).iloc[0]
         exact = row["lo"] == row["hi"]
         number = signed(f"{row['measured']:.3g}") if exact else with_bounds(row["measured"], row["lo"], row["hi"])
         return number + unit
