@@ -67,7 +67,7 @@ IN Polar polar(const v8 *x) {
 IN void begin(const World *w, const v8 *z, v8 *x, v8 *P) {
     v8 half = wrapped(z[1], 2 * M_PI), s, o; /* sine and cosine by the library: once a track */
     for (int i = 0; i < 8; i++) s[i] = sin(half[i]), o[i] = cos(half[i]);
-    int known = 36 * w->start * w->start < w->span * w->span; /* the fold of the first velocity */
+    int known = 100 * w->start * w->start < w->span * w->span; /* the fold of the first velocity */
     double a = w->sigma_r * w->sigma_r, ss = w->start * w->start, vv = known ? w->sigma_v * w->sigma_v : ss;
     v8 v = known ? z[2] : full(0), across = z[0] * w->sigma_b, d = across * across;
     x[0] = z[0] * o, x[1] = z[0] * s, x[2] = v * o, x[3] = v * s;
@@ -98,9 +98,10 @@ IN Law law_of_plot(const World *w, const v8 *x, const v8 *P) {
     S[2] = y.north * c[0][2] + y.east * c[1][2], S[3] = h1[0] * c[0][1] + h1[1] * c[1][1] + w->sigma_b * w->sigma_b;
     S[4] = h1[0] * c[0][2] + h1[1] * c[1][2];
     S[5] = y.along[0] * c[0][2] + y.along[1] * c[1][2] + y.north * c[2][2] + y.east * c[3][2] + w->sigma_v * w->sigma_v;
-    v8 known = full(w->span * w->span / 36), zero = full(0); /* else the fold of the velocity is not known */
+    v8 known = full(w->span * w->span / 100), zero = full(0); /* else the fold of the velocity is not known */
     S[2] = where_greater(known, S[5], S[2], zero), S[4] = where_greater(known, S[5], S[4], zero);
     for (int i = 0; i < N; i++) c[i][2] = where_greater(known, S[5], c[i][2], zero);
+    S[5] = where_greater(full(w->span * w->span / (2 * M_PI)), S[5], S[5], full(w->span * w->span / (2 * M_PI))); /* no wider than an even density */
     I[0] = S[3] * S[5] - S[4] * S[4], I[1] = S[2] * S[4] - S[1] * S[5], I[2] = S[1] * S[4] - S[2] * S[3];
     l.determinant = S[0] * I[0] + S[1] * I[1] + S[2] * I[2];
     v8 inverse = 1.0 / l.determinant;

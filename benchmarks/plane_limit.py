@@ -77,7 +77,7 @@ def measure(library, pool, name: str, in_gate: float, n: int, pairs: int) -> str
     plan = plane.prepare(case)
     groups, (member,) = n // WIDTH, plan.filters
     plots = draw_plots(plan, 0, groups)
-    errors, work = aligned_zeros(groups * SCANS * 4 * WIDTH), aligned_zeros(member.rows * WIDTH)
+    errors, work = aligned_zeros(groups * SCANS * 5 * WIDTH), aligned_zeros(member.rows * WIDTH)
     shapes = {
         "error": (SCANS, 4, 4),
         "paired": (SCANS, 4),
@@ -86,6 +86,7 @@ def measure(library, pool, name: str, in_gate: float, n: int, pairs: int) -> str
         "counts": (SCANS, 3),
     }
     ours, theirs = ({of: np.zeros(shape) for of, shape in shapes.items()} for _ in range(2))
+    ours["both"] = np.zeros((SCANS, 4, 5))  # over the tracks that two filters keep, which a lone filter of C has not
     given = world_of(plan, plots, groups, n)
     world, to = limits.structure(given), limits.structure(theirs)
 
