@@ -5,10 +5,10 @@ import numpy as np
 
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats.records import POSITIONS, Batch
+from radarsim.recordings.formats.site_distance import EARTH_RADIUS_M
 from radarsim.recordings.grouping import rows_by_name
 
 MAX_ROWS, MAX_STEP_S = 3000, 60.0  # rows that are compared, and time from row to row
-METRES_PER_DEGREE = 111_195.0  # of latitude
 MIN_WAY_M = 30.0  # of a step, in an axis, whose direction counts
 MIN_STEPS, MIN_SHARE = 20, 0.9  # of the steps in an axis that are turned
 CAUSES = {  # by the axes that are turned, east and north
@@ -34,10 +34,10 @@ class CourseCheck:
         for name, rows in rows_by_name(batch.track).items():
             t, lat, lon, east, north = (batch.columns[key][rows] for key in names)
             steps_s = np.diff(t)
-            eastward = METRES_PER_DEGREE * np.cos(np.radians(lat[1:])) * np.diff(lon)
+            eastward = EARTH_RADIUS_M * np.cos(np.radians(lat[1:])) * np.radians(np.diff(lon))
             stated = [0.5 * (speed[1:] + speed[:-1]) * steps_s for speed in (east, north)]
             is_used = np.isfinite(stated).all(axis=0) & (steps_s > 0) & (steps_s < MAX_STEP_S) & bool(name)
-            actual = [eastward, METRES_PER_DEGREE * np.diff(lat)]
+            actual = [eastward, EARTH_RADIUS_M * np.radians(np.diff(lat))]
             self.steps.append(np.array([actual, stated])[:, :, is_used])
 
     def notes(self) -> list[str]:

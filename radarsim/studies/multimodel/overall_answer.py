@@ -67,7 +67,8 @@ def ranking_sentences(results: Sequence[CaseResult], ranking: OverallRanking) ->
     first_text = tr(
         "{filter} is best overall: its RMS height error is at most {percent} above the least of a stage "
         "({where}; {together}).",
-        **_worst_stage_fields(results, ranking, best),
+        percent=_excess(results, ranking, best),
+        where=_stage_label(results, best),
         **fields,
     )
     next_text = tr(
@@ -95,19 +96,15 @@ def _undecided_sentences(results: Sequence[CaseResult], ranking: OverallRanking)
         "{best} is best; {together}).",
         filter=quote_name(best["filter"]),
         together=together,
-        **_worst_stage_fields(results, ranking, best),
+        percent=_excess(results, ranking, best),
+        where=_stage_label(results, best),
+        best=quote_name(ranking.best_by_stage.loc[(best["case"], best["stage"])]),
     )
     rows = ranking.worst_stages[ranking.worst_stages["filter"].isin([best["filter"], *ranking.close])]
     return [
         Sentence(undecided_text, sentences.intervals("stages", "sigma", rows)),
         Sentence(first_text, sentences.intervals("stages", "sigma", best)),
     ]
-
-
-def _worst_stage_fields(results: Sequence[CaseResult], ranking: OverallRanking, row: "pd.Series[Any]") -> dict:
-    """How far a filter is above the least in the stage in which it is worst, which stage, and its best filter."""
-    best = quote_name(ranking.best_by_stage.loc[(row["case"], row["stage"])])
-    return {"percent": _excess(results, ranking, row), "where": _stage_label(results, row), "best": best}
 
 
 def _excess(results: Sequence[CaseResult], ranking: OverallRanking, row: "pd.Series[Any]") -> str:
