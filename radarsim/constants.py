@@ -3,8 +3,7 @@
 from typing import Literal
 
 STANDARD_GRAVITY_MPS2 = 9.80665  # ISO 80000-3
-
-
+EARTH_RADIUS_M = 6.371e6  # of a sphere of the earth's volume: distances along it are within 0.6 %
 LIGHT_MPS = 299_792_458.0
 LETTERS_HZ = {  # IEEE Std 521-2019, radar-frequency letter bands: from, to
     "HF": (3e6, 30e6),

@@ -21,7 +21,7 @@ LIBRARIES = (  # most of what commands import
     *("numba", "pandas", "scipy.linalg", "scipy.special", "jinja2", "rich.console", "rich.table"),
     *("pydantic", "yaml", "click"),
 )
-PARTS = ("app", "cli", "kernels", "report", "studies")  # of radarsim
+PARTS = ("api", "cli", "kernels", "report", "studies")  # of radarsim
 APART = ("__main__", "one_file", "one_step", "reproduce")  # no command imports them
 LIMIT_S = 300
 

@@ -167,14 +167,21 @@ ROOMS = {
         "studies.user_filters",
     ),
     "recordings.formats": (
-        *("recordings", "recordings.fit.folded_doppler", "recordings.fit.velocity_faults", "language", "physics"),
+        *(
+            "constants",
+            "recordings",
+            "recordings.fit.folded_doppler",
+            "recordings.fit.velocity_faults",
+            "language",
+            "physics",
+        ),
         "report",
     ),
     "recordings.fit": (
         *("recordings", "config", "language", "report", "studies.error_law", "studies.missed_scans"),
         "studies.recording_interface",
     ),
-    "recordings.registration": ("recordings", "recordings.formats", "language", "report"),
+    "recordings.registration": ("constants", "recordings", "recordings.formats", "language", "report"),
     "recordings.report": (
         *("recordings", "recordings.fit", "config", "language", "report", "report.drawing"),
         *("studies.error_law", "studies.recording_interface"),

@@ -114,7 +114,7 @@ class PlanarStudy(ClutteredStudy):
         b, near, far, across = self.edges(x, halves)  # even in area
         return sqrt(near + (far - near) * even[0]), wrap_angle(b + across * (2 * even[1] - 1)), c.span * (even[2] - 0.5)
 
-    def kept(self, e: Any, u: Any, c: Any) -> Any:
+    def is_on_target(self, e: Any, u: Any, c: Any) -> Any:
         """Whether a track errs by less than LOST; outside the time of false plots, whose window is empty, always."""
         return (u[0] <= 0.0) | ((abs(e[0]) < LOST * c.sigma[0]) & (abs(e[1]) < LOST * c.sigma[1]))
 

@@ -44,7 +44,7 @@ class Trial(NamedTuple):
     worst: float
 
     @property
-    def least(self) -> float:
+    def smaller_gain(self) -> float:
         return self.last if math.isnan(self.worst) else min(self.last, self.worst)
 
 
@@ -110,9 +110,9 @@ def _sentence(study: Study, result: CaseResult[Any], index: int, groups: Sequenc
     fields = {"case": key_labels.plain_case_label(result), "filter": result.spec.members[index].name, "count": count}
     for group in groups:
         trials = {settings: _trial(study, result.spec, index, settings, TRIAL_REALISATIONS) for settings in group}
-        best = max(trials, key=lambda settings: trials[settings].least)
-        trial = _trial(study, result.spec, index, best, count) if trials[best].least > MIN_GAIN else trials[best]
-        if trial.least > MIN_GAIN:
+        best = max(trials, key=lambda settings: trials[settings].smaller_gain)
+        trial = _trial(study, result.spec, index, best, count) if trials[best].smaller_gain > MIN_GAIN else trials[best]
+        if trial.smaller_gain > MIN_GAIN:
             text = tr(
                 "{case}, {filter}: {settings} --out cured helps: {gains} ({count} trials).",
                 settings=" ".join(f"--set {key}={_option_text(value)}" for key, value in best),

@@ -142,7 +142,9 @@ def compile_filter(study: "StepStudy", spec: Any, filter_keys: Any, scene: Scene
     steps = study.kinds[filter_keys.kind]
     numbers = record(steps.design, spec, filter_keys)
     names = "start", "predict", "update", "estimate", "covariance", "counts"
-    of_study = functions_of(type(study), "difference", "kept", "known_columns", "counted", "components", "measured")
+    of_study = functions_of(
+        type(study), "difference", "is_on_target", "known_columns", "counted", "components", "measured"
+    )
     key = functions_of(steps, *names), of_study, study.false_quantities, scene.false, missed, branches(numbers)
     first, following, rows = remembered(key, lambda: trace_filter(study, steps, numbers, scene, missed))
     tested = steps.covariance is not None
@@ -185,7 +187,7 @@ def trace_filter(
         rows = tracing.count_numbers(s)
         if scene.false:
             was_kept = True if begins else trace.rows(kernels_steps.STATE, 0.0, rows) > 0.5
-            is_kept = study.kept(e, tuple(known), c) & was_kept
+            is_kept = study.is_on_target(e, tuple(known), c) & was_kept
             trace.write(kernels_steps.STATE, tracing.where(is_kept, 1.0, 0.0), rows)
             counts, rows = counts & is_kept, rows + 1
             events = traced_step(steps.counts, s, u, c)

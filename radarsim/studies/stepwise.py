@@ -40,7 +40,7 @@ Among false plots a study gives more:
     def false_places(self, spec): …                 # how many places for false plots a scan has; 0: none
     def expected_false_plots(self, x, u, c): …      # their mean number, of Poisson's law
     def false_plot(self, x, u, even, c): …          # one, of numbers `even` from 0 to 1, as many as are measured
-    def kept(self, e, u, c): …                      # whether a track with these errors is still the target's
+    def is_on_target(self, e, u, c): …              # whether a track with these errors is still the target's
 
 and each filter `counts(s, u, c)`, what is counted of a track: 1.0 or 0.0 each. An update then takes, in place of a
 plot, places for plots, each whether there is one (1.0), and its numbers: that of the target first, at missed scans too;
@@ -98,7 +98,7 @@ class StepStudy(OneFile):
     move: Callable[..., Any]
     plot: Callable[..., Any]
 
-    kept: Callable[..., Any]
+    is_on_target: Callable[..., Any]
     expected_false_plots: Callable[..., Any]
     false_plot: Callable[..., Any]
 

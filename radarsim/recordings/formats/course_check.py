@@ -3,9 +3,9 @@ sign."""
 
 import numpy as np
 
+from radarsim.constants import EARTH_RADIUS_M
 from radarsim.language.translate import term, tr
 from radarsim.recordings.formats.records import POSITIONS, Batch
-from radarsim.recordings.formats.site_distance import EARTH_RADIUS_M
 from radarsim.recordings.grouping import rows_by_name
 
 MAX_ROWS, MAX_STEP_S = 3000, 60.0  # rows that are compared, and time from row to row

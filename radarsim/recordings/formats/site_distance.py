@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from radarsim.constants import EARTH_RADIUS_M
 from radarsim.language.translate import term
 from radarsim.recordings.formats.records import POSITIONS, Batch
 from radarsim.recordings.formats.sites import Site
@@ -12,7 +13,6 @@ from radarsim.recordings.formats.table_checks import horizon_m
 from radarsim.recordings.formats.units import degrees_of_minutes
 
 MAX_RADAR_DISTANCE_M = 1e6  # of a target that a radar sees along a straight line: an aircraft at 20 km from a mountain
-EARTH_RADIUS_M = 6.371e6
 MAX_KEPT_ROWS = 2000  # from which the cause is told
 BELOW_HORIZON, MIN_HIDDEN_M = 1.2, 200e3  # horizons, and least distance, from which a target is hidden
 MIN_HIDDEN_SHARE = 0.95  # of the positions

@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from radarsim.constants import EARTH_RADIUS_M
 from radarsim.language.translate import term
 from radarsim.recordings.aircraft_match import range_bearing_offsets
 from radarsim.recordings.formats.records import BIASES
 from radarsim.recordings.grouping import rows_by_name
 
-EARTH_RADIUS_M = 6371e3  # of a sphere: within 0.3 %, as much of what it is used for
 MIN_RELATIVE_SIGMA = 1e-13  # of a range, relative, and of a bearing
 
 
