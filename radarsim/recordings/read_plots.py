@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from radarsim.errors import ConfigError
+from radarsim.recordings import fill_values
 from radarsim.recordings.grouping import rows_by_name
 from radarsim.recordings.row_faults import Faults
 from radarsim.recordings.track_numbers import TrackNumbers
@@ -36,7 +37,7 @@ class Piece(NamedTuple):
 
     The measured columns (n,); the track of each row, None if the file has no tracks; the columns (n,) of the truth,
     `true_…`; the POSITION_COLUMNS that the file has; the requested texts that it has; the counts so far of track
-    numbers used again, and of further plots of a scan that were left out."""
+    numbers used again, of further plots of a scan that were left out, and of velocities that stand for none."""
 
     columns: dict[str, np.ndarray]
     tracks: list[str] | None
@@ -45,6 +46,7 @@ class Piece(NamedTuple):
     texts: dict[str, list[str]]
     reused_numbers: int = 0
     doubles: int = 0
+    fills: int = 0
 
 
 def pieces(
@@ -117,6 +119,7 @@ class _Reader:
         self.text_indices = {name: header.index(name) for name in texts or () if name in header}
         self.last_times: dict[str, float] = {}
         self.track_numbers = TrackNumbers()
+        self.fills = 0
 
     def chunks(self, size: int) -> Iterator[Piece]:
         """The columns, tracks, truth and positions of the rows, `size` rows at a time."""
@@ -144,9 +147,11 @@ class _Reader:
                         tables = [{name: column[retained] for name, column in numbers.items()} for numbers in tables]
                 columns, truth, places = tables
                 row_tracks = None if self.track_index is None else tracks
-                yield Piece(
-                    columns, row_tracks, truth, places, texts, self.track_numbers.reused, self.track_numbers.doubles
-                )
+                if not self.equal_times and not self.any_order and set(fill_values.COLUMNS) <= set(columns):
+                    names = ["1"] * len(columns["t_s"]) if row_tracks is None else row_tracks
+                    self.fills += fill_values.remove_fill_velocities(columns, names)
+                counts = self.track_numbers.reused, self.track_numbers.doubles, self.fills
+                yield Piece(columns, row_tracks, truth, places, texts, *counts)
         if self.faults:
             raise ConfigError(*self.faults.lines())
         if not any_row:

@@ -84,13 +84,13 @@ def track_plots(
     tracker = interface.tracker(case)
     size = tracker.most_rows or read_plots.CHUNK_ROWS
     followers: dict[str | None, TrackFollower] = {}
-    trackless_rows = row_count = reused_numbers = doubles = 0
+    trackless_rows = row_count = reused_numbers = doubles = fills = 0
     with mapping(os.cpu_count() or 1 if threads is None else threads) as mapped:
         choices, any_origin = interface.columns(case.spec), interface.from_any_origin
         for piece in read_plots.pieces(source, choices, size, tracker.several, any_origin):
             if followers and tracker.most_rows:
                 raise ConfigError(f"{source}: must be of at most {size} rows for the study {case.study}")
-            reused_numbers, doubles = piece.reused_numbers, piece.doubles
+            reused_numbers, doubles, fills = piece.reused_numbers, piece.doubles, piece.fills
             track_pieces = [track_piece for track_piece in split_by_track(piece) if track_piece.name != ""]
             trackless_rows += len(piece.columns["t_s"]) - sum(track_piece.rows for track_piece in track_pieces)
             for track_piece in track_pieces:
@@ -105,9 +105,9 @@ def track_plots(
         raise ConfigError(f"{source}: track: must name the track of some rows, all {trackless_rows} are empty")
     results = {name: follower.followed for name, follower in followers.items()}
     if None in results:
-        return results[None]
+        return replace(results[None], fills=fills)
     combined = combine_tracks(case, results, trackless_rows)
-    return replace(combined, reused_numbers=reused_numbers, doubles=doubles)
+    return replace(combined, reused_numbers=reused_numbers, doubles=doubles, fills=fills)
 
 
 def combine_tracks(case: Case, results: Mapping[str | None, TrackingResult], passed_over: int) -> TrackingResult:

@@ -98,6 +98,7 @@ class Fit:
     plain: "Fit | None" = None
     outlier_rows: tuple["OutlierRow", ...] = ()  # the numbers that are probably outliers
     doubles: int = 0  # further plots of a track in a scan, left out
+    fills: int = 0  # velocities that stand for none, left out
 
     @property
     def has_overlap(self) -> bool:
@@ -169,12 +170,13 @@ class CorrelatedLikelihood:
 
 class FileLikelihoods(NamedTuple):
     """The likelihood of a filter over all tracks of a file, and over a sample of its rows; the tracks' names, None
-    where they have none; and how many further plots of a track in a scan are left out."""
+    where they have none; how many further plots of a scan are left out, and velocities that stand for none."""
 
     complete: Likelihood
     rough: Likelihood | None
     track_names: list[str | None]
     doubles: int
+    fills: int
 
 
 def file_likelihoods(
@@ -190,7 +192,7 @@ def file_likelihoods(
         user_filters = [user_filter.name for user_filter in case.user_filters]
         why = ": it is written in Python, and radarsim does not know its keys" if filter_name in user_filters else ""
         raise ConfigError(f"filter: must be one of {', '.join(filter_names)}; got {filter_name}{why}")
-    tracks, doubles = _read_tracks(source, interface.columns(case.spec), interface.from_any_origin)
+    tracks, doubles, fills = _read_tracks(source, interface.columns(case.spec), interface.from_any_origin)
     names = [name for name, columns in tracks.items() if len(columns["t_s"]) >= MIN_TRACK_ROWS]
     long_tracks = [tracks[name] for name in names]
     if not long_tracks:
@@ -211,7 +213,7 @@ def file_likelihoods(
         )
     _refuse_lost_digits(source, case, likelihood, long_tracks)
     rough = interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked)))
-    return FileLikelihoods(likelihood, rough, names, doubles)
+    return FileLikelihoods(likelihood, rough, names, doubles, fills)
 
 
 def _refuse_impossible_motion(
@@ -258,12 +260,12 @@ def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters:
 
 def _read_tracks(
     source: str | os.PathLike, choices: Sequence[Sequence[str]], any_origin: bool
-) -> tuple[dict[str | None, dict[str, np.ndarray]], int]:
+) -> tuple[dict[str | None, dict[str, np.ndarray]], int, int]:
     """The columns (n,) of each track of a file of plots, by its name, without empty rows; and how many further plots of
-    a scan are left out."""
-    pieces_by_track, doubles = dict[str | None, list[dict[str, np.ndarray]]](), 0
+    a scan are left out, and velocities that stand for none."""
+    pieces_by_track, doubles, fills = dict[str | None, list[dict[str, np.ndarray]]](), 0, 0
     for piece in read_plots.pieces(source, choices, any_origin=any_origin):
-        doubles = piece.doubles
+        doubles, fills = piece.doubles, piece.fills
         for rows in split_by_track(piece):
             if rows.name != "":
                 pieces_by_track.setdefault(rows.name, []).append(rows.columns)
@@ -271,7 +273,7 @@ def _read_tracks(
         name: without_empty_rows({key: np.concatenate([piece[key] for piece in pieces]) for key in pieces[0]})
         for name, pieces in pieces_by_track.items()
     }
-    return tracks, doubles
+    return tracks, doubles, fills
 
 
 def fit_plots(
@@ -288,7 +290,7 @@ def fit_plots(
     rows = tuple(
         row._replace(track=likelihoods.track_names[int(row.track)] or row.track) for row in fitted.outlier_rows
     )
-    return replace(fitted, doubles=likelihoods.doubles, outlier_rows=rows)
+    return replace(fitted, doubles=likelihoods.doubles, fills=likelihoods.fills, outlier_rows=rows)
 
 
 def fit_likelihood(

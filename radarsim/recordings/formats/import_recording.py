@@ -18,13 +18,13 @@ from radarsim.language.current import use_language
 from radarsim.language.translate import term, tr
 from radarsim.recordings import target_speed, track_jumps
 from radarsim.recordings.csv_output import column_texts
+from radarsim.recordings.fill_values import FILL_NOTE, remove_fill_velocities
 from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
 from radarsim.recordings.formats.asterix import Asterix
 from radarsim.recordings.formats.clock_steps import may_be_small_step
 from radarsim.recordings.formats.course_check import CourseCheck
 from radarsim.recordings.formats.doppler_check import DopplerCheck
-from radarsim.recordings.formats.fill_values import FILL_NOTE, remove_fill_velocities
 from radarsim.recordings.formats.import_options import Format, Options
 from radarsim.recordings.formats.open_recording import open_recording
 from radarsim.recordings.formats.records import BATCH_ROWS, BIASES, DAY_S, PLOTS, POSITIONS, Batch, Reader, skip_counts
@@ -256,7 +256,7 @@ class _Import:
             columns["bearing_rad"] = (columns["bearing_rad"] - bearing_bias) % (2 * math.pi)
         columns["velocity_mps"] *= -1 if self.options.towards else 1
         columns["span_mps"][columns["span_mps"] <= 0] = np.nan
-        self.note_counts[FILL_NOTE] += remove_fill_velocities(batch)
+        self.note_counts[FILL_NOTE] += remove_fill_velocities(columns, batch.track)
         if (is_invalid := columns["range_m"] <= 0).any():
             self.skipped[term("plots whose range is not above 0")] += int(is_invalid.sum())
             return batch.rows(np.flatnonzero(~is_invalid).tolist())
