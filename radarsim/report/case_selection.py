@@ -16,7 +16,8 @@ from radarsim.report.key_labels import (
     key_symbol,
     plain_case_label,
     swept_description,
-    value_with_unit,
+    swept_title,
+    titled_value,
     without_markup,
 )
 
@@ -84,10 +85,7 @@ def group_by_panel(results: Sequence[CaseResult], max_lines: float = MAX_PANEL_L
     has_several_families = len(group_by_config(results)) > 1
     groups: dict[tuple[str, str, str], list[CaseResult]] = {}
     for result in results:
-        swept_text = ", ".join(
-            f"{key_symbol(result, key)} = {value_with_unit(result, key, value)}"
-            for key, value in result.swept_values[:-1]
-        )
+        swept_text = ", ".join(titled_value(result, key, value) for key, value in result.swept_values[:-1])
         device_name = config_device(result) if has_several_families or not swept_text else ""
         groups.setdefault((config_stem(result), device_name, swept_text), []).append(result)
 
@@ -98,7 +96,7 @@ def group_by_panel(results: Sequence[CaseResult], max_lines: float = MAX_PANEL_L
             titled.append((", ".join(filter(None, title_parts)), members))
         else:
             prefix = [config_device(members[0])] if has_several_families else []
-            titled += [(", ".join([*prefix, swept_description(result) or result.name]), [result]) for result in members]
+            titled += [(", ".join([*prefix, swept_title(result) or result.name]), [result]) for result in members]
     titles_and_stems = [(title, config_stem(members[0])) for title, members in titled]
     return with_distinct_titles(titles_and_stems, [members for _, members in titled])
 

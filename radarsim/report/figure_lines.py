@@ -8,7 +8,7 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.report import tables as common
-from radarsim.report.drawing.model import Line, Mark, Panel, Reference, Style
+from radarsim.report.drawing.model import Line, Panel, Reference, Style
 from radarsim.report.key_labels import (
     config_device,
     escape_dollars,
@@ -65,13 +65,13 @@ def all_filters(results: Sequence[CaseResult]) -> list[str]:
 
 def case_lines(
     members: Sequence[CaseResult], rows: Mapping, component: str, columns: Sequence[str], filters: Sequence[str]
-) -> list[Mark]:
+) -> list[Line]:
     """A line for each filter of each case of a panel: named by the filter if there is one case, else by the swept
     value.
 
     rows by case, filter and component; columns as for `line_from_rows`; filters as of `all_filters`: a filter has the
     same style in all panels of a figure."""
-    marks: list[Mark] = []
+    marks: list[Line] = []
     for i, result in enumerate(members):
         for f in result.axes.filters:
             case_rows = rows.get((result.name, f, component))

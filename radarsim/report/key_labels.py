@@ -21,7 +21,7 @@ POWERS = ("manoeuvre_variance",)  # swept keys written as powers of ten
 
 
 def format_value(value: object, powers: bool = False) -> str:
-    """A number for people: 0.001 as 10⁻³ (with powers, 0.1 as 10⁻¹), others at four digits; text unchanged. Numbers of
+    """A number for people at four digits, 10⁵ and 10⁻⁵ as such (with powers, 0.1 as 10⁻¹); text unchanged. Numbers of
     a list one after the other."""
     if isinstance(value, list | tuple) and all(isinstance(item, int | float) for item in value):
         return wording.list_numbers(map(format_value, value))
@@ -31,7 +31,7 @@ def format_value(value: object, powers: bool = False) -> str:
     if (
         value != 0
         and float(f"1e{power}") == value
-        and (power >= (2 if powers else LONG) or power < (0 if powers else -1))
+        and (power >= (2 if powers else LONG) or power < (0 if powers else 1 - LONG))
     ):
         return power_of_ten(power)
     return wording.number(value, 6 if NEAR_ONE < value < 1 else 4)
@@ -76,6 +76,18 @@ def swept_description(result: CaseResult, without: Iterable[str] = ()) -> str:
     """The swept keys of a case in short, but for some: "D_M = 10⁻³", "σ_V = 5 m/s"."""
     pairs = [(key, value) for key, value in result.swept_values if key not in set(without)]
     return ", ".join(f"{key_symbol(result, key)} = {value_with_unit(result, key, value)}" for key, value in pairs)
+
+
+def swept_title(result: CaseResult, without: Iterable[str] = ()) -> str:
+    """The swept keys of a case as the title of a panel: names alone, numbers with their symbol, but for some keys."""
+    pairs = [(key, value) for key, value in result.swept_values if key not in set(without)]
+    return ", ".join(titled_value(result, key, value) for key, value in pairs)
+
+
+def titled_value(result: CaseResult, key: str, value: object) -> str:
+    """A value of a key in a title: "turn", "σ_V = 5 m/s"."""
+    text = value_with_unit(result, key, value)
+    return text if isinstance(value, str | Mapping) else f"{key_symbol(result, key)} = {text}"
 
 
 def shared_keys(results: Sequence[CaseResult]) -> set[str]:

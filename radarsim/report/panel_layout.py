@@ -33,6 +33,7 @@ from radarsim.report.key_labels import (
 WIDE_MM = 120.0  # one panel of many lines
 RARE_LOSS = 0.1  # of a share's loss: below it the loss is drawn logarithmically
 LOG_RATIO = 20  # ratio of values from which an axis is logarithmic
+PANEL_RATIO = 5.0  # of the largest values of panels side by side, from which their shared axis is logarithmic
 FLAT_RATIO = 2.0  # ratio of values up to which an axis begins near them: from zero they would fill less than half of it
 NEAR_ZERO = 1e-5  # of the largest σ: below it a logarithmic axis would show rounding
 WIDEST_BAND, LOG_MARGIN, MARGIN = 2.0, 1.12, 0.05  # of a shared axis: how far bands count, and room at its ends
@@ -69,7 +70,7 @@ def count_axis(label: str, highest: float) -> Axis:
 def fitting_axis(label: str, marks: Sequence[Mark]) -> Axis:
     """An axis of positive values: from zero, or near them if they would fill less than half of it; logarithmic where
     the least would otherwise lie on zero."""
-    values = np.concatenate([np.asarray(mark.y, float) for mark in marks if isinstance(mark, Line)] or [np.ones(1)])
+    values = _columns_y([mark for mark in marks if isinstance(mark, Line)])
     values = values[np.isfinite(values)]
     if values.size and 0 < values.max() < FLAT_RATIO * values.min():
         return Axis(label)
@@ -118,7 +119,7 @@ def share_y_axis(panels: Sequence[Panel]) -> list[Panel]:
         return list(panels)
     limited = [panel.y for panel in filled if None not in panel.y.limits]
     logarithmic = [panel.y for panel in filled if panel.y.scale == "log"]
-    fitted = fitting_axis(filled[0].y.label, lines)
+    fitted = _shared_fitting_axis(filled)
     is_fitted = any(panel.y.limits == (0, None) for panel in filled) or all(map(_has_fitting_axis, filled))
     y = (limited or logarithmic or [fitted if is_fitted else filled[0].y])[0]
     if y.scale == fitted.scale == "log" and y.limits == (None, None):
@@ -126,6 +127,24 @@ def share_y_axis(panels: Sequence[Panel]) -> list[Panel]:
     if not limited:
         y = replace(y, limits=holding(lines, y))
     return [replace(panel, y=y) for panel in panels]
+
+
+def _shared_fitting_axis(panels: Sequence[Panel]) -> Axis:
+    """The fitting axis of all panels; logarithmic where some panel's lines would all lie near zero."""
+    lines = [[mark for mark in panel.marks if isinstance(mark, Line)] for panel in panels]
+    fitted = fitting_axis(panels[0].y.label, [line for panel_lines in lines for line in panel_lines])
+    values = [column[np.isfinite(column)] for column in (_columns_y(panel_lines) for panel_lines in lines)]
+    known = [column for column in values if column.size]
+    highest = [float(column.max()) for column in known]
+    is_positive = all(float(column.min()) > 0 for column in known)
+    if is_positive and highest and fitted.scale == "linear" and max(highest) > PANEL_RATIO * min(highest):
+        return Axis(fitted.label, "log")
+    return fitted
+
+
+def _columns_y(lines: Sequence[Line]) -> np.ndarray:
+    """The values of all lines one after the other."""
+    return np.concatenate([np.zeros(0), *(np.asarray(line.y, float) for line in lines)])
 
 
 def _has_fitting_axis(panel: Panel) -> bool:

@@ -8,8 +8,9 @@ import numpy as np
 
 from radarsim.engine.results import CaseResult
 from radarsim.language.translate import tr
-from radarsim.report import case_selection, key_labels, panel_layout
-from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
+from radarsim.report import case_selection, key_labels, panel_layout, row_panels
+from radarsim.report.drawing.model import MAX_PANEL_LINES, PAGE_MM, Axis, Figure, Heat, Line, Panel, Style
+from radarsim.report.figure_lines import all_filters
 
 WIDE = 20  # ratio of swept values from which the axis is logarithmic
 VALUES = ("m", "rad")  # units of what is measured itself, not of its rates
@@ -90,11 +91,12 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
     def title_of(result: CaseResult) -> str:
         return key_labels.config_device(result) if has_several_configs else ""
 
+    draw_panel = _row_panel if _has_many_points(key, members) else _line_panel
     panels_drawn = [
         panel
         for group in groups
         for component in swept_components(group[0])[: 1 if has_several_configs else None]
-        if (panel := _line_panel(key, group, component, curves, title_of(group[0]))).marks
+        if (panel := draw_panel(key, group, component, curves, title_of(group[0]))).marks
     ]
     if not panels_drawn:
         return None
@@ -104,6 +106,8 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
         realisations=case_selection.realisations_text(members),
     )
     title = tr("σ versus {key}", key=key_labels.key_label(members[0], key).text)
+    if draw_panel is _row_panel:
+        return row_panels.row_figure(name, title, caption, panels_drawn)
     figure = panel_layout.arrange_columns(Figure(name, title, caption, tuple(panels_drawn)))
     if len(panels_drawn[0].x.ticks) > FEW_NAMES:
         figure = replace(figure, columns=min(2, len(panels_drawn)))
@@ -118,13 +122,12 @@ def _line_panel(
     key: str, members: Sequence[CaseResult], component: tuple[str, str], curves: Mapping, title: str = ""
 ) -> Panel:
     """Lines over numbers; over anything else points, ordered by the leading σ of the first filter."""
-    filters = list(dict.fromkeys(f for result in members for f in result.axes.filters))
+    filters = all_filters(members)
     factor, unit = key_labels.degrees_factor_and_unit(component[1])
-    x, axis = axis_positions(members[0], key, [dict(result.swept_values)[key] for result in members])
+    x, axis = _key_positions(key, members)
     if axis.ticks:
-        leading = members[0].axes.components[0][0]
-        members = sorted(members, key=lambda result: final_sigma(result, filters[0], leading, curves)[0])
-        _, axis = axis_positions(members[0], key, [dict(result.swept_values)[key] for result in members])
+        members = _in_order_of_sigma(members, curves)
+        _, axis = _key_positions(key, members)
     order = np.argsort(x)
     marks = []
     for i, f in enumerate(filters):
@@ -136,14 +139,47 @@ def _line_panel(
             marks.append(
                 Line(positions, sigma[:, 0], key_labels.escape_dollars(f), style, sigma[:, 1], sigma[:, 2], exact)
             )
-    label = tr("$\\sigma$ of {symbol} at the end", symbol=key_labels.component_symbol(component[0]))
     return Panel(
-        axis,
-        panel_layout.fitting_axis(key_labels.label_with_unit(label, unit), marks),
-        tuple(marks),
-        title,
-        direct=False,
+        axis, panel_layout.fitting_axis(_end_label(component[0], unit), marks), tuple(marks), title, direct=False
     )
+
+
+def _key_positions(key: str, members: Sequence[CaseResult]) -> tuple[np.ndarray, Axis]:
+    """Places of the cases on the axis of a key."""
+    return axis_positions(members[0], key, [dict(result.swept_values)[key] for result in members])
+
+
+def _in_order_of_sigma(members: Sequence[CaseResult], curves: Mapping) -> list[CaseResult]:
+    """The cases by the σ of their first filter in the leading component."""
+    first_filter, leading = all_filters(members)[0], members[0].axes.components[0][0]
+    return sorted(members, key=lambda result: final_sigma(result, first_filter, leading, curves)[0])
+
+
+def _end_label(component: str, unit: str) -> str:
+    """The label of an axis of σ at the last scan."""
+    label = tr("$\\sigma$ of {symbol} at the end", symbol=key_labels.component_symbol(component))
+    return key_labels.label_with_unit(label, unit)
+
+
+def _has_many_points(key: str, members: Sequence[CaseResult]) -> bool:
+    """Whether a key has names for values, and more filters than colours are told apart by."""
+    return bool(_key_positions(key, members)[1].ticks) and len(all_filters(members)) > MAX_PANEL_LINES
+
+
+def _row_panel(
+    key: str, members: Sequence[CaseResult], component: tuple[str, str], curves: Mapping, title: str = ""
+) -> Panel:
+    """Rows of filters, with a point for each of the values of a key, which are names."""
+    filters, (factor, unit) = all_filters(members), key_labels.degrees_factor_and_unit(component[1])
+    members = _in_order_of_sigma(members, curves)
+    series = []
+    for result, (_, value) in zip(members, _key_positions(key, members)[1].ticks, strict=True):
+        sigma = factor * np.array([final_sigma(result, f, component[0], curves) for f in filters])
+        series.append(row_panels.RowSeries(value.replace("\n", " "), *sigma.T))
+    values = np.concatenate([values_of_case for _, values_of_case, *_ in series])
+    axis = panel_layout.fitting_axis(_end_label(component[0], unit), [Line(values, values)])
+    names = list(map(key_labels.escape_dollars, filters))
+    return row_panels.row_panel(axis, names, series, title, ()) if np.isfinite(values).any() else Panel(axis, axis, ())
 
 
 class SweptGrid:

@@ -33,14 +33,15 @@ from radarsim.report.drawing.model import (
     Reference,
     Style,
 )
-from radarsim.report.figure_lines import GAIN, SIGMA, all_filters, case_lines, line_from_rows
+from radarsim.report.figure_lines import GAIN, SIGMA, all_filters, case_lines, line_from_rows, scale_line
 from radarsim.report.key_labels import (
     case_label,
     config_device,
+    degrees_factor_and_unit,
     escape_dollars,
     label_with_unit,
     sigma_axis_label,
-    swept_description,
+    swept_title,
 )
 from radarsim.report.panel_layout import WIDE_MM, arrange_columns, fitting_axis, keyed_panels, time_axis
 from radarsim.report.quantities import Component
@@ -97,8 +98,9 @@ GUIDE = Style(GREY, 0, width_pt=0.8)
 def _sigma_panels(
     title: str, members: Sequence[CaseResult], curves: Mapping, component: Component, filters: Sequence[str]
 ) -> list[Panel]:
-    marks = case_lines(members, curves, component.name, SIGMA, filters)
-    y = fitting_axis(sigma_axis_label(component.symbol, component.unit), marks)
+    factor, unit = degrees_factor_and_unit(component.unit)
+    marks = [scale_line(line, factor) for line in case_lines(members, curves, component.name, SIGMA, filters)]
+    y = fitting_axis(sigma_axis_label(component.symbol, unit), marks)
     return keyed_panels(Panel(time_axis(), y, tuple(marks), title), members, filters) if marks else []
 
 
@@ -188,7 +190,8 @@ def component_figures(
             figure = draw(name, visible, rows, component) if visible else None
             if figure and any(isinstance(mark, Line) for panel in figure.panels for mark in panel.marks):
                 if kind == "sigma" and len(results) == 1:
-                    figure = with_floor(figure, tables["curves"], component.name)
+                    factor, _ = degrees_factor_and_unit(component.unit)
+                    figure = with_floor(figure, tables["curves"], component.name, factor)
                 figures[name] = replace(figure, caption=figure.caption + remark)
     return figures
 
@@ -224,16 +227,17 @@ def _dynamic_panels(
     result: CaseResult, filter_rows: "Mapping[str, pd.DataFrame]", component: Component
 ) -> tuple[Panel, Panel]:
     """The panels of bias and of spread of a case, a line for each filter."""
+    factor, unit = degrees_factor_and_unit(component.unit)
     biases: list[Mark] = [Reference(0)]
     spreads: list[Mark] = []
     for n, (f, rows) in enumerate(filter_rows.items()):
         t, name, style = rows["t_s"].to_numpy(), escape_dollars(f), Style(n, n, n)
-        bias, half = rows["bias"].to_numpy(), Z95 * rows["bias_se"].to_numpy()
+        bias, half = factor * rows["bias"].to_numpy(), factor * Z95 * rows["bias_se"].to_numpy()
         biases.append(Line(t, bias, name, style, bias - half, bias + half, name=name))
-        spreads.append(Line(t, rows["spread"].to_numpy(), name, style, name=name))
-    title = swept_description(result) or config_device(result)
-    bias_axis = Axis(label_with_unit(tr("bias of {symbol}", symbol=component.symbol), component.unit))
-    label = label_with_unit(tr("standard deviation of {symbol}", symbol=component.symbol), component.unit)
+        spreads.append(Line(t, factor * rows["spread"].to_numpy(), name, style, name=name))
+    title = swept_title(result) or config_device(result)
+    bias_axis = Axis(label_with_unit(tr("bias of {symbol}", symbol=component.symbol), unit))
+    label = label_with_unit(tr("standard deviation of {symbol}", symbol=component.symbol), unit)
     return (
         Panel(time_axis(), bias_axis, tuple(biases), title),
         Panel(time_axis(), fitting_axis(label, spreads), tuple(spreads), title),

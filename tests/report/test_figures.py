@@ -165,14 +165,19 @@ def test_panels_side_by_side_share_an_axis_that_shows_no_rounding():
     assert low > 1e-5
 
 
-def test_flat_curves_of_different_sizes_share_an_axis_from_zero():
-    panels = [Panel(Axis("x"), panel_layout.fitting_axis("σ", [curve]), (curve,)) for curve in FLAT]
-    low, high = panel_layout.share_y_axis(panels)[0].y.limits
-    assert low == 0
-    assert high > 15
+def shared_axis(*curves_drawn):
+    panels = [Panel(Axis("x"), panel_layout.fitting_axis("σ", [curve]), (curve,)) for curve in curves_drawn]
+    return panel_layout.share_y_axis(panels)[0].y
 
 
-FLAT = curve_of([15, 16]), curve_of([1, 1.1])
+def test_flat_curves_of_different_sizes_share_an_axis_on_which_none_lies_near_zero():
+    near = shared_axis(curve_of([4, 4.2]), curve_of([1, 1.1]))
+    assert (near.scale, near.limits[0]) == ("linear", 0)
+    assert near.limits[1] > 4.2
+    assert shared_axis(curve_of([15, 16]), curve_of([1, 1.1])).scale == "log"
+    assert shared_axis(curve_of([15, 16]), curve_of([0, 1.1])).scale == "linear"
+
+
 DIPPED = curve_of([20, 0.5, 10]), curve_of([20, 1e-8, 0.5])
 
 
@@ -560,7 +565,7 @@ def test_numbers_for_people():
     assert [key_labels.format_value(v, powers=True) for v in (1e-3, 0.1, 1, 250.0)] == ["10⁻³", "10⁻¹", "1", "250"]
     assert [
         key_labels.format_value(v) for v in (1e-3, 0.1, 1, 100, 1000.0, 1e5, 250.0, 0.00025, -2.5, "fly_by", True)
-    ] == [*("10⁻³", "0.1", "1", "100", "1000", "10⁵", "250", "0.00025", "−2.5", "fly by", "True")]
+    ] == [*("0.001", "0.1", "1", "100", "1000", "10⁵", "250", "0.00025", "−2.5", "fly by", "True")]
 
 
 def test_angles_given_in_radians_are_shown_in_degrees():

@@ -12,7 +12,7 @@ from radarsim.language.current import use_language
 from radarsim.papers.claim_rows import measured_words
 from radarsim.report import case_selection, figure_lines, gain_maps, key_labels, math_text, sweep_figures, tables
 from radarsim.report.drawing import canvas, legend_placement
-from radarsim.report.drawing.model import Line
+from radarsim.report.drawing.model import MAX_PANEL_LINES, Line
 from radarsim.report.quantities import Component
 
 
@@ -86,10 +86,23 @@ def test_gains_over_two_keys_are_maps_with_their_intervals_and_sentences():
     ],
 )
 def test_every_study_of_tracks_draws_its_sweeps(config, overrides, name):
-    _, drawn = swept(config, *overrides, n=16)
-    marks = [mark for panel in drawn[name].panels for mark in panel.marks]
-    assert all(len(mark.x) == 2 for mark in marks)
-    assert {mark.name for mark in marks} >= {marks[0].name}
+    result, drawn = swept(config, *overrides, n=16)
+    filters = result.cases[0].axes.filters
+    for panel in drawn[name].panels:
+        named = [mark for mark in panel.marks if mark.label]
+        assert sum(len(mark.x) * len(mark.label.split(" = ")) for mark in named) == 2 * len(filters)
+        assert all(np.isfinite([mark.x, mark.y]).all() for mark in named)
+
+
+def test_many_filters_over_names_have_a_row_each():
+    _, drawn = swept("sonar_smoothing", "sweep.target=[sonar_straight,sonar_fluctuating]", "scans=8", n=16)
+    figure = drawn["sweep_target"]
+    rows = [text for _, text in figure.panels[0].y.ticks]
+    assert len(rows) > MAX_PANEL_LINES
+    assert figure.share_y
+    for panel in figure.panels:
+        assert panel.y.limits[0] > panel.y.limits[1]  # from the top down
+        assert {mark.label for mark in panel.marks if mark.label} == {"sonar straight", "sonar fluctuating"}
 
 
 @pytest.mark.slow

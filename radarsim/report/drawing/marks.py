@@ -108,7 +108,8 @@ def _draw_line(axes: Axes, line: Line, crosses: str) -> None:
         if line.style.dash is None:
             axes.vlines(line.x, line.lo, line.hi, color=colour, linewidth=0.8, zorder=2.8)
         else:
-            axes.fill_between(line.x, line.lo, line.hi, color=colour, alpha=0.25, linewidth=0, zorder=2)
+            if line.has_band:
+                axes.fill_between(line.x, line.lo, line.hi, color=colour, alpha=0.25, linewidth=0, zorder=2)
             axes.vlines(line.x[lone], line.lo[lone], line.hi[lone], color=colour, linewidth=0.8)
     if line.exact is not None:
         stride = marker_stride(line)

@@ -47,7 +47,7 @@ class Line:
 
     The label is written at the line's end where labels fit, else in a legend. dash None draws markers without a line
     (scatter), with whiskers for lo … hi. name identifies the line where the label leaves that to keys or to another
-    panel."""
+    panel. has_band: whether lo … hi is drawn as a band; a page shows it in any case."""
 
     x: np.ndarray
     y: np.ndarray
@@ -57,6 +57,7 @@ class Line:
     hi: np.ndarray | None = None
     exact: np.ndarray | None = None
     name: str = ""
+    has_band: bool = True
 
 
 @dataclass(frozen=True)

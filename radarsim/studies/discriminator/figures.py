@@ -169,20 +169,31 @@ def accuracy(result: CaseResult, tables_by_name: Mapping) -> Figure:
             ratios = component_rows.assign(
                 **{name: component_rows[name] / component_rows["posterior_crb"] for name in figure_lines.SIGMA[1:4]}
             )
-            marks.append(
-                figure_lines.line_from_rows(ratios, figure_lines.SIGMA[:4], NAMES[component], Style(n, n % 4, n))
-            )
+            line = figure_lines.line_from_rows(ratios, figure_lines.SIGMA[:4], NAMES[component], Style(n, n % 4, n))
+            marks.append(replace(line, has_band=False))
         if len(marks) > 1:
+            marks.append(_interval_about_one(marks[1:]))
             axis = Axis(tr("$\\sigma$ / bound"), limits=(0.9, 1.3))
             panels.append(Panel(Axis(tr(WINDOW_LABEL), "log"), axis, tuple(marks), name, direct=False))
     caption = tr(
         "Root-mean-square error of the locked bursts divided by the Cramér–Rao bound of the window (prior included), "
-        "from {count:,} bursts.",
+        "from {count:,} bursts. Grey: the 95 % interval of a value of one.",
         count=result.count,
     )
     columns = min(3, max(1, len(panels)))
     figure = Figure("accuracy", tr("Accuracy of the locked bursts"), caption, tuple(panels), columns, PAGE_MM, 52.0)
     return figure
+
+
+def _interval_about_one(lines: Sequence[Line]) -> Line:
+    """The widest interval of the lines at each window, as if their value was one."""
+    windows = np.unique(np.concatenate([line.x for line in lines]))
+    lo, hi = np.full((2, len(windows)), np.nan)
+    for line in lines:
+        places = np.searchsorted(windows, line.x)
+        lo[places] = np.fmin(lo[places], np.asarray(line.lo) / line.y)
+        hi[places] = np.fmax(hi[places], np.asarray(line.hi) / line.y)
+    return Line(windows, np.ones(len(windows)), "", Style(GREY, 2, width_pt=0.7), lo, hi)
 
 
 def lock_against(name: str, key: str, members: Sequence[CaseResult], tables_by_name: Mapping) -> Figure:

@@ -13,7 +13,7 @@ from radarsim.config.experiment import Experiment
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import term, tr
-from radarsim.report import caption_remarks, case_selection, figure_lines, key_labels, panel_layout, tables
+from radarsim.report import caption_remarks, case_selection, figure_lines, key_labels, panel_layout, row_panels, tables
 from radarsim.report.drawing.model import (
     MAX_PANEL_LINES,
     PAGE_MM,
@@ -49,7 +49,6 @@ RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
 POINT_SIZES_PT = (7.0, 5.8, 4.6, 3.4)  # of points that may coincide, each drawn on those before it
 SAME_FLIGHT = 1e-3  # of its extent: a difference that is less than the width of a line
-STAGE_SPREAD = 0.5  # width over which a stage's points are spread; stages are one apart
 MAX_LOOKS = 8  # filters with distinct colours, dashes and markers
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
 
@@ -128,14 +127,7 @@ def _title(result: CaseResult, results: Sequence[CaseResult]) -> str:
         return ""
     if len(case_selection.group_by_config(results)) > 1:
         return key_labels.case_label(result).replace("_", " ")
-    return ", ".join(_value(result, key, value) for key, value in result.swept_values)
-
-
-def _value(result: CaseResult, key: str, value: object) -> str:
-    """A swept value in words: a number with its symbol and unit, a choice by its name."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return f"{key_labels.key_symbol(result, key)} = {key_labels.value_with_unit(result, key, value)}"
-    return key_labels.value_with_unit(result, key, value)
+    return key_labels.swept_title(result)
 
 
 def trajectory(results: Sequence["CaseResult[FlightAxes]"]) -> Figure | None:
@@ -421,35 +413,24 @@ def _without_labels(lines: Sequence) -> list:
 
 
 def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure | None:
-    """NEES and NIS per degree of freedom by stage of the first case shown, a line of points for each filter."""
+    """NEES and NIS per degree of freedom of the first case shown: a row for each filter, a point for each stage."""
     if not results:
         return None
     result = results[0]
-    rows = tables.group_by(table[table["case"] == result.name], "filter")
+    rows, filters = table[table["case"] == result.name], result.axes.filters
+    names = list(map(key_labels.escape_dollars, filters))
+    x = Axis(tr("mean per degree of freedom"), "log")
     consistency_panels = []
     for key, title in (("nees", tr("NEES of the position")), ("nis", tr("NIS of the plot"))):
-        marks: list = [Reference(1.0)]
-        stages: tuple = ()
-        for n, (f, style) in enumerate(zip(result.axes.filters, _styles(result), strict=True)):
-            filter_rows = rows[(f,)]
-            stages = tuple(tr(str(stage)) for stage in filter_rows["stage"])
-            x = np.arange(len(filter_rows)) + STAGE_SPREAD / len(result.axes.filters) * (
-                n - (len(result.axes.filters) - 1) / 2
-            )
-            columns = ("x", key, f"{key}_lo", f"{key}_hi")
-            marks.append(
-                figure_lines.line_from_rows(
-                    filter_rows.assign(x=x), columns, key_labels.escape_dollars(f), replace(style, dash=None)
-                )
-            )
-        axis = Axis(tr("stage"), ticks=tuple(enumerate(stages)))
-        consistency_panels.append(
-            Panel(axis, Axis(tr("mean per degree of freedom"), "log"), tuple(marks), title, direct=False)
-        )
-    consistency_panels = _with_legend(consistency_panels, result, dash=None)
+        series = []
+        for stage, stage_rows in rows.groupby("stage", sort=False):
+            by_filter = stage_rows.set_index("filter").reindex(filters)
+            columns = (by_filter[column].to_numpy(float) for column in (key, f"{key}_lo", f"{key}_hi"))
+            series.append(row_panels.RowSeries(tr(str(stage)), *columns))
+        consistency_panels.append(row_panels.row_panel(x, names, series, title, [Reference(1.0, "x")]))
     caption = tr(
         "Normalised squared errors per degree of freedom, by stage: 1 if the filter's own covariance is correct, more "
         "if it is optimistic.{of_case}",
         of_case=_case_sentence(result, results),
     )
-    return _figure_of_panels("consistency", tr("Consistency of the filters"), caption, consistency_panels, 66)
+    return row_panels.row_figure("consistency", tr("Consistency of the filters"), caption, consistency_panels)

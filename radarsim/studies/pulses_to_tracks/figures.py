@@ -48,7 +48,7 @@ def _figure(name: str, title: str, caption: str, figure_panels: list[Panel]) -> 
 
 
 def _title(result: Result) -> str:
-    return key_labels.swept_description(result) or key_labels.config_device(result)
+    return key_labels.swept_title(result) or key_labels.config_device(result)
 
 
 def threshold_figure(results: Sequence[Result], tables_by_name: "Mapping[str, pd.DataFrame]") -> dict[str, Figure]:

@@ -47,7 +47,7 @@ def sigma_figure(
         if marks:
             y = panel_layout.fitting_axis(key_labels.sigma_axis_label(component.symbol, unit), marks)
             marks_of_panel: tuple[Mark, ...] = (*manoeuvre_lines(result), *marks)
-            title = key_labels.swept_description(result, without=shared)
+            title = key_labels.swept_title(result, without=shared)
             figure_panels.append(Panel(panel_layout.time_axis(), y, marks_of_panel, title, direct=False))
     if not figure_panels:
         return None

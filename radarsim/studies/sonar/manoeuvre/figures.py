@@ -9,8 +9,8 @@ import numpy as np
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import numeral
 from radarsim.language.translate import term, tr
-from radarsim.report import case_selection, figure_lines, key_labels, panel_layout, tables
-from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Mark, Panel, Reference, Style
+from radarsim.report import case_selection, figure_lines, key_labels, panel_layout, row_panels, tables
+from radarsim.report.drawing.model import COLUMN_MM, PAGE_MM, Axis, Figure, Line, Panel, Reference, Style
 from radarsim.studies.sonar.manoeuvre import detection_laws
 from radarsim.studies.sonar.manoeuvre.axes import ManoeuvreAxes
 from radarsim.studies.sonar.sigma_figure import case_lines, manoeuvre_lines
@@ -221,25 +221,27 @@ def modes_figure(results: Results, modes: "pd.DataFrame") -> Figure | None:
 
 
 def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
-    """Measured over believed σ of the quantities derived from a track, a panel for each time."""
+    """Measured over believed σ of the quantities derived from a track: a panel for each, a row for each filter."""
     result = results[0]
-    rows, names = uses[uses["case"] == result.name], list(SYMBOLS)
-    ticks = tuple((float(i), tr(label)) for i, label in enumerate(SYMBOLS.values()))
+    rows = uses[uses["case"] == result.name]
+    filters = [f for f in result.axes.filters if f in set(rows["filter"])]
+    low, high = panel_layout.holding(
+        [figure_lines.line_from_rows(rows, ("ratio", "ratio", "ratio_lo", "ratio_hi"), "", 0)], Axis("", "log")
+    )
+    ticks = tuple((float(value), numeral(f"{value:g}")) for value in RATIOS if low <= value <= high or value == 1)
+    x = Axis(tr("measured / computed $\\sigma$"), "log", (low, high), ticks)
     figure_panels = []
-    for t_s, at_time in rows.groupby("t_s", sort=True):
-        marks: list[Mark] = [Reference(1.0, label="")]
-        for n, (f, filter_rows) in enumerate(at_time.groupby("filter", sort=False)):
-            x = np.array([names.index(name) for name in filter_rows["component"]]) + 0.08 * (
-                n - len(result.axes.filters) / 2
-            )
-            columns = ("x", "ratio", "ratio_lo", "ratio_hi")
-            marks.append(figure_lines.line_from_rows(filter_rows.assign(x=x), columns, str(f), Style(n, None, n)))
-        low, high = at_time["ratio"].min(), at_time["ratio"].max()
-        ratio_ticks = tuple(
-            (float(value), numeral(f"{value:g}")) for value in RATIOS if low <= value <= high or value == 1
-        )
-        y = Axis(tr("measured / computed $\\sigma$"), "log", ticks=ratio_ticks)
-        figure_panels.append(Panel(Axis("", ticks=ticks), y, tuple(marks), tr("t = {t_s:g} s", t_s=t_s), direct=False))
+    for name, title in SYMBOLS.items():
+        if not len(of_quantity := rows[rows["component"] == name]):
+            continue
+        series = [
+            _use_series(at_time.set_index("filter").reindex(filters), tr("t = {t_s:g} s", t_s=t_s))
+            for t_s, at_time in of_quantity.groupby("t_s", sort=True)
+        ]
+        names = list(map(key_labels.escape_dollars, filters))
+        figure_panels.append(row_panels.row_panel(x, names, series, tr(title), [Reference(1.0, "x")]))
+    if not figure_panels:
+        return None
     case = f" ({key_labels.without_markup(_swept_values(result))})" if result.swept_values else ""
     caption = (
         tr(
@@ -249,7 +251,13 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
             count=result.count,
         )
     ) + case_selection.cases_left_out_remark(results, results[:1])
-    return _figure_of_panels("uses", tr("Quantities derived from a track"), caption, figure_panels, 2)
+    return row_panels.row_figure("uses", tr("Quantities derived from a track"), caption, figure_panels)
+
+
+def _use_series(rows: "pd.DataFrame", name: str) -> row_panels.RowSeries:
+    """The ratios of a quantity at a time, one for each filter."""
+    columns = (rows[column].to_numpy(float) for column in ("ratio", "ratio_lo", "ratio_hi"))
+    return row_panels.RowSeries(name, *columns)
 
 
 def _swept_values(result: CaseResult[ManoeuvreAxes]) -> str:
