@@ -2,7 +2,8 @@
 
 A unit or a zero that changes within a recording makes the one, two sensors under one name the other. Single wild rows
 are neither: the rows before and after a jump must say it in the median. A jump is larger than any target moves, or it
-changes the range by the factor of a unit; both are judged by the scatter of the same track."""
+changes the range by the factor of a unit, or the track goes on after it as before, as no manoeuvre between two plots
+lets it; all are judged by the scatter of the same track."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -23,6 +24,11 @@ MIN_LASTING_SHARE = 0.5  # of a jump, by which the rows after it differ from tho
 MAX_TURN_SHARE = 0.2  # of the way on both sides, by which a turn may bend it
 UNIT_FACTORS = np.log([1000.0, 1852.0, 1.852, 1 / 0.3048, 1000 / 0.3048, 1852 / 0.3048, 1000 / 0.9144])
 UNIT_TOLERANCE = 0.02  # of the ratio of the ranges before and after a jump
+MAX_SHIFT_MPS2 = 40.0  # of a target that turns aside and back between two plots: 4 g
+MIN_SHIFT_M, MIN_SHIFT_SCATTER = 500.0, 8.0  # of a shift; in median distances from straight courses beside it: over 5 σ
+MIN_OFFSET_SCATTER = 3.0  # of the step at a shift from those beside it, in its median over the track
+MAX_SHIFT_CHANGE = 0.5  # of the shift, by which a change of the velocity may move the rows beside it
+MAX_SHIFTS = 3  # of a track: cells of a coarse measurement change oftener
 MIN_ALTERNATING_ROWS, MIN_ALTERNATING_SHARE = 20, 0.9  # of a track
 MAX_ALTERNATING_RATIO = 0.5  # of the distances from the last row but one and from the last
 
@@ -64,10 +70,20 @@ class CourseFault(NamedTuple):
 
 def find_jumps(name: str, track: TrackPositions) -> list[Jump]:
     """The jumps of a track that last; none where its times do not rise."""
+    if len(track.t_s) < MIN_ROWS or not (np.diff(track.t_s) > 0).all():
+        return []
+    leaps = _leaps(track)
+    shifts = [i for i in _shifts(track) if all(abs(i - leap) >= SIDE_ROWS for leap in leaps)]
+    return [
+        Jump(name, float(track.t_s[i + 1]), *np.linalg.norm(track.positions[i : i + 2], axis=1).tolist())
+        for i in sorted(leaps + shifts)
+    ]
+
+
+def _leaps(track: TrackPositions) -> list[int]:
+    """The rows before jumps that are larger than any target moves, or by the factor of a unit."""
     t, positions = track
     steps = np.diff(t)
-    if len(t) < MIN_ROWS or not (steps > 0).all():
-        return []
     legs = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     speed_mps = float(np.median(legs / steps))
     scatter = MIN_LASTING_SCATTER * float(np.median(np.abs(np.diff(legs))))
@@ -76,10 +92,50 @@ def find_jumps(name: str, track: TrackPositions) -> list[Jump]:
         is_large & (legs > MIN_JUMP_LEGS * np.median(legs)) & (steps < MAX_JUMP_STEPS * np.median(steps))
     )
     return [
-        Jump(name, float(t[i + 1]), *np.linalg.norm(positions[i : i + 2], axis=1).tolist())
+        i
         for i in rows.tolist()
         if _is_impossible(positions, i, float(legs[i]), float(steps[i])) and _lasts(track, i, float(legs[i]), speed_mps)
     ]
+
+
+def _shifts(track: TrackPositions) -> list[int]:
+    """The rows before jumps after which the track goes on as before: a target that turns aside and back between two
+    plots moves less. A step is compared with the mean of those beside it, which a steady turn does not change."""
+    t, positions = track
+    if len(t) < 2 * MIN_SIDE_ROWS:
+        return []
+    steps, ways = np.diff(t), np.diff(positions, axis=0)
+    velocities = ways / steps[:, None]
+    expected = 0.5 * steps[1:-1, None] * (velocities[:-2] + velocities[2:])
+    offsets = np.pad(np.linalg.norm(ways[1:-1] - expected, axis=1), 1)
+    least = np.maximum(MIN_SHIFT_M, 0.25 * MAX_SHIFT_MPS2 * steps**2)
+    is_far = (offsets > MIN_OFFSET_SCATTER * np.median(offsets)) & (offsets > least)
+    is_far[1:-1] &= (offsets[1:-1] >= offsets[:-2]) & (offsets[1:-1] >= offsets[2:])
+    rows = np.flatnonzero(is_far & (steps < MAX_JUMP_STEPS * np.median(steps))).tolist()
+    shifts = [i for i in rows if _is_shift(track, i, float(least[i]))]
+    return shifts if len(shifts) <= MAX_SHIFTS else []
+
+
+def _is_shift(track: TrackPositions, i: int, least_m: float) -> bool:
+    """Whether the rows after i follow a straight course beside that of the rows up to i, farther than least_m."""
+    middle_s = float(track.t_s[i : i + 2].mean())
+    places, velocities, distances = [], [], []
+    for first, last in ((max(0, i + 1 - SIDE_ROWS), i + 1), (i + 1, i + 1 + SIDE_ROWS)):
+        t, positions = (values[first:last] for values in track)
+        if len(t) < MIN_SIDE_ROWS:
+            return False
+        before, after = np.triu_indices(len(t), k=1)
+        slopes = (positions[after] - positions[before]) / (t[after] - t[before])[:, None]
+        velocities.append(np.median(slopes, axis=0))
+        continued = positions - velocities[-1] * (t - middle_s)[:, None]
+        places.append(np.median(continued, axis=0))
+        distances.append(np.linalg.norm(continued - places[-1], axis=1))
+    shift = float(np.linalg.norm(places[1] - places[0]))
+    beside_s = float(np.ptp(track.t_s[i - MIN_SIDE_ROWS // 2 + 1 : i + MIN_SIDE_ROWS // 2 + 1]))
+    change = float(np.linalg.norm(velocities[1] - velocities[0])) * beside_s
+    scatter = float(np.median(np.concatenate(distances)))
+    is_straight = all((side < MAX_SIDE_WIDTH * shift).mean() >= MIN_SIDE_SHARE for side in distances)
+    return shift > max(least_m, MIN_SHIFT_SCATTER * scatter) and change < MAX_SHIFT_CHANGE * shift and is_straight
 
 
 def _lasts(track: TrackPositions, i: int, leg: float, speed_mps: float) -> bool:

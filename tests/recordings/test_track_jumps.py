@@ -65,3 +65,38 @@ def test_outliers_are_no_jumps(share, size_m):
         r = np.abs(r + is_wild * rng.choice([-size_m, size_m], t.size) * rng.random(t.size)) + 1
         t = t + rng.uniform(0, 3.9, t.size) * (seed % 2)
         assert column_fault({"": [{"t_s": t[is_seen], "range_m": r[is_seen]}]}) is None
+
+
+@pytest.mark.parametrize("kind", ["plain", "sparse", "bearings"])
+@pytest.mark.parametrize("size_m", [-12e3, 2e3, 5e3])
+def test_a_zero_that_changes_is_named_for_all_sizes(kind, size_m):
+    """Far faster than it and far slower, and where bearings tell the place."""
+    for seed in range(10):
+        t, r, _ = course(speed_mps=(-250, -20, 95)[seed % 3], first_m=120e3, seed=seed)
+        if kind == "sparse":
+            t = t + 4.0 * np.arange(N)
+        columns = {"t_s": t, "range_m": r + size_m * (t >= t[N // 2])}
+        if kind == "bearings":
+            columns |= {"bearing_rad": 1.0 + np.random.default_rng(seed).normal(0, 1e-3, N)}
+        fault = column_fault({"": [columns]})
+        assert [jump.t_s for jump in fault.jumps] == [t[N // 2]], seed
+
+
+@pytest.mark.parametrize("kind", ["turn", "passes", "cells"])
+def test_what_a_target_does_is_no_change_of_zero(kind):
+    """A turn of 5 g between plots and over several, a target that passes near, and cells of 300 m."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        t = 10.0 * np.arange(N) + rng.uniform(0, 10)
+        speed, radius = 300.0, 300.0**2 / 50 * rng.uniform(1, 5)
+        angle = np.clip((t - 300) * speed / radius, 0, rng.uniform(0.3, 2 * np.pi))
+        x = 60e3 - speed * np.minimum(t - 300, 0) + radius * np.sin(angle)
+        y = rng.uniform(-30e3, 30e3) - radius * (1 - np.cos(angle))
+        after_s = np.maximum(t - 300 - angle.max() * radius / speed, 0) * speed
+        x, y = x + after_s * np.cos(angle.max()), y - after_s * np.sin(angle.max())
+        if kind == "passes":
+            x, y = 250 * (t - 290), np.full(N, rng.uniform(100, 5000))
+        r = np.hypot(x, y) + rng.normal(0, 60, N)
+        r = 300 * np.round(r / 300) if kind == "cells" else r
+        columns = {"t_s": t, "range_m": r} | ({"bearing_rad": np.arctan2(y, x)} if seed % 2 else {})
+        assert column_fault({"": [columns]}) is None, seed
