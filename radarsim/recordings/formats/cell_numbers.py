@@ -27,17 +27,24 @@ UNIT_CELL_PATTERN = re.compile(r"([-+]?[\d.,]*\d[\d.,]*(?:[eE][-+]?\d+)?)\s*([^\
 SEXAGESIMAL_PATTERN = re.compile(  # 52°18'30.5", 52° 18.5', 52 18 30
     r"([-+]?\d{1,3})\s*[°º:d\s]\s*(\d{1,2}(?:[.,]\d+)?)\s*(?:['′’:m\s]\s*(?:(\d{1,2}(?:[.,]\d+)?)\s*(?:[\"″”s]|'')?)?)?"
 )
-HEMISPHERES = {  # by quantity: those whose coordinates are negative last
-    "latitude_deg": (("n", "north", "nord", "с", "с.ш", "сш"), ("s", "south", "süd", "ю", "ю.ш", "юш")),
-    "longitude_deg": (("e", "east", "ost", "в", "в.д", "вд"), ("w", "west", "з", "з.д", "зд")),
+HEMISPHERES = {  # by quantity: those whose coordinates are negative last; in the languages of the names of columns
+    "latitude_deg": (
+        ("n", "north", "nord", "norte", "с", "с.ш", "сш", "北"),
+        ("s", "south", "süd", "sued", "sud", "sur", "sul", "ю", "ю.ш", "юш", "南"),
+    ),
+    "longitude_deg": (
+        ("e", "east", "ost", "est", "este", "leste", "в", "в.д", "вд", "东", "東"),
+        ("w", "west", "ouest", "oeste", "ovest", "з", "з.д", "зд", "西"),
+    ),
 }
+EAST_OR_WEST = "o"  # of Ost, ouest, oeste, ovest
 
 
 class CellNumbers:
-    """Read the numbers of a table; decimal_comma: whether its cells may have one."""
+    """Read the numbers of a table; decimal_comma: whether its cells may have one; o_sign: of longitudes with an O."""
 
-    def __init__(self, decimal_comma: bool):
-        self.decimal_comma = decimal_comma
+    def __init__(self, decimal_comma: bool, o_sign: float = math.nan):
+        self.decimal_comma, self.o_sign = decimal_comma, o_sign
         self.doubtful = ""  # the first number whose comma may separate thousands
         self.has_decimal_comma = False  # a comma that cannot has been read
 
@@ -67,7 +74,7 @@ class CellNumbers:
             return float(self._with_decimal_point(text)), factor
         except ValueError:
             pass
-        if ours in HEMISPHERES and (sides := _split_hemisphere(text, ours)):
+        if ours in HEMISPHERES and (sides := split_hemisphere(text, ours, self.o_sign)):
             angle, sign = sides
             return sign * abs(self.quantity(angle, "", 1.0, DEGREES)), 1.0
         if (units in (DEGREES, EARTH_DEGREES, RADIANS)) and (parts := SEXAGESIMAL_PATTERN.fullmatch(text)):
@@ -122,18 +129,21 @@ def unit_of_cells(cells: list[str], units: Mapping[str, float]) -> str:
     return found.pop() if len(found) == 1 and found <= set(units) else ""
 
 
-def hemisphere_sign(text: str, ours: str) -> float:
-    """1 or -1 by the hemisphere that a cell names; not-a-number of any other text."""
+def hemisphere_sign(text: str, ours: str, o_sign: float = math.nan) -> float:
+    """1 or -1 by the hemisphere that a cell names, o_sign where it may be east or west; not-a-number of any other
+    text."""
     key = text.strip().rstrip(".").lower()
+    if key == EAST_OR_WEST and ours == "longitude_deg":
+        return o_sign
     names = zip(HEMISPHERES[ours], (1.0, -1.0), strict=True)
     return next((sign for words, sign in names if key in words), math.nan)
 
 
-def _split_hemisphere(text: str, ours: str) -> tuple[str, float] | None:
+def split_hemisphere(text: str, ours: str, o_sign: float = math.nan) -> tuple[str, float] | None:
     """The angle of a coordinate with its hemisphere before or after it, and the sign of that."""
     for pattern in (r"(\D+?)\s*([\d].*)", r"([\d].*?)\s*([^\W\d][^\d]*)"):
         if match := re.fullmatch(pattern, text):
             letter, angle = match.groups() if pattern.startswith(r"(\D") else match.groups()[::-1]
-            if not math.isnan(sign := hemisphere_sign(letter, ours)):
+            if not math.isnan(sign := hemisphere_sign(letter, ours, o_sign)):
                 return angle, sign
     return None

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
-from radarsim.recordings.formats.cell_numbers import hemisphere_sign, unit_of_cells
+from radarsim.recordings.formats.cell_numbers import hemisphere_sign, split_hemisphere, unit_of_cells
 from radarsim.recordings.formats.column_suggestions import cell_number, name_by_cells, suggest_options
 from radarsim.recordings.formats.units import (
     DEGREES,
@@ -22,6 +22,7 @@ from radarsim.recordings.formats.units import (
     FLIGHT_LEVELS,
     HEIGHTS,
     LENGTHS,
+    O_SIGNS,
     RADIANS,
     SPEEDS,
     TIME_UNITS,
@@ -153,9 +154,9 @@ def _printable(name: str) -> str:
 class Header:
     """The columns of a file by our names, those assigned by the user first; raises ConfigError.
 
-    columns: by name of the quantity; hemispheres: the indices of those with N or S, E or W, by coordinate;
-    identities: the indices of those in IDENTITIES; reads_positions: whether positions are read, not plots; aviation,
-    maritime: whether names follow their customs; sample: some rows of the file."""
+    columns: by name of the quantity; o_sign: of longitudes with an O; hemispheres: the indices of those with N or S, E
+    or W, by coordinate; identities: the indices of those in IDENTITIES; reads_positions: whether positions are read,
+    not plots; aviation, maritime: whether names follow their customs; sample: some rows of the file."""
 
     def __init__(self, path: str, names: list[str], assigned: Mapping[str, str], sample: Sequence[Sequence[str]] = ()):
         self.path, self.names, self.sample = path, [_printable(name) for name in names], sample
@@ -176,6 +177,7 @@ class Header:
             kind: [places[name] for name in names if name in places] for kind, names in IDENTITIES.items()
         }
         self.identities = {kind: indices[0] for kind, indices in identity_columns.items() if indices}
+        self.o_sign = self._find_o_sign() if self.reads_positions and "longitude_deg" in self.columns else math.nan
         self.hemispheres = self._find_hemispheres()
         if "track" in self.columns and not self.identities:
             self.identities["address"] = self.columns["track"].position  # one's own name of it
@@ -236,6 +238,30 @@ class Header:
             for ours in set(EARTH_COLUMNS) - set(self.columns):
                 self.columns[ours] = self._column(ours, indices[JOINT_POSITION], "")
 
+    def _find_o_sign(self) -> float:
+        """1 if an O of longitudes is Ost, as the user or a W beside it says, -1 if it is ouest; not-a-number of none.
+        Raises ConfigError where it may be either."""
+        column = self.columns["longitude_deg"]
+        if column.unit in O_SIGNS:
+            return O_SIGNS[column.unit]
+        free = [i for i in range(len(self.names)) if i not in {other.position for other in self.columns.values()}]
+        for i in (column.position, *free):
+            cells = [row[i].strip() for row in self.sample if i < len(row)]
+            halves = [split_hemisphere(cell, "longitude_deg", math.inf) for cell in cells]
+            if i == column.position:
+                signs = {half[1] for half in halves if half is not None}
+            else:
+                signs = {hemisphere_sign(cell, "longitude_deg", math.inf) for cell in cells if cell}
+            if math.inf in signs and signs <= {math.inf, 1.0, -1.0}:
+                if len(signs) == 2:
+                    return -1.0 if 1.0 in signs else 1.0
+                name = shlex.quote(column.name)
+                raise ConfigError(
+                    f"{self.path}:1: {self.names[i]}: must name east or west; got 'O': for Ost --column "
+                    f"longitude_ost={name}, for ouest or oeste --column longitude_ouest={name}"
+                )
+        return math.nan
+
     def _find_hemispheres(self) -> dict[str, int]:
         """The columns that hold the hemisphere of a coordinate, N or S, E or W, by its quantity."""
         found = {}
@@ -243,7 +269,8 @@ class Header:
         for ours in EARTH_COLUMNS if self.reads_positions else ():
             free = sorted(set(range(len(self.names))) - used, key=lambda i: abs(i - 1 - self.columns[ours].position))
             for i in free:
-                signs = [hemisphere_sign(row[i], ours) for row in self.sample if i < len(row) and row[i].strip()]
+                cells = [row[i] for row in self.sample if i < len(row) and row[i].strip()]
+                signs = [hemisphere_sign(cell, ours, self.o_sign) for cell in cells]
                 if signs and not any(map(math.isnan, signs)):
                     found[ours] = i
                     break

@@ -68,7 +68,7 @@ class Table:
         self.faults = Faults(self.path)
         self.width = len(sheet.header)
         self.header = Header(self.path, sheet.header, assigned or {}, sheet.sample)
-        self.columns = self.header.columns
+        self.columns, self.numbers.o_sign = self.header.columns, self.header.o_sign
         self.kind = records.POSITIONS if self.header.reads_positions else records.PLOTS
         self.time_index = self.columns["t_s"].position
         self.time_name = sheet.header[self.time_index]
@@ -283,7 +283,7 @@ class Table:
             must = f"must be from -{limit} to {limit} degrees"
             self._add_fault(name, must, f"{value:g}", self._coordinate_cure(name, value, limit))
         if name in self.header.hemispheres:
-            sign = hemisphere_sign(cells[self.header.hemispheres[name]], name)
+            sign = hemisphere_sign(cells[self.header.hemispheres[name]], name, self.numbers.o_sign)
             return value if math.isnan(sign) else sign * abs(value)
         return value
 

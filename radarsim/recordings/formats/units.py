@@ -23,6 +23,8 @@ TURNS = {  # in a turn, by unit; of an encoder's counts, `acp`
 }
 DEGREES = {**dict.fromkeys(("deg", "degree", "degrees", "°"), 1.0), "rad": 180 / math.pi}
 EARTH_DEGREES = {**DEGREES, "e7": 1e-7, "e6": 1e-6, "ddmm": 1.0}  # of coordinates; ddmm: degrees and minutes
+O_SIGNS = {"ost": 1.0, "ouest": -1.0}  # of longitudes in degrees with an O, by the unit that says what that is
+EARTH_DEGREES |= dict.fromkeys(O_SIGNS, 1.0)
 RADIANS = {unit: math.radians(factor) for unit, factor in DEGREES.items()}
 RADIANS |= {unit: 2 * math.pi / turn for unit, turn in TURNS.items()}
 RADIANS["mrad"] = 1e-3

@@ -59,6 +59,36 @@ def test_hemispheres_in_columns_of_their_own(tmp_path, names):
     np.testing.assert_array_equal(columns["range_m"], expected["range_m"])
 
 
+@pytest.mark.parametrize(("names", "form"), [("lat,lon", "{:.6f} S,{:.6f} O"), ("lat,ns,lon,ew", "{:.6f},S,{:.6f},O")])
+def test_an_o_may_be_ost_or_ouest(tmp_path, names, form):
+    lat, at = -33.5 - LAT, {sign: Site(-33.4, sign * 70.5, 500) for sign in (1, -1)}
+    data = table(-lat, 70.6 + LON, names, form)
+    (line,) = refused(tmp_path, data, Options(site=at[1]))
+    assert line.endswith("got 'O': for Ost --column longitude_ost=lon, for ouest or oeste --column longitude_ouest=lon")
+    for sign, unit in ((1, "ost"), (-1, "ouest")):
+        _, expected, _ = imported(tmp_path, table(lat, sign * (70.6 + LON)), Options(site=at[sign]))
+        (tmp_path / "plots.csv").unlink()
+        _, columns, _ = imported(tmp_path, data, Options(site=at[sign], columns={f"longitude_{unit}": "lon"}))
+        (tmp_path / "plots.csv").unlink()
+        np.testing.assert_array_equal(columns["range_m"], expected["range_m"])
+        other = form.replace("O", "W" if sign == 1 else "E").format(33.5, 70.6)
+        first, *rows = data.decode().splitlines()
+        beside = "\n".join([first, f"-4,4ca1fb,{other},9000", *rows]).encode()
+        _, columns, _ = imported(tmp_path, beside, Options(site=at[sign], tracks=("4ca1fa",)))
+        (tmp_path / "plots.csv").unlink()
+        np.testing.assert_array_equal(columns["range_m"], expected["range_m"])
+
+
+@pytest.mark.parametrize(("south", "west"), [("sur", "Oeste"), ("Sud", "ouest"), ("ю.ш.", "з.д."), ("南", "西")])
+def test_hemispheres_in_other_languages(tmp_path, south, west):
+    lat, lon, at = -33.5 - LAT, -70.6 - LON, Options(site=Site(-33.4, -70.5, 500))
+    _, expected, _ = imported(tmp_path, table(lat, lon), at)
+    (tmp_path / "plots.csv").unlink()
+    data = table(-lat, -lon, "lat,ns,lon,ew", f"{{:.6f}},{south},{{:.6f}},{west}")
+    _, columns, _ = imported(tmp_path, data, at)
+    np.testing.assert_array_equal(columns["range_m"], expected["range_m"])
+
+
 @pytest.mark.parametrize(
     ("form", "cure"),
     [("ddmm", "--column latitude_ddmm=lat"), ("e7", "--column latitude_e7=lat"), ("e6", "--column latitude_e6=lat")],
