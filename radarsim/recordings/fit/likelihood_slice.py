@@ -25,6 +25,8 @@ IMPOSSIBLE_LOG_LIKELIHOOD = -1e300  # stands for the logarithm of zero likelihoo
 NO_VALUES: Mapping[str, float] = MappingProxyType({})
 RIVAL_STARTS = (0.03, 0.2)  # of the share of hard manoeuvres
 CLEAR_RIVAL_GAIN = 3.0  # of the log-likelihood, a factor of twenty, from which one of two explanations is clear
+CLEAR_GAIN_OF_TURNING = 7.0  # of outliers where the target plainly turns: hard intervals describe a turn ill
+MANOEUVRE_KEY = "manoeuvre_variance"
 SEARCH_STARTS = (-2.0, 0.0, 2.0)  # of a search
 Progress = Callable[[int, int | None], None]  # likelihoods computed, and their expected number where known
 
@@ -133,14 +135,17 @@ def climb(slice_: LikelihoodSlice, start: Mapping[str, float]) -> tuple[dict[str
 @dataclass(frozen=True)
 class Rival:
     """Hard manoeuvres in place of outliers: their share of the intervals, and by how much the logarithm of the
-    likelihood is larger than with outliers."""
+    likelihood is larger than with outliers; is_turning: whether both need a larger manoeuvre variance than stated."""
 
     share: float
     gain: float
+    is_turning: bool = False
 
     @property
     def is_clear(self) -> bool:
-        return abs(self.gain) > CLEAR_RIVAL_GAIN
+        return self.gain > CLEAR_RIVAL_GAIN or -self.gain > (
+            CLEAR_GAIN_OF_TURNING if self.is_turning else CLEAR_RIVAL_GAIN
+        )
 
 
 def rival_of_outliers(likelihood: CountedLikelihood, values: Mapping[str, float]) -> Rival | None:
@@ -157,7 +162,9 @@ def rival_of_outliers(likelihood: CountedLikelihood, values: Mapping[str, float]
         slice_ = LikelihoodSlice(likelihood, [*keys, name], fixed)
         starts = ({**configured, **fixed, name: share} for share in shares)
         maxima[name] = max((climb(slice_, start) for start in starts), key=lambda maximum: maximum[1])
-    return Rival(maxima[MANOEUVRES][0][MANOEUVRES], maxima[MANOEUVRES][1] - maxima[OUTLIERS][1])
+    stated = dict(zip(likelihood.keys, np.asarray(likelihood.likelihood.stated).tolist(), strict=True))
+    is_turning = fixed.get(MANOEUVRE_KEY, 0.0) > stated.get(MANOEUVRE_KEY, np.inf)
+    return Rival(maxima[MANOEUVRES][0][MANOEUVRES], maxima[MANOEUVRES][1] - maxima[OUTLIERS][1], is_turning)
 
 
 def _search_scale(name: str, starting: dict[str, float]) -> tuple[Callable[[float], float], Callable[[float], float]]:
