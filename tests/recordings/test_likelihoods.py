@@ -504,6 +504,30 @@ def test_a_velocity_whose_error_is_a_span_tells_nothing():
     assert_rounded(found["velocity_mps"], -rows * np.log(15.0), operations=rows)
 
 
+@pytest.mark.parametrize("sigma_r", [250.0, 2e6])
+@pytest.mark.parametrize("sigma_v", [20.0, 28.0, 38.0, 50.0])
+def test_velocities_that_tell_little_are_as_likely_as_over_all_folds(sigma_r, sigma_v):
+    """By the normal density of all numbers of three plots together, summed over their folds; the first range is given.
+    With the larger σ no row tells anything, with the smaller ones all do, or the first ones."""
+    case, columns, n, T, q, D = loaded("ambiguous_rls2"), recording("ambiguous_rls2", "scans=3"), 3, 10.0, 2e-2, 75.0
+    prior, F = case.spec.prior, transition(T)
+    states = [[np.diag([sigma_r**2, prior.sigma_velocity_mps**2, prior.sigma_acceleration_mps2**2])]]
+    for k in range(1, n):  # states[j][i]: covariance of the states at rows i and j
+        states.append([states[-1][i] @ F.T for i in range(k)])
+        states[-1].append(F @ states[k - 1][k - 1] @ F.T + manoeuvre_covariance(q, T))
+    whole = np.block([[states[max(i, j)][min(i, j)] if i <= j else states[i][j].T for j in range(n)] for i in range(n)])
+    numbers = [*range(3, 3 * n, 3), *range(1, 3 * n, 3)]  # ranges, velocities
+    sigmas = np.array([sigma_r] * (n - 1) + [sigma_v] * n)
+    spread = whole[np.ix_(numbers, numbers)] + np.diag(sigmas**2)
+    folds = np.stack(np.meshgrid(*[np.arange(-16, 17)] * n), axis=-1).reshape(-1, n)
+    ranges = np.tile(columns["range_m"][1:] - columns["range_m"][0], (len(folds), 1))
+    root = np.linalg.cholesky(spread / np.outer(sigmas, sigmas))
+    white = np.linalg.solve(root, (np.hstack([ranges, columns["velocity_mps"] + D * folds]) / sigmas).T)
+    densities = np.exp(-0.5 * (white**2).sum(axis=0)) / np.prod(np.sqrt(2 * np.pi) * sigmas * np.diag(root))
+    found = likelihood(case, "memory", columns)(np.array([sigma_r, sigma_v, q]))
+    assert found == pytest.approx(np.log(densities.sum()), rel=0, abs=2e-3)
+
+
 @pytest.mark.parametrize("name", ["memory", "no memory", "nearest fold", "range only"])
 def test_missing_plots_count_as_nothing(name):
     """Rows without a plot among those with one: as without these rows, where no manoeuvre parts two steps from one."""

@@ -27,6 +27,7 @@ START_RANGES = 3  # of a track, among which gross errors are left out
 NEGLIGIBLE = 80.0  # below the logarithm of the greatest weight
 ROUNDING = 1e-9  # of the logarithm of a ratio
 SMALLEST_MASS = 1e-300  # of the laws of a number
+FLAT_VARIANCE = 0.45  # of a folded velocity, in squares of the span: its density is even, to 2 exp(-2 pi² 0.45) = 3e-4
 INVISIBLE = 45.0  # the same, in a sum of weights: thousands of such change no digit
 MAX_SEQUENCES = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
 
@@ -239,6 +240,14 @@ def take_velocity(x, w, P, R, v, D, max_fold, merge, max_count, min_ratio, outli
 
 
 @kernel
+def visible_share(P, variances, D):
+    """The share of a difference between hypotheses that the next range or folded velocity can show: two that differ by
+    d standard deviations, and are merged by moments, change its density by about the cube of d times this."""
+    even = math.exp(-2.0 * math.pi**2 * (P[3] + variances[1]) / (D * D))
+    return max(math.sqrt(P[0] / (P[0] + variances[0])), even ** (1.0 / 3.0))
+
+
+@kernel
 def merge_alike(x, w, P, distance):
     """Merge hypotheses that differ by less than a distance, in standard deviations, by moments: each with the first one
     so near. Returns states and weights; P is updated in place.
@@ -276,6 +285,38 @@ def merge_alike(x, w, P, distance):
 
 
 @kernel
+def rate_variances(F, Q, present, prior, variances, manoeuvre_variance, with_velocities):
+    """The variances (n,) of the rate at each row, of the ranges up to it and, where asked for, of the velocities before
+    it, were all folds known. Arguments as for `log_likelihood`."""
+    rates, P, no_states, has_range = np.empty(len(F)), prior.copy(), np.empty((3, 0)), False
+    for k in range(len(F)):
+        if k > 0:
+            extrapolate(no_states, P, F[k], Q[k], manoeuvre_variance)
+        if present[k, 0] and has_range:
+            P[0], P[1], P[2], P[3], P[4], P[5] = take_value((P[0], P[1], P[2], P[3], P[4], P[5]), variances[0], 1.0)[0]
+        elif present[k, 0]:
+            P[0], P[1], P[2], has_range = variances[0], 0.0, 0.0, True
+        rates[k] = P[3]
+        if with_velocities and has_range and present[k, 1]:
+            P[0], P[1], P[2], P[3], P[4], P[5] = take_rate((P[0], P[1], P[2], P[3], P[4], P[5]), variances[1], 1.0)[0]
+    return rates
+
+
+@kernel
+def count_telling_rows(F, Q, rows, present, prior, variances, manoeuvre_variance):
+    """The number of rows up to the last whose folded velocity tells something. The velocity of each later row has an
+    even density, even if all folds before it and all ranges were known: ranges after a row tell no more of its rate
+    than those before the row that tell most. Arguments as for `log_likelihood`."""
+    motion = F, Q, present, prior, variances, manoeuvre_variance
+    rates, least, telling = rate_variances(*motion, True), rate_variances(*motion, False).min(), 0
+    for k in range(len(rows)):
+        known = rates[k] * least / (rates[k] + least) if least > 0.0 else 0.0
+        if not variances[1] + known >= FLAT_VARIANCE * rows[k, 2] * rows[k, 2]:
+            telling = k + 1
+    return telling
+
+
+@kernel
 def log_likelihood(
     F, Q, rows, present, prior, variances, manoeuvre_variance, reach, merge, max_count, min_ratio, merge_distance,
     outliers, span, start_factor, score, soundness
@@ -285,11 +326,13 @@ def log_likelihood(
     F (n, 5), Q (n, 6): motion to each row, of unit variance; rows (n, 3): range, velocity and its span; present (n, 2):
     which of the first two count (a kernel has no not-a-number); prior (6,): covariance before the first plot;
     variances (2,) of range and velocity; reach: 0: velocities are not folded, 1: the nearest fold, 2: all folds that
-    matter; merge, max_count, min_ratio as in `take_velocity`; merge_distance: of `merge_alike`; outliers (2, 4): their
-    laws; span (2,): of the data; start_factor: on the variance of the first START_RANGES ranges, which are no outliers:
-    they find the state. Filled: score (n, 2), zero where nothing is measured, and soundness (n, 2), the probabilities
-    that the numbers are no outliers."""
+    matter; merge, max_count, min_ratio as in `take_velocity`; merge_distance: of `merge_alike`, where plots show all of
+    a difference; outliers (2, 4): their laws; span (2,): of the data; start_factor: on the variance of the first
+    START_RANGES ranges, which are no outliers: they find the state. Filled: score (n, 2), zero where nothing is
+    measured, and soundness (n, 2), the probabilities that the numbers are no outliers."""
     x, w, P, ranges, laws = np.zeros((3, 1)), np.zeros(1), prior.copy(), 0, np.empty((3, LAW_COUNT))
+    motion = F, Q, rows, present, prior, variances, manoeuvre_variance
+    telling_rows = count_telling_rows(*motion) if reach == 2 else len(rows)
     for k in range(len(rows)):
         z, v, D = rows[k, 0], rows[k, 1], rows[k, 2]
         if k > 0:
@@ -310,7 +353,7 @@ def log_likelihood(
             if not S > 0.0:
                 return False
             if reach == 2:
-                if variances[1] >= D * D:  # all velocities are equally likely, to 2 exp(-2 pi²): no information
+                if k >= telling_rows:
                     score[k, 1] = -math.log(D)
                     continue
                 if 2.0 * FARTHEST * math.sqrt(S) / D * w.size > MAX_SEQUENCES:
@@ -321,5 +364,5 @@ def log_likelihood(
                 x, w, P, variances[1], v, D, *hypotheses, outliers[1], span[1]
             )
             if w.size > 1:
-                x, w = merge_alike(x, w, P, merge_distance)
+                x, w = merge_alike(x, w, P, merge_distance / visible_share(P, variances, D))
     return True
