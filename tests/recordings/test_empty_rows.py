@@ -12,6 +12,8 @@ from radarsim.recordings.study_part import recording_interface
 from radarsim.studies import authoring, step_tracker
 from radarsim.studies.linear_recordings import LinearTracker
 from radarsim.studies.missed_scans import with_missed_scans, without_empty_rows
+from radarsim.studies.range_doppler import tracking as radial_tracking
+from radarsim.studies.range_doppler.package_filters import GivenGains
 
 CONFIGS = {
     "rls2": ("scans=40",),
@@ -137,6 +139,31 @@ def test_empty_rows_change_no_estimate_of_a_step_study():
     columns = {"t_s": 4.0 * np.arange(40), "x_m": np.random.default_rng(2).normal(0, 5, 40)}
     empty, without, kept = with_and_without(columns, [6, 9, 10, 11, 14])
     assert_same(*(step_tracker.Tracker(study, spec).feed(track) for track in (empty, without)), kept)
+
+
+class Frozen(GivenGains):
+    """The study's Kalman filter, with the gains of a scan from there on."""
+
+    kind: str = authoring.key("kind", "of a package")
+
+    def noise(self, dt_s):
+        return authoring.process_noise("random_jerk", 1e-3, dt_s)
+
+    def gains(self, scans):
+        gains = scans.kalman(self.noise)
+        gains[8:] = gains[7]
+        return gains
+
+
+@pytest.mark.parametrize("missed", [[6, 9, 10, 11, 14], [2, 3, 4]])
+def test_empty_rows_change_no_estimate_of_a_package_filter(missed):
+    columns = recording("rls2", "scans=40")
+    empty, without, kept = with_and_without(columns, missed)
+    frozen = Frozen.model_validate({"name": "frozen", "kind": "frozen", "observes": ["range", "velocity"]})
+    case = SimpleNamespace(spec=SimpleNamespace(filters=[frozen], radar=loaded("rls2").spec.radar))
+    tracks = [radial_tracking.Tracker(case).feed(track) for track in (empty, without)]
+    assert np.isfinite(tracks[1].sigma[:, 3:]).all()
+    assert_same(*tracks, kept)
 
 
 def test_a_scan_without_plots_ends_tracks_among_false_plots_as_one_without_rows():

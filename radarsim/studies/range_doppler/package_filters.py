@@ -21,7 +21,8 @@ STEADY_TOLERANCE = 1e-9  # relative change of a gain from one scan to the next t
 
 
 class Scans(NamedTuple):
-    """What gains are made for: K scans, or rows of recorded plots: a start and the rows after it.
+    """What gains are made for: K scans, or rows of recorded plots and the scans missed between them: a start and the
+    rows after it.
 
     t_s (K,) are their times, s; there (K, 2): where range and velocity come and are observed; sigma (2,) are the
     standard deviations of these, m and m/s. start is the scan, from 1, at which the least-squares start ends, and

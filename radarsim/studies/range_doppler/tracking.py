@@ -9,6 +9,7 @@ from radarsim.config.experiment import Case
 from radarsim.config.radial_keys import MAX_SCANS
 from radarsim.kernels import second_order
 from radarsim.kernels.kalman_algebra import pack, unpack
+from radarsim.studies.missed_scans import with_missed_scans
 from radarsim.studies.plot_arrays import DrawPlots, SimulatedPlots
 from radarsim.studies.range_doppler import config
 from radarsim.studies.range_doppler.config import Filter, FilterKeys, Keys
@@ -57,7 +58,8 @@ class Tracker:
     these determine range, velocity and acceleration; before, its estimates are the plots. Then the Kalman filter of the
     study goes from row to row, its gains computed for the interval and for what the row holds; an empty row is none.
     Where the config leaves the manoeuvre variance to be looked for, it is the best one on the config's target. A filter
-    of a package makes its gains for the times of the whole recording and for what each row holds."""
+    of a package makes its gains for the times of the whole recording, missed scans included, and for what each row
+    holds."""
 
     several = False
 
@@ -69,7 +71,7 @@ class Tracker:
         self.filters = [
             _KalmanTrackFilter(f, noise_by_time(f.process_noise, variance, period), self.sigma)
             if isinstance(f, Filter)
-            else _GainsTrackFilter(f, self.sigma)
+            else _GainsTrackFilter(f, self.sigma, period)
             for f, variance in zip(spec.filters, configured_variances(case), strict=True)
         ]
         self.most_rows = None if all(isinstance(f, Filter) for f in spec.filters) else MAX_SCANS
@@ -172,14 +174,19 @@ class _KalmanTrackFilter(_TrackFilter):
 class _GainsTrackFilter(_TrackFilter):
     """A filter of a package, over a whole recording at once; left (n, 2): variances of what plots differ by from it."""
 
-    def __init__(self, options: GivenGains, sigma: np.ndarray):
+    def __init__(self, options: GivenGains, sigma: np.ndarray, period: float):
         super().__init__(options, sigma)
-        self.options, self.left = options, np.empty((0, 2))
+        self.options, self.period, self.left = options, period, np.empty((0, 2))
 
     def after(
         self, k: int, t: np.ndarray, z: np.ndarray, is_used: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         assert self.x is not None  # it has started
-        scans = Scans(t, is_used, self.sigma, k, unpack(self.P))
-        estimate, sigma, nis, self.left = filter_recorded(self.options, scans, self.x, z)
+        times, rows = with_missed_scans(t, self.period)
+        is_there, plots = np.zeros((len(times), 2), dtype=bool), np.full((len(times), 2), np.nan)
+        is_there[rows], plots[rows] = is_used, z
+        start = int(rows[k - 1]) + 1
+        scans = Scans(times, is_there, self.sigma, start, unpack(self.P))
+        outputs = filter_recorded(self.options, scans, self.x, plots)
+        estimate, sigma, nis, self.left = (values[rows[k:] - start] for values in outputs)
         return estimate, sigma, nis
