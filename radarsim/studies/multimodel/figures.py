@@ -47,7 +47,10 @@ COMPONENTS = (
 SIGMAS = {"y": (term("the height"), "$y$", "m"), "vy": (term("the rate of climb"), "$\\dot y$", "m/s")}
 RULES = ("moment", "best", "combined", "modified_combined")
 FAMILIES = {"gpb1": term("MMA1"), "imm": term("MMA2"), "gpb2": term("MMA3")}
-POINT_SIZES_PT = (7.0, 5.8, 4.6, 3.4)  # of points that may coincide, each drawn on those before it
+POINT_SIZES_PT = dict(zip(RULES, (5.8, 7.0, 4.6, 3.4), strict=True))  # of points that may coincide, small ones on top
+POINT_PT = 4.6  # of points of few filters
+LINE_WIDTHS_PT = {"moment": 1.1, "best": 3.0, "combined": 2.0, "modified_combined": 0.9}  # likewise of lines, by rule
+SAME_FRACTION = 0.01  # of a value, or of an axis: points nearer to each other are drawn as one
 SAME_FLIGHT = 1e-3  # of its extent: a difference that is less than the width of a line
 MAX_LOOKS = 8  # filters with distinct colours, dashes and markers
 DRAWN_FROM = {"families": ("stages",), "cost": ("stages", "operations")}
@@ -256,7 +259,8 @@ def _sigma_panels(result: CaseResult, rows: Mapping, component: str, title: str)
             family = tr(FAMILIES.get(options.family, options.family)) if has_families else ""
             name, label, look = key_labels.escape_dollars(f), "", replace(style, marker=None)
             if family and is_named_by_rule:
-                label, look = options.merge.replace("_", " "), replace(look, dash=0)
+                label = options.merge.replace("_", " ")
+                look = replace(look, dash=0, width_pt=LINE_WIDTHS_PT.get(options.merge, look.width_pt))
             line = figure_lines.line_from_rows(rows[result.name, f], figure_lines.SIGMA[:4], label or name, look, name)
             lines.setdefault(family, []).append(line)
     y = Axis(key_labels.label_with_unit(tr("full r.m.s. error of {symbol}", symbol=symbol), unit), "log")
@@ -366,25 +370,59 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
     max_operations = (
         tables_by_name["operations"].loc[tables_by_name["operations"]["case"] == result.name, "operations"].max()
     )
+    rules = {f: options.merge for f, options in zip(result.axes.filters, result.spec.filters, strict=True)}
+    joined_rules = _joined_rules(result, rows, operations, float(max_operations))
+    drawn_filters = [f for f, rule in rules.items() if joined_rules.get(rule, True)]
     styles = dict(zip(result.axes.filters, _styles(result), strict=True))
-    sizes = POINT_SIZES_PT if _has_many_filters(result) else POINT_SIZES_PT[2:3]
+    sizes = POINT_SIZES_PT if _has_many_filters(result) else {}
     for stage, stage_rows in rows.groupby("stage", sort=False):
         marks: list[Line] = []
-        for _, row in stage_rows.iterrows():
-            style = replace(styles[row["filter"]], dash=None, size_pt=sizes[len(marks) % len(sizes)])
+        for _, row in stage_rows[stage_rows["filter"].isin(drawn_filters)].iterrows():
+            style = replace(styles[row["filter"]], dash=None, size_pt=sizes.get(rules[row["filter"]], POINT_PT))
             count = operations[(result.name, stage, row["filter"])]["operations"].to_numpy(float)
             lo, hi, value = (np.array([row[key]]) for key in ("sigma_lo", "sigma_hi", "sigma"))
             marks.append(Line(count, value, key_labels.escape_dollars(row["filter"]), style, lo, hi))
+        marks.sort(key=lambda mark: -mark.style.size_pt)
         x = Axis(tr("operations per update"), limits=(0, 1.06 * float(max_operations)))
         y = Axis(key_labels.sigma_axis_label("$y$", "m"), "log")
         cost_panels.append(Panel(x, y, tuple(marks), tr(str(stage)), direct=False))
     cost_panels = _with_legend(cost_panels, result, dash=None)
+    keys = [(joined_rules.get(text.replace(" ", "_"), text), style) for text, style in cost_panels[-1].keys]
+    cost_panels[-1] = replace(cost_panels[-1], keys=tuple((text, style) for text, style in keys if text))
     caption = tr(
         "RMS error of the height over each stage against arithmetic operations per update. Coinciding points: small "
         "marks on large ones.{of_case}",
         of_case=_case_sentence(result, results),
     )
     return _figure_of_panels("cost", tr("Cost and accuracy"), caption, cost_panels, 62)
+
+
+def _joined_rules(
+    result: CaseResult, rows: "pd.DataFrame", operations: Mapping, max_operations: float
+) -> dict[str, str]:
+    """What the legend calls each rule of many filters: "a = b" for the first of rules whose points coincide for all
+    families and stages, nothing for the others."""
+    if not _has_many_filters(result):
+        return {}
+    designs = {f: (o.family, o.merge) for f, o in zip(result.axes.filters, result.spec.filters, strict=True)}
+    points: dict[str, dict] = {}
+    for stage, f, sigma in zip(rows["stage"], rows["filter"], rows["sigma"], strict=True):
+        family, rule = designs[f]
+        place = float(operations[(result.name, stage, f)]["operations"].iloc[0]) / max_operations, np.log(sigma)
+        points.setdefault(rule, {})[stage, family] = place
+    groups: list[list[str]] = []
+    for rule, places in points.items():
+        group = next((group for group in groups if _are_near(points[group[0]], places)), None)
+        groups.append([rule]) if group is None else group.append(rule)
+    names = {group[0]: " = ".join(rule.replace("_", " ") for rule in group) for group in groups}
+    return {rule: names.get(rule, "") for rule in points}
+
+
+def _are_near(places: Mapping, other_places: Mapping) -> bool:
+    """Whether points of two rules, by stage and family, coincide."""
+    if places.keys() != other_places.keys():
+        return False
+    return all(np.abs(np.subtract(places[key], other_places[key])).max() < SAME_FRACTION for key in places)
 
 
 def _motions(models: Sequence) -> list[str]:

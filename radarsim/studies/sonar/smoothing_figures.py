@@ -105,7 +105,7 @@ def believed_figure(
         for table in (curves, consistency)
     )
     sigma_lines: list[Mark] = []
-    nees_lines: list[Mark] = [Reference(1.0, label=tr("consistent"))]
+    nees_lines: list[Mark] = [Reference(1.0)]
     for n, f in enumerate(cases[0].axes.filters):
         keys = [(r.name, f) for r in cases]
         rows = true_rows.loc[keys]
@@ -118,7 +118,8 @@ def believed_figure(
         nees_lines.append(figure_lines.line_from_rows(rows, ("rho", "nees", "nees_lo", "nees_hi", "exact_nees"), f, n))
     caption = tr(
         "Left: RMS error of the {name} at plot {last} in σ of a plot, true (lines) and the filter's own (markers "
-        "alone, where they differ by over 5 %). Right: normalised squared error per component.",
+        "alone, where they differ by over 5 %). Right: normalised squared error per component, one (dotted) if "
+        "consistent.",
         name=COMPONENTS_BY_NAME[component].words,
         last=last,
     )

@@ -251,3 +251,17 @@ def test_time_per_update_is_only_in_the_record_and_the_report(tmp_path):
     assert "Cost against accuracy" in page
     assert typeset.cell_text(1e9 * measured["Kalman-2 1"]) in page
     assert not any("measured, ns" in path.read_text() for path in folder.glob("*.csv"))
+
+
+def test_rules_whose_points_coincide_share_a_name():
+    rules, families = ("best", "combined", "modified_combined"), ("gpb1", "imm", "gpb2")
+    designs = [SimpleNamespace(family=family, merge=rule, models=()) for family in families for rule in rules]
+    names = [f"{design.family} {design.merge}" for design in designs]
+    result = SimpleNamespace(name="c", axes=SimpleNamespace(filters=names), spec=SimpleNamespace(filters=designs))
+    table = pd.DataFrame({"case": "c", "stage": "start", "filter": names, "component": "y"})
+    table["operations"] = [1000.0, 2000.0, 2001.0] * 3
+    table["sigma"] = [90.0, 50.0, 50.1] * 3
+    table["sigma_lo"], table["sigma_hi"] = table["sigma"] - 1, table["sigma"] + 1
+    figure = figures.cost([result], {"stages": table, "operations": table})
+    assert [text for text, _ in figure.panels[-1].keys][:2] == ["best", "combined = modified combined"]
+    assert len(figure.panels[0].marks) == 6
