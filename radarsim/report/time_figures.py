@@ -43,7 +43,7 @@ from radarsim.report.key_labels import (
     sigma_axis_label,
     swept_title,
 )
-from radarsim.report.panel_layout import WIDE_MM, arrange_columns, fitting_axis, keyed_panels, time_axis
+from radarsim.report.panel_layout import WIDE_MM, arrange_columns, fitting_axis, holding, keyed_panels, time_axis
 from radarsim.report.quantities import Component
 from radarsim.report.statistics import Z95
 
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
 
 
 CUT_LOSS_PERCENT = 100.0  # per cent at which much lower gains are cut
+MAX_FIRST_RATIO = 3.0  # of the largest bias at the first plot to that at later ones, on one axis
 LONGEST_INSIDE = 28  # letters of a name in a legend inside a panel of many lines
 
 
@@ -219,6 +220,8 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
     titles = [panel.title for panel, _ in pairs]
     pairs = pick_evenly(pairs, MAX_PANELS // 2)
     caption += left_out_remark(titles, [panel.title for panel, _ in pairs])
+    if any(bias.y.limits != (None, None) for bias, _ in pairs):
+        caption += " " + tr("The bias at the first plot is off the plot.")
     title = tr("Dynamic and fluctuation error of the {quantity}", quantity=component.words)
     return Figure(name, title, caption, tuple(panel for pair in pairs for panel in pair), 2, PAGE_MM, 56.0)
 
@@ -236,9 +239,25 @@ def _dynamic_panels(
         biases.append(Line(t, bias, name, style, bias - half, bias + half, name=name))
         spreads.append(Line(t, factor * rows["spread"].to_numpy(), name, style, name=name))
     title = swept_title(result) or config_device(result)
-    bias_axis = Axis(label_with_unit(tr("bias of {symbol}", symbol=component.symbol), unit))
+    bias_axis = _bias_axis(label_with_unit(tr("bias of {symbol}", symbol=component.symbol), unit), biases)
     label = label_with_unit(tr("standard deviation of {symbol}", symbol=component.symbol), unit)
     return (
         Panel(time_axis(), bias_axis, tuple(biases), title),
         Panel(time_axis(), fitting_axis(label, spreads), tuple(spreads), title),
     )
+
+
+def _bias_axis(label: str, marks: Sequence[Mark]) -> Axis:
+    """An axis of biases; without those at the first plot where they would hide the others: an estimate from one plot
+    may err by the whole quantity."""
+    lines = [mark for mark in marks if isinstance(mark, Line) and len(mark.x) > 1]
+    later = [replace(line, x=line.x[1:], y=line.y[1:], lo=None, hi=None) for line in lines]
+    first, highest = (
+        max((_largest(line.y[part]) for line in lines), default=0.0) for part in (slice(1), slice(1, None))
+    )
+    return Axis(label, limits=holding(later, Axis(label))) if first > MAX_FIRST_RATIO * highest > 0 else Axis(label)
+
+
+def _largest(values: np.ndarray) -> float:
+    """The largest magnitude of values."""
+    return float(np.nanmax(np.abs(values), initial=0.0))

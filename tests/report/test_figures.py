@@ -7,6 +7,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.axis import XAxis
 
@@ -193,6 +194,23 @@ def test_an_axis_begins_near_its_curves_if_from_zero_they_would_fill_less_than_h
     strokes = [curve for curve in drawn(figure).lines if isinstance(curve.get_marker(), tuple)]
     assert len(strokes) == 1
     assert len(drawn(replace(figure, panels=(replace(figure.panels[0], y=far),))).lines) == 1
+
+
+def test_the_bias_of_an_estimate_from_one_plot_hides_no_other(expected_radar):
+    result = expected_radar("rls2")
+    t = np.arange(6.0)
+    rows = {"t_s": t, "bias": [-250.0, 1, 2, -2, 1, 0], "bias_se": 0.1, "spread": 1.0}
+    component = Component("r", "m", "$r$", "range")
+
+    def dynamic(bias):
+        curves_by_key = {(result.name, f, "r"): pd.DataFrame(rows | {"bias": bias}) for f in result.axes.filters}
+        return time_figures.dynamic_figure("dynamic_r", [result], curves_by_key, component)
+
+    hidden, seen = dynamic(rows["bias"]), dynamic([-3.0, 1, 2, -2, 1, 0])
+    assert -3 < hidden.panels[0].y.limits[0] < -2
+    assert "off the plot" in hidden.caption
+    assert seen.panels[0].y.limits == (None, None)
+    assert "off the plot" not in seen.caption
 
 
 def test_a_legend_has_the_order_of_the_lines_at_their_ends():
