@@ -90,10 +90,26 @@ class ShortTuple(tuple[Any, ...]):
 
 def first_lines(lines: Sequence[str]) -> str:
     """The first lines, long ones shortened."""
-    lines_shown = [line if len(line) <= MAX_LETTERS else f"{line[: MAX_LETTERS - 2]} …" for line in lines[:MAX_LINES]]
+    lines_shown = [_shortened(line) for line in lines[:MAX_LINES]]
     if len(lines) > MAX_LINES and lines_shown:
         lines_shown[-1] += " …"
     return "\n".join(lines_shown)
+
+
+def _shortened(line: str) -> str:
+    """A line of at most MAX_LETTERS: cut between words, and before a bracket that would stay open."""
+    if len(line) <= MAX_LETTERS:
+        return line
+    head = line[: MAX_LETTERS - 1]
+    end, open_brackets = head.rfind(" "), list[int]()
+    for place, letter in enumerate(head):
+        if letter in "([":
+            open_brackets.append(place)
+        elif letter in ")]" and open_brackets:
+            open_brackets.pop()
+    if open_brackets and open_brackets[0] > 0:
+        end = min(end, open_brackets[0])
+    return f"{head[:end].rstrip(' ,;:')} …" if end > 0 else f"{head[:-1]} …"
 
 
 def _image(figure: "Figure | None") -> str:

@@ -6,6 +6,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure as Canvas
 
 import radarsim
+from radarsim.api.display import MAX_LETTERS, first_lines
 from radarsim.report.drawing.colours import COLOURS
 from radarsim.report.drawing.style import MARKERS
 
@@ -95,3 +96,20 @@ def test_a_figure_without_axes_is_drawn_as_before(results):
         results["rls2"].figure().axes[0].get_ylabel()
         == results["rls2"].figure(results["rls2"].figures[0]).axes[0].get_ylabel()
     )
+
+
+@pytest.mark.parametrize(
+    ("line", "end"),
+    [
+        ("a" * 200, "a" * 5),
+        (f"{'word ' * 45}end", "word …"),
+        (f"{'word ' * 30}(no estimate: its RMS error is not a number, because none of its rows has one)", "word …"),
+        (f"gain 12 % [10, 14], {'(one) ' * 28}[95 % interval of the mean over all the scans]", "(one) …"),
+        (f"({'b' * 300}", "b …"),
+    ],
+)
+def test_a_long_line_is_cut_between_words_and_outside_brackets(line, end):
+    shown = first_lines([line])
+    assert len(shown) <= MAX_LETTERS
+    assert shown.endswith(end)
+    assert line.startswith(shown.removesuffix(" …"))
