@@ -14,13 +14,25 @@ from radarsim.papers.forest_plot import forest_plot
 from radarsim.report.drawing import canvas as drawing_canvas
 from radarsim.report.drawing.crowded_panels import with_names_at_ends
 from radarsim.report.drawing.legend_placement import plan_legends
-from radarsim.report.drawing.model import COLUMN_MM, MAX_PANEL_LINES, PAGE_MM, Axis, Figure, Heat, Line, Note, Panel
+from radarsim.report.drawing.model import (
+    COLUMN_MM,
+    MAX_PANEL_LINES,
+    PAGE_MM,
+    Axis,
+    Figure,
+    Heat,
+    Line,
+    Note,
+    Panel,
+    Style,
+)
 from radarsim.report.drawing.style import MM, PNG_DPI
 from radarsim.report.drawing.word_overlaps import overlapping_words
 from tests.report.test_claims_page import row
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 WIDTHS_MM = (85.0, 120.0, 180.0)
+A4_HEIGHT_MM = 297.5
 INK = 230  # of 255: a darker pixel is part of a letter or a line
 
 
@@ -46,7 +58,8 @@ def faults_of_widths(figures):
             png = io.BytesIO()
             canvas.savefig(png, format="png", dpi=PNG_DPI)
             pixels, width_mm = picture(png.getvalue())
-            if (edges := cut_edges(pixels)) or words or round(width_mm) != round(drawn_figure.width_mm):
+            is_tall = len(pixels) / PNG_DPI / MM > A4_HEIGHT_MM
+            if (edges := cut_edges(pixels)) or words or is_tall or round(width_mm) != round(drawn_figure.width_mm):
                 faults.append(f"{name} at {width} mm: {width_mm:.0f} mm, cut: {edges}, meet: {words}")
     return faults
 
@@ -92,7 +105,7 @@ def test_a_figure_of_a_column_is_lower_than_a_page_or_wider(count):
     drawing = drawing_canvas.draw(figure, ("png",), COLUMN_MM)
     assert (drawing.figure.width_mm > COLUMN_MM) == (count > 6)
     with Image.open(io.BytesIO(drawing.files["png"])) as image:
-        assert image.height / PNG_DPI / MM < 297.5
+        assert image.height / PNG_DPI / MM < A4_HEIGHT_MM
 
 
 def test_a_width_at_which_words_would_be_cut_is_increased_and_said(tmp_path):
@@ -120,6 +133,12 @@ def crowded_panels(figure):
     ]
 
 
+def test_a_figure_of_many_rows_is_no_taller_than_a_page_at_its_own_width():
+    x = np.arange(3.0)
+    panel = Panel(Axis("x"), Axis("y"), (Line(x, x),), "panel")
+    assert faults_of_widths({"f": Figure("f", "F", "A flight.", (panel,) * 12, 2, PAGE_MM, 56.0)}) == []
+
+
 def test_words_that_meet_are_found():
     x = np.arange(3.0)
     notes = Note(1.0, 1.0, "one"), Note(1.0, 1.0, "two"), Note(2.0, 0.0, "far", "nw")
@@ -142,6 +161,24 @@ def test_a_long_name_in_a_legend_is_broken_into_rows(width):
     panel = Panel(Axis("x"), Axis("y"), tuple(Line(x, x + n, name) for n, name in enumerate(names)))
     for count in (1, 3):
         assert faults_of_widths({"f": Figure("f", "F", "A flight.", (panel,) * count, 3, width)}) == []
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_legend_below_each_panel_ends_within_the_figure(count):
+    x, motions = np.arange(3.0), ("constant velocity", "constant accelerations")
+    panels = [
+        Panel(
+            Axis("time, s"),
+            Axis("mean probability", limits=(0, 1)),
+            tuple(
+                Line(x, x / 2, f"{m} {motion}, $\\sigma_a$ = {5 * n + 1} m/s²", Style(m, m))
+                for m, motion in enumerate(motions)
+            ),
+            direct=False,
+        )
+        for n in range(count)
+    ]
+    assert faults_of_widths({"f": Figure("f", "F", "A flight.", tuple(panels), count, PAGE_MM)}) == []
 
 
 @pytest.mark.slow

@@ -32,6 +32,7 @@ from radarsim.report.drawing.style import (
     END_LETTER_MM,
     HEADLINE_LETTERS_PER_MM,
     HEADLINE_MM,
+    LABELS_MM,
     MM,
     PNG_DPI,
     SIDE_MM,
@@ -218,7 +219,8 @@ def _legends_height_mm(figure: Figure, plan: LegendPlan, rows: int, columns: int
     if plan.common is not None and not in_cell and not plan.stands_beside:
         height += plan.common.height_mm(figure.width_mm)
     legends = [legend for legend in plan.panel_legends if legend is not None]
-    return height + rows * max([legend.height_mm(figure.width_mm / columns) for legend in legends], default=0.0)
+    cell_mm = figure.width_mm / columns - LABELS_MM
+    return height + rows * max([legend.height_mm(cell_mm) for legend in legends], default=0.0)
 
 
 def _fill_grid(figure: Figure, plan: LegendPlan, grid: np.ndarray, columns: int) -> list[list[Annotation]]:
@@ -233,7 +235,7 @@ def _fill_grid(figure: Figure, plan: LegendPlan, grid: np.ndarray, columns: int)
         length_mm = cell_mm - SIDE_MM - (END_LETTER_MM * longest_name(panel) if plan.at_ends[n] else 0.0)
         draw_panel(axes, stack_top_notes(replace(panel, title=title, x=x, y=y), length_mm), map_colours)
         end_names.append(name_line_ends(axes, panel) if plan.at_ends[n] else [])
-        draw_legend_below(axes, plan.panel_legends[n], cell_mm)
+        draw_legend_below(axes, plan.panel_legends[n], cell_mm - LABELS_MM)
     for axes in grid.flat[len(plan.panels) :]:
         axes.set_axis_off()
     return end_names

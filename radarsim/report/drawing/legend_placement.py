@@ -13,6 +13,7 @@ from radarsim.report.drawing.line_points import rough_points
 from radarsim.report.drawing.model import Figure, Line, Panel, Style
 from radarsim.report.drawing.style import LETTER_MM, ROUGH_KEY, ROW_MM, SAMPLE_MM, wrap
 from radarsim.report.math_text import plain_text
+from radarsim.report.wording import with_unbroken_units
 
 MAX_END_NAME_LETTERS = 28  # of a name at a line's end
 MAX_END_NAMES_SHARE = 0.3  # of a panel's cell, for names at the ends of its lines
@@ -39,7 +40,7 @@ class Legend:
     def names(self, width_mm: float) -> list[str]:
         """The names, those that are longer than a width broken into rows."""
         letters = (width_mm - SAMPLE_MM) / LETTER_MM
-        return [wrap(name, letters, " ") for name in self.keys]
+        return [wrap(with_unbroken_units(name), letters, " ") for name in self.keys]
 
     def height_mm(self, width_mm: float) -> float:
         """Height of the legend at a width."""
@@ -176,10 +177,11 @@ def _legend_keys(panel: Panel, at_ends: bool, explained_crosses: set[str]) -> Le
 
 
 def at_width(figure: Figure, width_mm: float | None) -> Figure:
-    """The figure at a width, with as many columns as leave enough width for a panel; unchanged without a width."""
-    if width_mm is None or width_mm == figure.width_mm:
-        return figure
-    columns = max(1, min(figure.columns, int(width_mm // MIN_PANEL_MM)))
+    """The figure at a width, with as many columns as leave enough width for a panel, and no taller than a page; without
+    a width, at its own."""
+    is_own = width_mm is None or width_mm == figure.width_mm
+    width_mm = figure.width_mm if width_mm is None else width_mm
+    columns = figure.columns if is_own else max(1, min(figure.columns, int(width_mm // MIN_PANEL_MM)))
     rows = -(-sum(bool(panel.marks) for panel in figure.panels) // columns)
-    height = max(MIN_PANEL_HEIGHT_MM, min(figure.panel_height_mm, MAX_FIGURE_MM / max(rows, 1)))
+    height = min(figure.panel_height_mm, max(MIN_PANEL_HEIGHT_MM, MAX_FIGURE_MM / max(rows, 1)))
     return replace(figure, width_mm=width_mm, columns=columns, panel_height_mm=height)

@@ -51,7 +51,7 @@ def draw_legend(
 
 
 def draw_legend_below(axes: Axes, legend: Legend | None, width_mm: float) -> None:
-    """Draw the legend of a panel below its axis, no wider than its cell."""
+    """Draw the legend of a panel below its axis, no wider than asked."""
     if legend is None:
         return
     origin = axes.transAxes + ScaledTranslation(0, -AXIS_MM * MM, axes.figure.dpi_scale_trans)

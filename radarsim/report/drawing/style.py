@@ -23,6 +23,7 @@ TITLE_LETTERS_PER_MM = 0.45  # of a panel's cell with its axis, in the bold of t
 HEADLINE_LETTERS_PER_MM, HEADLINE_MM = 0.64, 3.6  # of a figure's width; height of a line
 LABEL_LETTERS_PER_MM = 0.62  # of an axis, in the letters of labels
 AXIS_MM = 9.0  # of the ticks and the label of an axis of x
+LABELS_MM = 11.0  # of the ticks and the label of an axis of y
 SIDE_MM = 14.0  # of those of an axis of y, with the gap to the next panel
 LETTER_EM = 0.62  # mean width of a digit, in its size
 NAME_LETTER_MM, NAME_LINE_MM = 1.32, 3.4  # of names above rows and panels: a letter, a line
