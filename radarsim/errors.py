@@ -14,6 +14,15 @@ def argument(name: str, option: str = "") -> str:
     return (option or f"--{name}") if ON_COMMAND_LINE.get() else name
 
 
+def count_text(count: float) -> str:
+    """A whole number in a message, as answers write it: in groups of three from five digits on.
+
+    >>> count_text(4000), count_text(12000)
+    ('4000', '12,000')
+    """
+    return f"{count:,.0f}" if abs(count) >= 10_000 else f"{count:.0f}"
+
+
 AUTHOR_ERRORS = Exception, SystemExit  #: what code that is not radarsim's may raise: a package may call sys.exit
 
 

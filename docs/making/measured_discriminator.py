@@ -66,7 +66,7 @@ def passes(case: str, name: str) -> Callable[[Results], str]:
 
 
 def efficiency(stem: str, case: str, column: str, figures: int, *names: str) -> Callable[[Results], str]:
-    """From the least to the largest ratio of σ to the potential one among the components, last window."""
+    """From the least to the largest ratio of σ to the Cramér–Rao bound among the components, last window."""
 
     def text(results: Results) -> str:
         ratios = []
@@ -126,7 +126,7 @@ def rival(results: Results) -> list[tuple]:
 
 
 def motion(results: Results) -> list[tuple]:
-    """What the potential spreads mean in velocity and acceleration, by band."""
+    """What the Cramér–Rao bounds mean in velocity and acceleration, by band."""
     heads = ("velocity at the start, m/s", "at the middle", "acceleration at the start, m/s²", "at the middle")
     table_rows: list[tuple] = [("band", "λ, m", *heads)]
     table = select_rows(results, PAPER, "motion")
@@ -150,7 +150,7 @@ def model_error(column: str) -> Callable[[Results], str]:
 
 
 def wide(results: Results) -> str:
-    """σ of f₀ of the first window alone over the potential one of the burst (P4.7)."""
+    """σ of f₀ of the first window alone over the Cramér–Rao bound of the burst (P4.7)."""
     part_name = "RMS error of f0 of the first window over the Cramér–Rao bound of the burst (σ² = 2.25, c = 1)"
     return claim_value(PAPER, "P4.7", part_name, "")(results)
 

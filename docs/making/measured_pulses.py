@@ -34,7 +34,7 @@ def sigma(results: Results, stem: str, case: str, name: str, component: str) -> 
 
 
 def bound_of(results: Results, stem: str, case: str) -> float:
-    """The Fisher bound of the velocity from the first burst of a case, m/s."""
+    """The Cramér–Rao bound of the velocity from the first burst of a case, m/s."""
     estimates = select_rows(results, stem, "estimates", case=case.partition(" ")[2], filter="ideal")
     return float(estimates.iloc[0]["crb"])
 
@@ -130,12 +130,12 @@ def tracks(results: Results) -> str:
 
 
 def accuracy(results: Results) -> str:
-    """The Fisher bound of velocity in the long bursts, mm/s."""
+    """The Cramér–Rao bound of velocity in the long bursts, mm/s."""
     return f"{1e3 * select_rows(results, 'pulses_acceleration', 'estimates', component='Vr').iloc[0]['crb']:.2g}"
 
 
 def radars(results: Results) -> list[tuple]:
-    """A burst of each radar of P1 whose Fisher bound is its σ_V, and what the track makes of it."""
+    """A burst of each radar of P1 whose Cramér–Rao bound is its σ_V, and what the track makes of it."""
     table_rows: list[tuple] = [
         (
             *("radar", "λ, m", "σ_V, m/s", "T √E, ms", "T at 15 dB, ms", "pulses at 1 kHz"),

@@ -18,6 +18,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from radarsim.language.numerals import group_digits
+
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 MARK = re.compile(r"<!-- (table|value): (\w+) -->(.*?)<!-- end -->", re.DOTALL)
@@ -60,7 +62,7 @@ def filled(page: str, results: Results) -> str:
     def filled_mark(mark: re.Match) -> str:
         kind, name = mark[1], mark[2]
         value = makers[name](results)
-        inner = f"\n{table(value)}\n" if kind == "table" else value
+        inner = group_digits(f"\n{table(value)}\n" if kind == "table" else value)
         return f"<!-- {kind}: {name} -->{inner}<!-- end -->"
 
     return MARK.sub(filled_mark, page)

@@ -18,7 +18,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any, Self
 
-from radarsim.errors import ConfigError, StoreError
+from radarsim.errors import ConfigError, StoreError, count_text
 from radarsim.report import atomic_files, provenance
 from radarsim.system.private_files import create_private_file, make_private_folder
 
@@ -76,19 +76,20 @@ def _entry(content: bytes) -> dict[str, Any]:
 def _size_faults(contents: Mapping[str, bytes]) -> list[str]:
     """Why contents are more than an archive holds."""
     faults = [
-        f"{name}: has {len(content):,} bytes, the limit is {MAX_FILE_BYTES:,}"
+        f"{name}: has {count_text(len(content))} bytes, the limit is {count_text(MAX_FILE_BYTES)}"
         for name, content in contents.items()
         if len(content) > MAX_FILE_BYTES
     ]
     total = sum(map(len, contents.values()))
     if total > MAX_TOTAL_BYTES:
-        faults.append(f"has {total:,} bytes, the limit is {MAX_TOTAL_BYTES:,}")
+        faults.append(f"has {count_text(total)} bytes, the limit is {count_text(MAX_TOTAL_BYTES)}")
     return faults
 
 
 def _name_faults(names: Sequence[str]) -> list[str]:
     """Why names are not those of files in an archive."""
-    faults = [f"has {len(names):,} files, the limit is {MAX_FILES:,}"] if len(names) > MAX_FILES else []
+    limit = f"the limit is {count_text(MAX_FILES)}"
+    faults = [f"has {count_text(len(names))} files, {limit}"] if len(names) > MAX_FILES else []
     faults += [f"{name!r}: is no path of a file in an archive" for name in names if not _is_safe(name)]
     folded_names: set[str] = set()
     for name in names:
@@ -191,7 +192,7 @@ class Archive:
         size = self._file.seek(0, os.SEEK_END)
         count, directory_size, directory = self._directory_end(size)
         if count > MAX_FILES or directory_size > count * (ENTRY_BYTES + MAX_NAME_BYTES):
-            raise self._refusal(f"it lists {count:,} files, the limit is {MAX_FILES:,}")
+            raise self._refusal(f"it lists {count_text(count)} files, the limit is {count_text(MAX_FILES)}")
         try:
             self._zip = zipfile.ZipFile(self._file)
         except (zipfile.BadZipFile, NotImplementedError, ValueError, struct.error) as error:
@@ -207,7 +208,7 @@ class Archive:
         if offset != directory:
             raise self._refusal("there are bytes before its list of files")
         if sum(info.file_size for info in infos) > MAX_TOTAL_BYTES + MAX_MANIFEST_BYTES:
-            raise self._refusal(f"it holds over {MAX_TOTAL_BYTES:,} bytes")
+            raise self._refusal(f"it holds over {count_text(MAX_TOTAL_BYTES)} bytes")
         return infos
 
     def _directory_end(self, size: int) -> tuple[int, int, int]:

@@ -32,9 +32,9 @@ DEPENDENCES = {  # warnings on a filter whose realisations depend on each other,
         "and are shown of one block alone; plots.normals(m) and plots.uniforms(m) give it others"
     ),
     "shared": term(
-        "{name}: seeds its random numbers anew, so that all realisations share them: its results are of this seed, and "
-        "no interval holds; plots.normals(m) and plots.uniforms(m) give each realisation others, and what is drawn in "
-        "__init__ is part of the filter"
+        "{name}: seeds its random numbers again, so that all realisations share them: its results are of this seed, "
+        "and no interval holds; plots.normals(m) and plots.uniforms(m) give each realisation others, and what is "
+        "drawn in __init__ is part of the filter"
     ),
     "place": term(
         "{name}: its estimates depend on the row of a realisation in the batch, in every block alike: no interval "

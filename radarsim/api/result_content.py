@@ -218,7 +218,7 @@ def _gains_against(result: CaseResult, tables_by_name: Mapping[str, "pd.DataFram
     gains_by_filter = [(row["filter"], compared_value.row_value(row, GAIN)) for _, row in last.iterrows()]
     texts = [f"{quote_name(name)} {gain_sentences.percent_text(gain, result.count)}" for name, gain in gains_by_filter]
     text = tr(
-        "{case}, gain in {component} against {base} at {t} s: {filters}.",
+        "{case}, gain in {component} over {base} at {t} s: {filters}.",
         case=result.name,
         base=quote_name(result.baseline),
         component=last["component"].iloc[0],

@@ -15,7 +15,7 @@ from radarsim.api.result_content import question_text
 from radarsim.api.result_folder import ResultFolder, choose_result
 from radarsim.api.stored_runs import stored_result
 from radarsim.config.experiment import Experiment
-from radarsim.errors import ConfigError, StoreError
+from radarsim.errors import ConfigError, StoreError, count_text
 from radarsim.extensions import extensions
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class StoredCase:
         self.user_filters = None
 
     def __repr__(self) -> str:
-        return f"<case {self.name}: {self.count:,} realisations>"
+        return f"<case {self.name}: {count_text(self.count)} realisations>"
 
 
 class TableResult(Result):

@@ -19,7 +19,7 @@ from radarsim.engine.blocks import Total
 from radarsim.engine.collect import read_stored
 from radarsim.engine.store.inventory import Inventory, take_inventory
 from radarsim.engine.store.store import Store
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, count_text
 from radarsim.language.translate import join_names, shorten_names, tr
 from radarsim.report.stored_tables import find_record
 from radarsim.studies import registry
@@ -149,9 +149,10 @@ def missing_blocks_line(name: str, stock: Inventory, store: Store) -> str:
     out = store.path.parent.parent
     if not stock.stored:
         reasons = [*store.warnings, *(["those there are of other sources, as before an edit"] * store.superseded())]
-        return "; ".join([f"{name}: {stock.requested:,} realisations are not stored in {out}", *reasons])
+        return "; ".join([f"{name}: {count_text(stock.requested)} realisations are not stored in {out}", *reasons])
     missing = missing_realisations(stock)
-    return f"{name}: {stock.stored:,} of {stock.requested:,} realisations are stored in {out}; missing: {missing}"
+    counts = f"{count_text(stock.stored)} of {count_text(stock.requested)} realisations"
+    return f"{name}: {counts} are stored in {out}; missing: {missing}"
 
 
 def make_result(experiment: Experiment, simulated: SimulatedCases, facts: dict[str, Any], repeat: str) -> "Result":

@@ -86,7 +86,7 @@ def phase_prior(sigma: np.ndarray) -> np.ndarray:
 
 
 def spreads(information: np.ndarray) -> np.ndarray:
-    """Potential standard deviations (size,) that an information matrix allows; infinite where it is singular."""
+    """Cramér–Rao bounds (size,) that an information matrix allows; infinite where it is singular."""
     try:
         with np.errstate(divide="ignore", invalid="ignore"):
             variance = np.diag(balanced_inverse(information))

@@ -23,7 +23,7 @@ class CommonKeys(Model):
     study: Stem | None = key("study", "the study; it determines the other keys", None)
     include: Annotated[tuple[Stem | dict[str, Anything], ...], Field(min_length=1)] | None = key(
         "included configs",
-        "stems of other configs to run together, or whole configs with a name; study keys given beside it override "
+        "stems of other configs to run together, or whole configs with a name; study keys given with it override "
         "theirs",
         None,
     )

@@ -8,6 +8,7 @@ from typing import Any
 
 from radarsim.config.identity import all_keys, portable_filter, recorded_keys
 from radarsim.config.value_text import one_line, short_number
+from radarsim.errors import count_text
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Case:
 
     def __repr__(self) -> str:
         filters = ", ".join(member.name for member in (*self.spec.members, *self.user_filters))
-        count = f"{self.realisations:,} realisation{'s' * (self.realisations != 1)}"
+        count = f"{count_text(self.realisations)} realisation{'s' * (self.realisations != 1)}"
         return f"<case {self.name}: {count}, seed {self.seed}; filters {filters}>"
 
     @property

@@ -31,7 +31,7 @@ class Radar(radial_keys.Radar):
         "detection probability", "probability of a plot of the target after the first", 1.0, symbol="P_D", gt=0
     )
     false_plots_per_km2: NonNegative = key(
-        "false plots per scan", "mean number per scan and km², of any velocity", 0.0, symbol="λ", unit="km⁻²"
+        "clutter density", "mean number of false plots per scan and km², of any velocity", 0.0, unit="km⁻²"
     )
     false_plots_from_s: NonNegative = key(
         "start of false plots", "time after the first plot from which there are false plots, s", 0.0

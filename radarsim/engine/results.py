@@ -6,6 +6,8 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from radarsim.errors import count_text
+
 
 @dataclass(frozen=True)
 class Axes:
@@ -71,7 +73,7 @@ class CaseResult(Generic[A_co]):
 
     def __repr__(self) -> str:
         filters = ", ".join(self.axes.filters)
-        count = f"{self.count:,} realisation{'s' * (self.count != 1)}"
+        count = f"{count_text(self.count)} realisation{'s' * (self.count != 1)}"
         return f"<case {self.name}: {count}, {len(self.axes.k)} scans; filters {filters}>"
 
     @property

@@ -32,6 +32,7 @@ from radarsim.config.model import Model
 from radarsim.config.validate import validate
 from radarsim.config.value_text import KeyPath
 from radarsim.config.yaml_io import parse_yaml, read_document
+from radarsim.errors import count_text
 from radarsim.papers import expected_ranges
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.claim_keys import ChoiceKeys, ChoicesKeys, ClaimKeys, FileKeys, OwnFileKeys, PartKeys
@@ -264,7 +265,7 @@ class _Reader:
                 raise _UnknownNameError
             axes.append([dict(zip(variables, row, strict=True)) for row in rows])
         if not 1 <= (count := math.prod(map(len, axes))) <= MAX_PARTS:
-            self._add(path, f"makes {count:,} parts; allowed: 1 to {MAX_PARTS:,}", each)
+            self._add(path, f"makes {count_text(count)} parts; allowed: 1 to {count_text(MAX_PARTS)}", each)
             raise _UnknownNameError
         for combination in itertools.product(*axes):
             yield {name: value for row in combination for name, value in row.items()}

@@ -104,7 +104,7 @@ def verdict_sentence(parts: Sequence[Mapping]) -> str:
         text = f"**{text}**"
     needed = cell_number(first["needed"])
     if UNDECIDED in (first["class"], first["as_shipped"]) and needed is not None:
-        notes.append(tr("{needed} realisations would decide", needed=f"{round_up(needed):,}"))
+        notes.append(tr("{needed} realisations would decide", needed=numeral(str(round_up(needed)))))
     if interpretations := cell_number(first["of"]):
         holds = cell_number(first["holds"])
         notes.append(

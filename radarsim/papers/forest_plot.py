@@ -53,7 +53,7 @@ def forest_plot(rows: Sequence[Mapping]) -> Figure | None:
     counted = ", ".join(class_count(kind, classes[kind]) for kind in CLASS_ORDER if classes[kind])
     return Figure(
         name="claims",
-        title=tr("Claims against what their papers say"),
+        title=tr("Claims compared with the papers"),
         caption=plural(
             "Of {count} claim: {counted}. ", "Of {count} claims: {counted}. ", len(judged_claims), counted=counted
         )

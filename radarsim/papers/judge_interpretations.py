@@ -11,7 +11,7 @@ from radarsim.api import arguments
 from radarsim.api.progress import Progress, TimedProgress
 from radarsim.api.simulate_cases import RunOptions
 from radarsim.engine.stop_conditions import AnyStop, Signals, Stop, TimeLimit
-from radarsim.errors import ConfigError, argument
+from radarsim.errors import ConfigError, argument, count_text
 from radarsim.papers.claim_outcome import round_up
 from radarsim.papers.interpretation_files import outdated_configs, write_files
 from radarsim.papers.interpretation_runs import FIGURE_S, InterpretationRuns
@@ -133,7 +133,7 @@ def _undecided_message(verdicts: ClaimVerdicts) -> str:
     would = (
         "a value lies on a border: more realisations would not decide"
         if needed is None
-        else f"about {round_up(needed):,} would"
+        else f"about {count_text(round_up(needed))} would"
     )
-    undecided, n = len(verdicts.undecided), verdicts.fewest_realisations
-    return f"{verdicts.claim.id} not yet decided under {undecided} interpretations at {n:,} realisations; {would}"
+    undecided, n = len(verdicts.undecided), count_text(verdicts.fewest_realisations)
+    return f"{verdicts.claim.id} not yet decided under {undecided} interpretations at {n} realisations; {would}"

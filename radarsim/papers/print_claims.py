@@ -201,7 +201,7 @@ def print_interpretations(verdicts: "InterpretationVerdicts", detailed: bool) ->
         curves = sum(name.endswith(".svg") for name in verdicts.files)
         file = str(verdicts.folder / "interpretations.csv")
         curve_count = plural("{count} curve", "{count} curves", curves)
-        print_field("table", tr("{file}, {curves} beside it", file=file, curves=curve_count) if curves else file)
+        print_field("table", tr("{file}, with {curves}", file=file, curves=curve_count) if curves else file)
     if verdicts.outdated:
         command = f"radarsim report {shlex.join(verdicts.outdated)}{repeat_command.out_option(verdicts.folder.parent)}"
         text = tr(

@@ -34,7 +34,7 @@ PLAIN_REASONS = (
     *(term("no such experiment is shipped"), term("a required case is missing"), term("there is no gain")),
     term("its measure gives no number"),
     *(term("there is nothing to measure it with"), term("no such scans"), term("not known exactly")),
-    *(term("no Kalman filter with manoeuvre variance"), term("gains against growing memory")),
+    *(term("no Kalman filter with manoeuvre variance"), term("gains over growing memory")),
     *(term("the run ends before the manoeuvre does"), term("the errors of its realisations are not known")),
     term("(15) has no root: with the phase in it, its left side exceeds c at every length"),
 )

@@ -14,7 +14,7 @@ from radarsim.api import configs, result_content, simulate_cases
 from radarsim.api.progress import Progress
 from radarsim.api.simulate_cases import RunOptions, SimulatedCases
 from radarsim.config.experiment import Experiment
-from radarsim.errors import ConfigError
+from radarsim.errors import ConfigError, count_text
 from radarsim.papers.claim_outcome import round_up
 from radarsim.papers.claim_rows import cell_number, group_by_claim, is_extension
 from radarsim.papers.study_claims import claims_of
@@ -93,8 +93,8 @@ def _undecided_rows(rows: Sequence[dict[str, Any]]) -> list[str]:
         remedy = (
             "its value lies on a border: more realisations would not decide"
             if needed is None
-            else f"about {round_up(needed):,} would"
+            else f"about {count_text(round_up(needed))} would"
         )
         max_realisations = max(cell_number(part["n"]) or 0.0 for part in parts)
-        lines.append(f"{parts[0]['claim']} not yet decided at {max_realisations:,.0f} realisations; {remedy}")
+        lines.append(f"{parts[0]['claim']} not yet decided at {count_text(max_realisations)} realisations; {remedy}")
     return lines

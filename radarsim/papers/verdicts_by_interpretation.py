@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 from radarsim.errors import MeasureError
+from radarsim.language.numerals import numeral
 from radarsim.language.translate import tr
 from radarsim.papers.claim import Claim, Part
 from radarsim.papers.claim_outcome import ClaimOutcome, claim_outcome, largest_needed, round_up
@@ -192,14 +193,19 @@ class ClaimVerdicts:
         nothing."""
         if self.outcome is None or self.outcome.kind != UNDECIDED:
             return ""
-        values, needed = {"count": len(self.undecided), "n": f"{self.fewest_realisations:,}"}, self.outcome.needed
+        values, needed = (
+            {"count": len(self.undecided), "n": numeral(str(self.fewest_realisations))},
+            self.outcome.needed,
+        )
         if needed is None:
             return tr(
                 "{count} open at {n} realisations: a value lies on a border, and more realisations would not decide",
                 **values,
             )
         return tr(
-            "{count} open at {n} realisations, about {needed} would decide", **values, needed=f"{round_up(needed):,}"
+            "{count} open at {n} realisations, about {needed} would decide",
+            **values,
+            needed=numeral(str(round_up(needed))),
         )
 
 

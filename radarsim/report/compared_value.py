@@ -71,8 +71,17 @@ class ComparedValue:
 
 
 def simultaneity_text(count: int) -> str:
-    """That intervals hold for so many values at once, and how surely; where the sentence names what these are."""
-    return tr("95 % for both together") if count == 2 else tr("95 % for all {count} together", count=count)
+    """That intervals hold for so many simulated values at once, and how surely."""
+    if count == 2:
+        return tr("95 % for both simulated values together")
+    return plural("95 % for {count} simulated value", "95 % for all {count} simulated values together", count)
+
+
+def cases_together(count: int) -> str:
+    """That intervals hold for so many cases at once."""
+    if count == 2:
+        return tr("95 % for both cases together")
+    return plural("95 % for {count} case", "95 % for all {count} cases together", count)
 
 
 def filters_together(count: int) -> str:

@@ -73,7 +73,7 @@ def _figure(name: str, grid: sweep_figures.SweptGrid, panels: Sequence[Panel]) -
     members = grid.members
     axes, (first, second) = members[0].axes, (key_labels.key_label(members[0], key).text for key in grid.keys)
     caption = tr(
-        "Gain over {base} in the RMS error at the last scan against the {first} and the {second}, ± half the width of "
+        "Gain over {base} in the RMS error at the last scan versus the {first} and the {second}, ± half the width of "
         "its 95 % interval (none where filters are nearly alike), of {realisations} in each cell.",
         base=axes.filters[axes.baseline],
         first=first,
@@ -101,7 +101,7 @@ def gain_map_sentences(
                     compared_value.extreme(chosen, GAIN, largest=largest) for largest in (False, True)
                 )
                 text = tr(
-                    "Gain of {filter} against {base} in the {quantity} at the last scan: {least} ({where_least}) to "
+                    "Gain of {filter} over {base} in the {quantity} at the last scan: {least} ({where_least}) to "
                     "{greatest} ({where_greatest}){remark}.",
                     filter=quote_name(filter_name),
                     base=quote_name(axes.filters[axes.baseline]),

@@ -9,13 +9,14 @@ from radarsim.config.labels import Label
 from radarsim.config.labels import label as label_of
 from radarsim.engine.results import CaseResult
 from radarsim.language.numerals import power_of_ten
-from radarsim.language.translate import tr
+from radarsim.language.translate import join_names, plural, tr
 from radarsim.report import wording
 
 NEAR_ONE = 0.999  # probabilities above it differ only in further digits
 LONG = 5  # powers of ten from this one on are written raised
 GREEK = {"b": "\\beta", "e": "\\varepsilon"}  # bearing and elevation, as the components' names begin or end
 DEGREES = 180 / np.pi
+PAPER_RADAR = re.compile(r"RLS \d")
 FEW_DIGITS = 3  # of an angle that was given in radians
 POWERS = ("manoeuvre_variance",)  # swept keys written as powers of ten
 
@@ -123,6 +124,13 @@ def key_label(result: CaseResult, key: str) -> Label:
     """The name of a key of a case, in the current language; its unit as in tables."""
     key_text = label_of(result.spec, key)
     return key_text._replace(text=tr(key_text.text))
+
+
+def list_radars(names: Sequence[str]) -> str:
+    """Names of radars in a question; those of the papers, RLS 1 to 5, with the word that says what they are."""
+    if not all(PAPER_RADAR.fullmatch(name) for name in names):
+        return join_names(names)
+    return plural("the radar {names}", "the radars {names}", len(names), names=join_names(names))
 
 
 def unit_label(name: str) -> str:

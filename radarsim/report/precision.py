@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from radarsim.engine.results import CaseResult
+from radarsim.errors import count_text
 from radarsim.report.quantities import SIGMA, Quantity
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class WidestInterval:
         width = f"± {self.percent:.3g} {self.of.half_width_unit}" if math.isfinite(self.percent) else "not known"
         if self.below is not None:
             width = f"none seen, so below {self.below:.2g},"
-        return f"{self.case}: filter {self.place()}: {self.of.words} {width} at {self.count:,} realisations"
+        return f"{self.case}: filter {self.place()}: {self.of.words} {width} at {count_text(self.count)} realisations"
 
     def place(self) -> str:
         """Filter, component and scan, as far as it has them."""

@@ -55,7 +55,7 @@ def _differing_settings(
     rows: list[tuple[object, ...]] = []
     for case in cases[:MAX_CASE_ROWS]:
         values = (settings[case.name].get(key, ("–", ""))[0] for key in keys)
-        rows.append((case.name, *values, numeral(f"{case.realisations:,}"), case.seed))
+        rows.append((case.name, *values, numeral(f"{case.realisations:,}"), str(case.seed)))
     title = tr("How the cases differ")
     if omitted := len(cases) - len(rows):
         title = tr("How the cases differ (first {shown}; {left} more in run.json)", shown=len(rows), left=omitted)

@@ -101,11 +101,11 @@ def line_figure(name: str, key: str, groups: Sequence[Sequence[CaseResult]], cur
     if not panels_drawn:
         return None
     caption = tr(
-        "RMS errors at the last scan against the {key}, from {realisations} each.",
+        "RMS errors at the last scan versus the {key}, from {realisations} each.",
         key=key_labels.key_label(members[0], key).text,
         realisations=case_selection.realisations_text(members),
     )
-    title = tr("σ versus {key}", key=key_labels.key_label(members[0], key).text)
+    title = tr("RMS errors versus {key}", key=key_labels.key_label(members[0], key).text)
     if draw_panel is _row_panel:
         return row_panels.row_figure(name, title, caption, panels_drawn)
     figure = panel_layout.arrange_columns(Figure(name, title, caption, tuple(panels_drawn)))
@@ -236,15 +236,15 @@ def map_figure(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], 
         return None
     first, second = (key_labels.key_label(members[0], key).text for key in keys)
     caption = tr(
-        "RMS error of {component} at the last scan against the {first} and the {second}, from {realisations} per cell. "
-        "Framed: the least of each map.",
+        "RMS error of {component} at the last scan versus the {first} and the {second}, from {realisations} per "
+        "cell. Framed: the least of each map.",
         component=component,
         first=first,
         second=second,
         realisations=case_selection.realisations_text(members),
     )
     caption += case_selection.left_out_remark(filters, filters[:MOST_PANELS])
-    return grid.figure(name, tr("σ versus {first} and {second}", first=first, second=second), caption, maps)
+    return grid.figure(name, tr("RMS error versus {first} and {second}", first=first, second=second), caption, maps)
 
 
 def _map_axis(result: CaseResult, key: str, values: Sequence) -> Axis:

@@ -68,7 +68,7 @@ def sigma_figure(name: str, results: Sequence[CaseResult], curves: Mapping, comp
         for panel in _sigma_panels(title, members, curves, component, filters)
     ]
     caption = tr(
-        "Root-mean-square error of the {quantity} against time, from {realisations}.",
+        "Root-mean-square error of the {quantity} versus time, from {realisations}.",
         quantity=component.words,
         realisations=realisations_text(results),
     )
@@ -212,8 +212,8 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
     if not pairs:
         return None
     caption = tr(
-        "Mean (bias) and standard deviation of the error in the {quantity}, from {realisations}; σ² is the sum of "
-        "their squares. Only cases whose bias sometimes exceeds the standard deviation.",
+        "Mean (bias) and standard deviation of the error in the {quantity}, from {realisations}; their squares "
+        "add to that of the RMS error. Only cases whose bias sometimes exceeds the standard deviation.",
         quantity=component.words,
         realisations=realisations_text(results),
     )

@@ -38,7 +38,7 @@ def number(value: float, digits: int = 4) -> str:
     A number under one is never rounded to one.
 
     >>> [number(one) for one in (25600.0, 1e10, 2.56e7, -0.00005, 0.25, 0.99999)]
-    ['25600', '10¹⁰', '2.56·10⁷', '−5·10⁻⁵', '0.25', '0.99999']
+    ['25,600', '10¹⁰', '2.56·10⁷', '−5·10⁻⁵', '0.25', '0.99999']
     """
     if math.isnan(value):
         return ""

@@ -64,7 +64,7 @@ def gain_sentences(
     return [
         Sentence(
             tr(
-                "{subject}, gain in {what}, {filter} over {baseline}{remark}: {clauses}.",
+                "{subject}, gain of {filter} over {baseline} in {what}{remark}: {clauses}.",
                 subject=subject,
                 what=what,
                 filter=quote_name(other.name),
@@ -93,7 +93,7 @@ def _clauses(key: NoiseKey, baseline: FilterChoices, other: FilterChoices) -> It
     texts = [tr(form, gain=_span_text(gains[value], is_measured), value=key.value_text(value)) for value in ends]
     if texts:
         gains_text = texts[0] if len(texts) == 1 else tr("{low} to {high}", low=texts[0], high=texts[1])
-        yield tr("with one {symbol} for both {gains}", symbol=key.symbol, gains=gains_text)
+        yield tr("{gains} with the same {symbol} for both", symbol=key.symbol, gains=gains_text)
 
 
 def _gain(baseline: Estimate, sigma: Estimate) -> Estimate:

@@ -25,7 +25,7 @@ def test_what_is_known_exactly_is_decided_at_the_first_look(tmp_path):
 
 def test_what_is_left_says_what_it_would_take():
     row = {"paper": "p", "claim": "P9.1", "as_shipped": UNDECIDED, "extension": False, "n": 4000, "needed": 12345.0}
-    assert undecided_rows([row]) == ["P9.1 not yet decided at 4,000 realisations; about 13,000 would"]
+    assert undecided_rows([row]) == ["P9.1 not yet decided at 4000 realisations; about 13,000 would"]
     assert "more realisations would not decide" in undecided_rows([row | {"needed": math.nan}])[0]
     assert undecided_rows([row | {"as_shipped": CONFIRMED}]) == []
     assert undecided_rows([row | {"extension": True}]) == []

@@ -165,7 +165,7 @@ def test_check(config):
         == (printed("check", config, "-n", 1000)[0]["cases"])
     )
     assert outlook.table["realisations"].eq(1000).all()
-    assert "1,000 realisations" in repr(outlook) or "30,000 realisations" in repr(outlook)
+    assert "1000 realisations" in repr(outlook) or "30,000 realisations" in repr(outlook)
 
 
 KEY = "rls2", "radar.sigma_range_m"

@@ -65,7 +65,7 @@ def test_an_unmet_precision_names_the_worst_cell_and_writes_what_is_done(tmp_pat
     row = pd.read_csv(tmp_path / "rls2" / "curves.csv").iloc[int(np.argmax(widths))]
     assert result.stderr == (
         f"rls2: precision of 0.1 % not reached; worst: rls2: filter '{row['filter']}', component {row.component}, "
-        f"k = {row.k}: σ ± {widths.max():.3g} % at 5,000 realisations\n"
+        f"k = {row.k}: σ ± {widths.max():.3g} % at 5000 realisations\n"
     )
     assert record(tmp_path / "rls2")["stop"].startswith("precision of 0.1 % not reached")
     command("report", "rls2", "--no-figures", "--out", tmp_path)
@@ -320,7 +320,7 @@ def test_of_many_cases_the_first_that_lacks_a_share_is_named(tmp_path):
     cases = len(load("rls2_manoeuvre_variance").cases)
     note = command("run", *config, "--no-figures").stderr.splitlines()[0]
     assert (
-        f"{cases * 8_904:,} of {cases * 13_000:,} realisations are stored; missing: realisations 4,096 to 8,191" in note
+        f"{cases * 8_904:,} of {cases * 13_000:,} realisations are stored; missing: realisations 4096 to 8191" in note
     )
     assert f", the first of {cases} such cases)" in note
 

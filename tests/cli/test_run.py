@@ -96,7 +96,7 @@ def test_report_remakes_the_same_tables_and_computes_nothing(done):
     command("report", "rls2", "--no-figures", "--out", done)
     assert csv_bytes(folder) == before
     result = command("report", "rls2", "-n", "1e6", "--out", done, code=2)
-    assert "rls2: 8,192 of 1,000,000 realisations are stored in " in result.stderr
+    assert "rls2: 8192 of 1,000,000 realisations are stored in " in result.stderr
     assert "radarsim run" in result.stderr
 
 

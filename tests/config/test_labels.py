@@ -20,7 +20,7 @@ from radarsim.config.study_keys import StudyKeys
         ("rls2", "scans", Label("number of scans", "", "")),
         ("rls2", "seed", Label("seed", "", "")),
         ("rls2", "radar.no_such_key_mps2", Label("no such key", "", "m/s²")),
-        ("sonar_clutter", "sensor.false_plots_per_km2", Label("false plots per scan", "λ", "km⁻²")),
+        ("sonar_clutter", "sensor.false_plots_per_km2", Label("clutter density", "", "km⁻²")),
         ("sonar_clutter", "sensor.sigma_bearing_deg", Label("σ of the measured bearing", "σ_β", "°")),
         ("sonar_clutter", "sensor.sigma_bearing_rad", Label("σ of the measured bearing", "σ_β", "rad")),
         ("discriminator", "steps", Label("scoring steps per window", "", "")),

@@ -29,14 +29,19 @@ def folded(span):
 
 def test_numbers_are_written_as_the_language_writes_them():
     assert folded(-1.5).startswith("an unambiguous interval of −1.5 m/s,")
-    assert numeral("-1,234.5") == "−1,234.5"
+    assert numeral("-1,234.5") == "−1234.5"
+    assert [numeral(text) for text in ("4,000", "4000", "12000")] == ["4000", "4000", "12,000"]  # four are not split
     assert folded(6.678e9).startswith("an unambiguous interval of 6.678·10⁹ m/s,")
     assert numeral("+1e-05") == "+10⁻⁵"
     with use_language("ru"):
         assert numeral("1.72e-05") == "1,72·10⁻⁵"
         assert folded(-1.5).startswith("интервал однозначности −1,5 м/с ")
         assert numeral("-12,345.5") == "−12\N{NARROW NO-BREAK SPACE}345,5"
-        assert [numeral(text) for text in ("4,000", "-1,234.5")] == ["4000", "−1234,5"]  # four digits are not split
+        assert [numeral(text) for text in ("4,000", "-1,234.5", "12000.5")] == [
+            "4000",
+            "−1234,5",
+            "12\N{NARROW NO-BREAK SPACE}000,5",
+        ]
         assert wording.number(2.5e-7) == "2,5·10⁻⁷"
         assert wording.estimate((12.3, 12.0, 12.6), "м") == "12,30 м [12,00; 12,60]"
         assert tr("{config}: valid", config="1.5") == "1.5: ошибок нет"  # a name of the user's stays as it is
@@ -70,9 +75,12 @@ def test_messages_that_differ_in_their_numbers_are_translated_once():
     assert tr("σ of f# at -0.5 s of 3") == "σ of f# at -0.5 s of 3"
     with use_language("ru"):
         for n in (2, 20, 7):
-            assert tr(f"smoothed σ after {n} plots, over the formula").count(f" {n} ") == 1
-        assert tr("largest relative difference in σ of the two at ρ = -0.5").endswith("ρ = −0,5")
-        assert tr("smoothed σ after n2 plots, over the formula") == "smoothed σ after n2 plots, over the formula"
+            assert tr(f"smoothed RMS error after {n} plots, over the formula").count(f" {n} ") == 1
+        assert tr("largest relative difference in RMS error of the two at ρ = -0.5").endswith("ρ = −0,5")
+        assert (
+            tr("smoothed RMS error after n2 plots, over the formula")
+            == "smoothed RMS error after n2 plots, over the formula"
+        )
 
 
 @pytest.mark.parametrize("code", CODES)

@@ -42,7 +42,7 @@ def test_unequal_decimals_are_seen():
     assert (
         unequal_decimals(
             [
-                "830 s [230, 2,980]",
+                "830 s [230, 2980]",
                 "12.3 m [12.0, 12.6]",
                 "7,0 % [1,5; 12,8]",
                 "100 % [99.62, 100]",

@@ -59,7 +59,7 @@ def test_a_claim_says_how_far_it_stands():
     assert verdict_sentence([row(kind=DEPENDS, **flips | {"as_shipped": DEPENDS})]).startswith("depends on flight")
     few = row(kind=CONFIRMED, overall="", holds=3, of=3, as_shipped=UNDECIDED, needed=8123)
     words = "not yet decided as shipped; confirmed over all interpretations"
-    assert verdict_sentence([few]) == f"{words} (8,200 realisations would decide; true under all 3 interpretations)"
+    assert verdict_sentence([few]) == f"{words} (8200 realisations would decide; true under all 3 interpretations)"
     assert verdict_sentence([row()]) == "**refuted**"  # by how much stands with its parts
 
 

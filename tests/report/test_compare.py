@@ -149,7 +149,7 @@ def test_a_quantity_that_both_studies_measure_has_figures_of_its_own(errors):
     drawn = figures.figures(sides, table.comparison_table([pairs.Pair(sides[1], sides[0])]))
     assert set(drawn) == {"sigma_r", "area_r"}
     values, apart = drawn["area_r"].panels
-    assert (values.y.label, apart.y.label) == ("mean square error $r$, m²", "change against a, %")
+    assert (values.y.label, apart.y.label) == ("mean square error $r$, m²", "change relative to a, %")
     assert [mark.name for mark in values.marks] == ["a, base", "a, one", "b, base", "b, one"]
 
 
@@ -176,12 +176,12 @@ def summary_of(errors, names, filters=("base", "one"), component=None):
 
 def test_a_summary_is_one_sentence_and_one_table_without_the_case_compared_with_itself(errors):
     single = summary_of(errors, "ab")
-    assert re.fullmatch(
-        r"b against a, σ of r at \d+ s: “base” 0 % \(exact\) and “one” 0 % \(exact\)\.", single.sentence
-    )
+    assert re.fullmatch(r"b versus a, σ of r at \d+ s: “base” 0 % \(exact\) and “one” 0 % \(exact\)\.", single.sentence)
     assert single.table.columns[:4] == ("filter", "of", "b", "a")
     several = summary_of(errors, "abc")
-    assert re.fullmatch(r"Against a, σ of r at \d+ s: undecided in 4 of 4 pairs of case and filter\.", several.sentence)
+    assert re.fullmatch(
+        r"Relative to a, σ of r at \d+ s: undecided in 4 of 4 pairs of case and filter\.", several.sentence
+    )
     assert several.table.columns == ("case", "base", "one")
     assert [row[0] for row in several.table.rows] == ["b", "c"]
     itself = [side("a", errors, ["base", "one"], noise="a"), side("b", errors, ["base", "one"], noise="b")]

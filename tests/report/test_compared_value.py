@@ -41,7 +41,7 @@ def test_equal_filters_are_called_equal_and_what_was_not_seen_is_said():
     assert gain_sentences.is_equal(equal)
     assert not gain_sentences.is_equal(gain_value(0.0, -0.1, 0.1))
     assert gain_sentences.percent_text(equal, 1000) == (
-        "identical in all 1,000 realisations: a difference in fewer than 0.3 % would not have shown"
+        "identical in all 1000 realisations: a difference in fewer than 0.3 % would not have shown"
     )
     assert gain_sentences.percent_text(gain_value(-0.707, -0.999, -0.416), 1000) == "−0.707 % [−0.999, −0.416]"
     assert gain_sentences.number_text(equal) == "0 %"  # as one end of a range
@@ -89,7 +89,7 @@ def test_an_extreme_is_the_exact_one_or_says_that_it_was_chosen():
     row, value = compared_value.extreme(rows, GAIN)
     assert (row.name, value.looks) == (0, 2)
     assert value.estimate.lo < 31.1 < 36.7 < value.estimate.hi
-    assert value.choice_remark() == " (95 % for both together)"
+    assert value.choice_remark() == " (95 % for both simulated values together)"
     row, value = compared_value.extreme(rows.assign(exact_percent=[30.9, 31.2]), GAIN)
     assert (row.name, value.value, value.is_exact, value.choice_remark()) == (1, 31.2, True, "")
 
@@ -132,6 +132,6 @@ def test_values_that_noise_orders_are_not_distinguished():
 
 def test_a_remark_stands_once_behind_the_last_value_with_an_interval():
     measured, exact = (ComparedValue(Estimate(5.0, 4.0, 6.0), is_exact).chosen_among(4) for is_exact in (False, True))
-    remark = " (95 % for all 4 together)"
+    remark = " (95 % for all 4 simulated values together)"
     assert compared_value.choice_remark([exact, measured]) == compared_value.choice_remark([measured]) == remark
     assert compared_value.choice_remark([exact, exact]) == ""

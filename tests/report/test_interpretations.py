@@ -165,7 +165,7 @@ def test_what_is_open_says_what_would_decide_it():
     needed = every[1].outcome.needed
     assert 1000 < needed < every[2].outcome.needed
     assert (found.outcome.kind, found.outcome.needed, found.fewest_realisations) == (UNDECIDED, needed, 1000)
-    assert f"1 open at 1,000 realisations, about {round_up(needed):,} would decide" in found.sentence()
+    assert f"1 open at 1000 realisations, about {round_up(needed):,} would decide" in found.sentence()
     assert {row["needed"] for each in every[1:2] for row in verdict_rows(each, verdict_columns([of]))} == {needed}
     assert found.undecided_sentence() in interpretations_page(of, "Nobody 1900", [found])
     assert over(Small(), claim(2, "1")).undecided_sentence() == ""

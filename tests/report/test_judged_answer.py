@@ -29,7 +29,7 @@ def floor_sentence(answer):
 def test_an_equal_filter_has_the_exact_number_and_no_other():
     answer = judged(twin).answer
     first, floor = answer[0], floor_sentence(answer)
-    assert re.search(r"“mine” is equal to r\+Vr, .*, identical in all 1,000 realisations: .* fewer than 0\.3 % ", first)
+    assert re.search(r"“mine” is equal to r\+Vr, .*, identical in all 1000 realisations: .* fewer than 0\.3 % ", first)
     assert first.endswith("; the RMS error of both is 154.7 m.")
     assert floor.endswith(": above it is r+Vr 5.18 %, and “mine” as far.")
 

@@ -139,7 +139,7 @@ def test_events_never_seen_are_told_with_their_bound(results):
     (case,) = results["range_doppler"]
     none = widest_cell(case, folds((1.0, 0.75, 1.0), (0.5, 0.25, 0.75)), WRONG)
     assert (none.filter, none.percent, none.below) == ("sought", np.inf, 0.25)
-    told = f"one: filter 'sought', k = 9: rate of wrong folds none seen, so below 0.25, at {case.count:,} realisations"
+    told = f"one: filter 'sought', k = 9: rate of wrong folds none seen, so below 0.25, at {case.count} realisations"
     assert str(none) == told
     assert widest_cell(case, folds((0.75, 0.5, 1.0), (0.5, 0.25, 0.75)), WRONG).below is None
     unknown = widest_cell(case, folds((np.nan, np.nan, np.nan), (0.5, 0.25, 0.75)), WRONG)

@@ -60,7 +60,7 @@ def test_the_reader_notices_what_contradicts_a_table():
     assert read_sentence("33,8 % [31,1; 36,7]", measured, "ru").read == ["33.8 % [31.1, 36.7]"]
     assert read_sentence(f"at worst 32.0 %{MARK} higher", exact).faults
     assert read_sentence("33.8 % [29.0, 38.0]", measured).faults
-    assert read_sentence("33.8 % [29.0, 38.0] (95 % for all 14 together)", measured).read
+    assert read_sentence("33.8 % [29.0, 38.0] (95 % for all 14 comparisons together)", measured).read
 
 
 def test_the_reader_tells_all_from_nearly_all():
@@ -110,9 +110,9 @@ def test_the_reader_notices_a_ratio_of_others():
     other = "a = 1, σ relative to that at a = 2"
     for sentence, is_right in {
         f"{other}: 4.00 [3.60, 4.44] (A)": True,
-        f"{other} (95 % for all 4 together): 4.00 [3.50, 4.57] (A)": True,
-        f"{other} (95 % for all 4 together): 4.00 [3.60, 4.44] (A)": False,
-        f"{other} (95 % for all 4 together): 4.00 [3.00, 5.30] (A)": False,
+        f"{other} (95 % for all 4 simulated values together): 4.00 [3.50, 4.57] (A)": True,
+        f"{other} (95 % for all 4 simulated values together): 4.00 [3.60, 4.44] (A)": False,
+        f"{other} (95 % for all 4 simulated values together): 4.00 [3.00, 5.30] (A)": False,
         "a = 2, σ relative to that at a = 1: 4.00 [3.60, 4.44] (A)": False,
         "A: σ is up to 1.33 [1.20, 1.48] times that with B (a = 1, scan 1)": True,
         "B: σ is up to 1.33 [1.20, 1.48] times that with A (a = 1, scan 1)": False,

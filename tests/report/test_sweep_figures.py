@@ -73,7 +73,7 @@ def test_gains_over_two_keys_are_maps_with_their_intervals_and_sentences():
     for (k, r), row in (least, greatest):
         assert f"{row['gain_percent']:.3g} %" in sentence.text
         assert f"scans = {k}, σ of the measured range = {r} m" in sentence.text or f"{r} m" in sentence.text
-    assert "(95 % for all 6 together)" in sentence.text
+    assert "(95 % for all 6 simulated values together)" in sentence.text
     assert not list(gain_maps.map_groups(run.run("rls2", realisations=8).cases))
 
 
@@ -195,7 +195,7 @@ def test_targets_that_are_swept_are_named_by_their_kind_and_what_sets_them_apart
     words = ["fly by, speed 280 m/s", "fly by, speed 100 m/s, σ of the first position 800 m", "recorded"]
     result = run.run("rls2", realisations=8, figures=False, overrides=["scans=4"]).cases[0]
     assert [key_labels.shorten_mapping(result, "target", one, targets) for one in targets] == words
-    whole = "distance of closest approach 15000 m, speed 280 m/s, range at the first plot 40000 m"
+    whole = "distance of closest approach 15,000 m, speed 280 m/s, range at the first plot 40,000 m"
     assert (
         key_labels.swept_description(replace(result, swept_values=(("target", past),))) == f"target = fly by, {whole}"
     )

@@ -70,8 +70,8 @@ def test_a_sweep_of_process_noise_says_the_best_of_each_filter_and_the_gain_then
     at_best = 100 * (1 - min(s["r+Vr"] for s in alone.values()) / min(s["r"] for s in alone.values()))
     low, high = map(float, re.search(r"% \((−?[\d.]+) … (−?[\d.]+)\) with each at its best", gain).groups())
     assert low < at_best < high
-    assert gain.startswith("mine, gain in RMS error of the range at worst, r+Vr over r (95 % intervals): ")
-    assert f"with one {symbol} for both" in gain
+    assert gain.startswith("mine, gain of r+Vr over r in RMS error of the range at worst (95 % intervals): ")
+    assert f"with the same {symbol} for both" in gain
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from radarsim.config.find_files import is_stem
 from radarsim.engine.blocks import Node, Partial, Piece, Total
 from radarsim.engine.store.audit import Audit, audit_blocks
 from radarsim.engine.store.block_file import Damage, block_path, decode, read_file
-from radarsim.errors import ConfigError, StoreError
+from radarsim.errors import ConfigError, StoreError, count_text
 from radarsim.report import atomic_files
 from radarsim.report.index_page import INDEX_NAME
 from radarsim.system.directories import is_directory
@@ -173,7 +173,7 @@ def _readme(facts: Mapping[str, Any]) -> str:
     for name, result in sorted(facts.items()):
         counts = sorted({case["realisations"] for case in result["cases"].values()})
         seeds = ", ".join(str(seed) for seed in sorted({case["seed"] for case in result["cases"].values()}))
-        span = " to ".join(f"{count:,}" for count in dict.fromkeys((counts[0], counts[-1])))
+        span = " to ".join(count_text(count) for count in dict.fromkeys((counts[0], counts[-1])))
         lines.append(f"  {name}: {len(result['cases'])} case(s) of {span} realisations, seed {seeds}")
     version = max(str(result["versions"].get("radarsim", "")) for result in facts.values())
     packages = sorted({package for result in facts.values() for package in _packages(result)})

@@ -21,6 +21,7 @@ from radarsim.engine.machine import platform_name
 from radarsim.engine.store.audit import Audit
 from radarsim.engine.store.block_file import block_path
 from radarsim.engine.sums import Sums
+from radarsim.errors import count_text
 from radarsim.extensions import extensions
 from radarsim.report import atomic_files, csv_text, provenance
 from radarsim.report.old_columns import with_current_columns
@@ -145,7 +146,7 @@ def _too_much_sentence(names: Sequence[str], cases: Mapping[str, Case]) -> str:
     """That cases are larger than what is computed again here."""
     largest = max(cases[name].realisations for name in names)
     return (
-        f"{', '.join(names)}: not computed again: {largest:,} realisations are more than is computed here, "
+        f"{', '.join(names)}: not computed again: {count_text(largest)} realisations are more than is computed here, "
         f"{MAX_RECOMPUTED_SCANS:.0e} realisations times scans; `radarsim run` computes them"
     )
 

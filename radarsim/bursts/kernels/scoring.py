@@ -13,9 +13,9 @@ block's centre. With d the mean of ψ − ψ_ref over the block and D its slope,
 
     Σ u e^{-jψ} ≈ e^{-jd} (Z₀ − jD Z₁ − ½D² Z₂).
 
-Without the terms in D, 32 blocks to a window are off by 0.11 potential σ; with them 16 are within 0.02. With d taken at
-the centre and not as the mean, information is lost and σ 0.3 % high. D is cut where the phase turns by one radian rms
-within a block: beyond that the expansion is invalid, and without the limit it drives lost estimates away."""
+Without the terms in D, 32 blocks to a window are off by 0.11 Cramér–Rao bounds; with them 16 are within 0.02. With d
+taken at the centre and not as the mean, information is lost and σ 0.3 % high. D is cut where the phase turns by one
+radian rms within a block: beyond that the expansion is invalid, and without the limit it drives lost estimates away."""
 
 import math
 

@@ -20,7 +20,7 @@ from radarsim.engine.store.block_file import (
 )
 from radarsim.engine.store.store import folder_fault, mixture_warning
 from radarsim.engine.sums import Sums
-from radarsim.errors import StoreError
+from radarsim.errors import StoreError, count_text
 from radarsim.system.private_files import UntrustedFileError
 
 ACROSS_PLATFORMS = 1e-9  # relative: sums made on several platforms agree to this
@@ -104,7 +104,7 @@ def _note_gaps(audit: Audit) -> None:
     end = max((node.stop for node in nodes), default=0)
     for first, stop in gaps(maximal_nodes(nodes, end), end):
         block = audit.pieces[nodes[0]][0]["block"]
-        span = f"realisations {first * block:,} to {stop * block - 1:,}"
+        span = f"realisations {count_text(first * block)} to {count_text(stop * block - 1)}"
         audit.notes.append(f"{audit.path}: {span} are not stored, but later ones are")
 
 

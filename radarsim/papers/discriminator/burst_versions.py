@@ -25,8 +25,8 @@ ROOT_TOLERANCE_PULSES = 1e-7  # pulses
 class Version(NamedTuple):
     """One way to take the burst and (14)–(16).
 
-    sigma: the forecast's spreads, (size,), rad, Hz, …; None: `multiples` of the potential ones. curvature: which window
-    H of (16) belongs to. The phase is that of the first window's problem (15)."""
+    sigma: the forecast's spreads, (size,), rad, Hz, …; None: `multiples` of the Cramér–Rao bounds. curvature: which
+    window H of (16) belongs to. The phase is that of the first window's problem (15)."""
 
     noise_variance: float
     threshold: float
@@ -41,7 +41,7 @@ class Version(NamedTuple):
 
 @dataclass(frozen=True)
 class Burst:
-    """What all versions share: pulse period, s, and the multiples of the potential spreads of the forecast, (size,)."""
+    """What all versions share: pulse period, s, and the multiples of the Cramér–Rao bounds of the forecast, (size,)."""
 
     period_s: float
     multiples: tuple[float, ...]
@@ -64,14 +64,14 @@ def first_windows(burst: Burst, versions: Sequence[Version]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Windows:
-    """Of B versions: the potential spreads (B, size), and the window lengths in pulses, none where there is no root."""
+    """Of B versions: the Cramér–Rao bounds (B, size), and the window lengths in pulses, none where there is no root."""
 
     spreads: np.ndarray
     windows: list[list[int] | None]
 
 
 def design_windows(burst: Burst, versions: Sequence[Version]) -> Windows:
-    """Potential spreads and windows of versions."""
+    """Cramér–Rao bounds and windows of versions."""
     problem = _Problem(burst, versions)
     first = problem.first()
     sequence = [[int(n)] if n else None for n in first]
@@ -134,7 +134,7 @@ class _Problem:
         self._rounding = np.array([version.rounding for version in versions])
 
     def spreads(self) -> np.ndarray:
-        """Potential spreads (B, size) of the whole burst."""
+        """Cramér–Rao bounds (B, size) of the whole burst."""
         indices = np.arange(len(self.pulses))
         variance = np.diagonal(_inverse(self._fisher(indices, self.pulses.astype(float))), axis1=1, axis2=2)
         return np.sqrt(variance) / self._unit

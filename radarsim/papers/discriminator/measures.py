@@ -71,14 +71,14 @@ class Evidence(GeneralEvidence):
         return self.lock(key, "sequence", column, (f"{column}_lo", f"{column}_hi"))
 
     def accuracy(self, key: Key, kind: str, component: str) -> Estimate:
-        """σ of the locked bursts over the potential one of the window, at the last window."""
+        """σ of the locked bursts over the Cramér–Rao bound of the window, at the last window."""
         result, i = self.case(key), self.estimator(key, kind)
         k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
         moments = result.sums["error"][i, k, c]
         return root_mean_square(moments[1], moments[3], result.sums["locks"][i, k, LOCKS.index("lock")])
 
     def over_whole(self, key: Key, kind: str, component: str) -> Estimate:
-        """σ of all bursts at an estimator's last window over the potential one of the whole burst."""
+        """σ of all bursts at an estimator's last window over the Cramér–Rao bound of the whole burst."""
         result, i = self.case(key), self.estimator(key, kind)
         k, c = len(self.windows(key, kind)) - 1, COMPONENTS.index(component)
         moments = result.sums["error_all"][i, k, c]
@@ -86,7 +86,7 @@ class Evidence(GeneralEvidence):
         return Estimate(*(scale * part for part in root_mean_square(moments[1], moments[3], result.count)))
 
     def potential(self, key: Key, component: str) -> Estimate:
-        """Potential spread by the discrete sum over the pulses l = 0 … n − 2, which gives the paper's digits."""
+        """Cramér–Rao bound by the discrete sum over the pulses l = 0 … n − 2, which gives the paper's digits."""
         burst = scenario.configured_burst(self.case(key).spec)
         spreads = bursts_fisher.spreads(bursts_fisher.fisher_sums(burst, len(COMPONENTS), [burst.pulses - 1])[0])
         return exact_number(spreads[COMPONENTS.index(component)])
@@ -184,7 +184,7 @@ def window_growth(evidence: Evidence, better: Key, worse: Key) -> float:
 
 
 def closed_over_sum(evidence: Evidence, key: Key, component: str) -> float:
-    """Potential spread of a component by the closed form over that by the sum over the pulses."""
+    """Cramér–Rao bound of a component by the closed form over that by the sum over the pulses."""
     closed = evidence.case(key).axes.potential_closed_form[COMPONENTS.index(component)]
     return float(closed / evidence.potential(key, component).value)
 
@@ -200,7 +200,7 @@ def lock_loss(evidence: Evidence, key: Key, base: Key, kind: str) -> Estimate:
 
 
 def forecast_spread(evidence: Evidence, key: Key, component: str) -> float:
-    """Printed potential spread times the printed factor."""
+    """Printed Cramér–Rao bound times the printed factor."""
     return float(SPREADS[component][0]) * FACTORS[component]
 
 

@@ -307,7 +307,7 @@ def window_gain(evidence: Evidence, key: Key) -> Estimate:
         for filter_key in (("window", 1, 10), ("growing_memory",))
     )
     if base != case.axes.baseline:
-        raise MissingEvidence("gains against growing memory")
+        raise MissingEvidence("gains over growing memory")
     moments, base_moments = case.sums["error"][f, -1, 0], case.sums["error"][base, -1, 0]
     return statistics.gain(
         moments[1], moments[3], base_moments[1], base_moments[3], case.sums["paired"][f, -1, 0], case.count

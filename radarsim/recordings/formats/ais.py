@@ -75,7 +75,7 @@ class Ais:
         """Notes on reports without a time, and how they get one, and on what is not read."""
         notes = []
         if self.target_count:
-            message = term("targets of a radar beside AIS: {count} ($RATTM or $RATLL; --from nmea reads them)")
+            message = term("targets of a radar in addition to AIS: {count} ($RATTM or $RATLL; --from nmea reads them)")
             notes.append(tr(message, count=self.target_count))
         if self.untimed_count:
             message = term("reports that state no time: {count}; they get the nearest with their second")

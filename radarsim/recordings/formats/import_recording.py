@@ -44,7 +44,7 @@ NO_SITE_FAULT = (
 )
 MAX_LOSS = 0.1  # of the rows that may be left out because of others
 MAX_STANDING_TRACKS = 20  # whose times stand still once, for which a recording is read again
-UNREACHABLE_REASON = term("rows that no target reaches from those beside them")
+UNREACHABLE_REASON = term("rows that no target reaches from neighbouring rows")
 UNKNOWN_RADAR_REASON = term("rows of radar #/#, whose place neither it nor --at says")
 OTHER_KIND_REASONS = {PLOTS: term("plots beside positions"), POSITIONS: term("positions beside plots")}
 SEA_LEVEL_NOTE = term("positions without altitude, placed at sea level: {count} of {all}")

@@ -57,7 +57,7 @@ def _figure(
     against = rows["against_label"].iloc[0] if rows["against_label"].nunique() == 1 else tr("the first")
     difference = Axis(
         label_with_unit(
-            tr("{of} against {name}", of=change_name, name=escape_dollars(against)),
+            tr("{of} relative to {name}", of=change_name, name=escape_dollars(against)),
             "%" if quantity.kind == "size" else unit,
         )
     )
@@ -67,7 +67,7 @@ def _figure(
     )
     caption = (
         tr(
-            "Left: {words} of {value} on common axes. Right: the {of} against {against} at common times.",
+            "Left: {words} of {value} on common axes. Right: the {of} relative to {against} at common times.",
             words=term(quantity.words),
             value=", ".join(side.label for side in visible),
             of=change_name,
@@ -111,7 +111,7 @@ def _change_lines(
             continue
         name = f"{escape_dollars(label)}, {escape_dollars(f)}"
         if has_several_partners:
-            name = tr("{name} against {other}", name=name, other=escape_dollars(against))
+            name = tr("{name} versus {other}", name=name, other=escape_dollars(against))
         i = filters.index(f)
         columns = ["t_s", value, f"{value}_lo", f"{value}_hi", *([exact] if exact else [])]
         marks.append(line_from_rows(line_rows, columns, "", Style(numbers[label], i, i), name))

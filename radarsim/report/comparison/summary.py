@@ -113,18 +113,20 @@ def _sentence(quantity: Quantity, records: Sequence[dict[Any, Any]]) -> str:
         return tr("{label} and {other} have the same numbers.", label=join_names(labels), other=fields["other"])
     if len(labels) == 1 and len(records) <= MAX_NAMED_CHANGES:
         changes = join_names([f"{quote_name(row['filter'])} {_change(row)}" for row in records])
-        return tr("{label} against {other}, {what}: {changes}.", label=labels[0], changes=changes, **fields)
+        return tr("{label} versus {other}, {what}: {changes}.", label=labels[0], changes=changes, **fields)
     signs = [_sign(row) for row in records]
     counts = [tr(words, count=signs.count(sign)) for sign, words in COUNTED_SIGNS.items() if sign in signs]
     fields |= {"counts": join_names(counts)}
     if len(labels) == 1:
         return tr(
-            "{label} against {other}, {what}: {counts} of {count} filters.",
+            "{label} versus {other}, {what}: {counts} of {count} filters.",
             label=labels[0],
             count=len(records),
             **fields,
         )
-    return tr("Against {other}, {what}: {counts} of {count} pairs of case and filter.", count=len(records), **fields)
+    return tr(
+        "Relative to {other}, {what}: {counts} of {count} pairs of case and filter.", count=len(records), **fields
+    )
 
 
 def _sign(row: dict[Any, Any]) -> int:
@@ -142,7 +144,7 @@ def _change(row: dict[Any, Any]) -> str:
 
 def _change_cells(quantity: Quantity, records: Sequence[dict[Any, Any]]) -> tuple[str, list[str]]:
     """The title of a table of changes, and the change of each row; that all are exact stands in the title."""
-    title = tr("{what}, change against {other}", what=_subject(quantity, records[0]), other=_reference(records))
+    title = tr("{what}, change relative to {other}", what=_subject(quantity, records[0]), other=_reference(records))
     exact = [change_texts(row)[1] for row in records]
     if all(exact):
         return tr("{value} (exact)", value=title), exact

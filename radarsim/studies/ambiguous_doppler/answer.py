@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 TablesByName = Mapping[str, "pd.DataFrame"]
 AS_GOOD_PERCENT = 5.0  # above the oracle's σ
+MAX_CASES, MAX_RARE_CASES = 6, 2  # that the answer reports; of more the first and the last
 MAX_LISTED_ERRORS = 3  # of filters in a sentence; of more the least and the greatest
 LOST_PERCENT = 100.0  # above the oracle's σ, from which a σ is rather a share of lost tracks
 
@@ -47,7 +48,7 @@ def warnings(experiment: Experiment) -> list[str]:
 
 def question(experiment: Experiment) -> str:
     """What the experiment asks, in one sentence."""
-    names = join_names(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
+    names = key_labels.list_radars(list(dict.fromkeys(case.spec.device or case.stem for case in experiment.cases)))
     if any(f.folds for case in experiment.cases for f in case.spec.filters):
         if any(case.spec.rare is not None for case in experiment.cases):
             return tr("How often is an ambiguity of the velocity wrong for {radars}?", radars=names)
@@ -65,7 +66,8 @@ def answer(
     Of filters of several orders: the largest error of each over the scans, beside that of the best single order.
     First, of all cases: the best D_M and the gain then; the filter of the least error, or in how many folded velocity
     is as good. scans: those that count, of each case that combines orders."""
-    reported, remark = case_selection.select_reported(results, 6)
+    has_rare_events = any(result.spec.rare is not None for result in results)
+    reported, remark = case_selection.select_reported(results, MAX_RARE_CASES if has_rare_events else MAX_CASES)
     if noise.cases:
         reported, remark = [result for result in results if result.name in noise.cases], []
     of_all_cases = _orders_over_cases(results, tables_by_name, scans) or _as_good_in_cases(results, tables_by_name)
@@ -204,7 +206,7 @@ def _weak_point(
         quantity=next(component.words for component in RADIAL if component.name == worst["component"]),
         ratio=ratio.text(form=".3g"),
         order=quote_name(order["filter"]),
-        chosen=f"; {compared_value.simultaneity_text(looks)}" if ratio.looks > 1 else "",
+        chosen=f"; {compared_value.comparisons_together(looks)}" if ratio.looks > 1 else "",
         case=labels[worst["case"]],
         k=worst["k"],
     )
@@ -237,10 +239,10 @@ def _least_error_of_all(
     equal = [name for name in same_kind if is_equal(_largest_sigma(worst_rows[name][0]), best_value)]
     since_texts = {wording.since(*scans[result.name]) for result in combining}
     text = plural(
-        "Smallest worst-case RMS range error {since}{scans}: {best}, {least}; {kind}, {other}, reaches {most} "
-        "({where}).",
-        "Smallest worst-case RMS range error {since}, over {count} cases{scans}: {best}, {least}; {kind}, {other}, "
-        "reaches {most} ({where}).",
+        "The largest RMS range error {since}{scans} is smallest with {best}: {least}; with {kind}, {other}, it is "
+        "{most} ({where}).",
+        "The largest RMS range error {since} in {count} cases{scans} is smallest with {best}: {least}; with {kind}, "
+        "{other}, it is {most} ({where}).",
         len(combining),
         since=since_texts.pop() if len(since_texts) == 1 else tr("after the start of the track"),
         best=join_names([*map(quote_name, equal)]),
@@ -414,7 +416,7 @@ def _excess_clause(final: "pd.Series[Any]", looks: int) -> Sentence:
         )
     )
     above = ComparedValue(ratio, is_exact=False).chosen_among(looks).mapped(lambda percent: percent - 100.0)
-    fields = {"k": final["k"], "chosen": above.choice_remark()}
+    fields = {"k": final["k"], "chosen": above.choice_remark(compared_value.cases_together)}
     if above.estimate.lo > AS_GOOD_PERCENT:
         text = tr(
             "the RMS velocity error is still {above} above that of unfolded velocity at scan {k}, the last{chosen}",
@@ -436,14 +438,14 @@ def _lost_clause(folds: "pd.Series[Any]", k: int, looks: int) -> Sentence:
     """The share of realisations whose velocity is off by more than half the span at the last scan, k."""
     beyond = Estimate(*(float(folds[key]) for key in (BEYOND_SHARE, f"{BEYOND_SHARE}_lo", f"{BEYOND_SHARE}_hi")))
     share = ComparedValue(beyond, is_exact=False, kind="share").chosen_among(looks)
-    text = tr(
-        "at scan {k} the velocity is off by more than D/2 in {share} of realisations",
-        k=k,
-        share=wording.share(*(100 * end for end in share.estimate)),
-    )
-    text += share.choice_remark()
+    fields = {"k": k, "share": wording.share(*(100 * end for end in share.estimate))}
     if folds[BEYOND_SHARE] > remedy_answer.LOST_SHARE:
-        text = tr("lost: {off}", off=text)
+        text = tr(
+            "the track is lost, at scan {k} the velocity is off by more than D/2 in {share} of realisations", **fields
+        )
+    else:
+        text = tr("at scan {k} the velocity is off by more than D/2 in {share} of realisations", **fields)
+    text += share.choice_remark(compared_value.cases_together)
     return Sentence(text, sentences.intervals("folds", BEYOND_SHARE, folds))
 
 

@@ -36,8 +36,8 @@ class Radar(radial_keys.Radar):
 
     repetition_rate_hz: Positive | Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MAX_RATES)] = key(
         "pulse repetition rate",
-        "pulse repetition rate, Hz; the velocity is folded modulo half the wavelength times this rate; a "
-        "list is used in turn, scan by scan (stagger)",
+        "pulse repetition rate, Hz; the velocity is folded modulo half the wavelength times this rate; the rates of "
+        "a list alternate from scan to scan (stagger)",
         symbol="F_r",
     )
     detection_probability: Annotated[Probability, Field(gt=0)] = key(

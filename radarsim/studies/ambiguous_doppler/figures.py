@@ -44,8 +44,8 @@ SHARES = {  # figure: column of folds.csv, title of the axis, caption
         "right",
         term("P(all folds right)"),
         term(
-            "Share of realisations in which the best hypothesis has all folds right so far. Exact: the nearest fold, "
-            "if the filter's model is true, and the Chinese remainder of two scans."
+            "Share of realisations in which the best hypothesis has all folds right so far. Exact for the nearest "
+            "fold (if the filter's model is true) and for the Chinese remainder of two scans."
         ),
     ),
     "lost": (

@@ -84,9 +84,13 @@ def remedy_sentence(filters: Sequence[tuple[Result, str]], tables_by_name: Table
 def _trial_text(trial: Trial) -> str:
     share = numeral(f"{100 * trial.share:.2g}")
     if math.isnan(trial.gain):
-        return tr("{share} % are lost", share=share)
+        return tr("{share} % of the tracks are lost", share=share)
     gain = numeral(f"{trial.gain:.0f}")
-    return tr("{share} % are lost, {gain} % gain over range alone in range", share=share, gain=gain)
+    return tr(
+        "{share} % of the tracks are lost, {gain} % gain over range alone in the RMS range error",
+        share=share,
+        gain=gain,
+    )
 
 
 def is_lost(result: Result, name: str, tables_by_name: TablesByName) -> bool:

@@ -79,7 +79,7 @@ def _worst_against_design(results: Sequence[CaseResult], tables_by_name: TablesB
         designed=designed,
         times=times,
         count=len(losses),
-        chosen=rate.choice_remark(),
+        chosen=rate.choice_remark(compared_value.cases_together),
     )
     return [Sentence(text, rate.intervals)]
 
@@ -152,15 +152,15 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
         if (case_name := key_labels.without_markup(key_labels.swept_description(result)))
     )
     text = plural(
-        "{estimator}, {count} case of {realisations}: locked at least in {least}; locked at most in {most}.",
-        "{estimator}, {count} cases of {realisations} each ({together}): locked at least in {least}; locked "
-        "at most in {most}.",
+        "{estimator}, share of bursts locked in {count} case of {realisations}: lowest {least}; highest {most}.",
+        "{estimator}, share of bursts locked in {count} cases of {realisations} each ({together}): lowest {least}; "
+        "highest {most}.",
         len(cases),
         estimator=quote_name(name),
         least=lowest,
         most=highest,
         realisations=case_selection.realisations_text(cases),
-        together=compared_value.simultaneity_text(len(cases)),
+        together=compared_value.cases_together(len(cases)),
     )
     return Sentence(text, _lock_intervals(*(rows[result.name] for result in extremes)))
 

@@ -122,7 +122,7 @@ class Prior(Model):
 
     @property
     def standard_deviations(self) -> tuple[float, ...]:
-        """The standard deviations as configured, absolute or over the potential ones."""
+        """The standard deviations as configured, absolute or over the Cramér–Rao bounds."""
         return self.sigma or self.spread_over_potential or ()
 
 

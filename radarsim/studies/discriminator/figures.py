@@ -115,7 +115,7 @@ def residuals(result: CaseResult, tables_by_name: Mapping, case: Case) -> Figure
         name=quote_name(name),
         count=result.count,
     )
-    title = tr("Errors against the window (figure 2)")
+    title = tr("Errors versus window (figure 2)")
     return Figure("residuals", title, caption, tuple(panels), 3, PAGE_MM, 52.0)
 
 
@@ -135,7 +135,7 @@ def locks(result: CaseResult, tables_by_name: Mapping) -> Figure:
         else tr("Share of bursts with every component within five times the Cramér–Rao bound of the window.")
     )
     caption += f" {_sample(result)}{remark}{case_selection.left_out_remark(result.axes.filters, plotted_names)}"
-    title = tr("Bursts not locked against the window") if lost else tr("Locked bursts against the window")
+    title = tr("Bursts not locked versus window") if lost else tr("Locked bursts versus window")
     figure = Figure(*("locks", title, caption, (panel,)), width_mm=panel_layout.WIDE_MM, panel_height_mm=80.0)
     return figure
 
@@ -219,11 +219,11 @@ def lock_against(name: str, key: str, members: Sequence[CaseResult], tables_by_n
         panel = replace(panel, marks=(*panel.marks, Line(x[order], x[order], "", Style(GREY, 2, width_pt=0.7))))
         remark += " " + tr("Dotted: designed failure probability of one hand-over.")
     if lost:
-        title = tr("Failures to lock against the {called}", called=key_name)
-        caption = tr("Share of bursts that fail to lock in the last window against the {called}.", called=key_name)
+        title = tr("Failures to lock versus {called}", called=key_name)
+        caption = tr("Share of bursts that fail to lock in the last window versus the {called}.", called=key_name)
     else:
-        title = tr("Lock against the {called}", called=key_name)
-        caption = tr("Share of bursts locked in the last window against the {called}.", called=key_name)
+        title = tr("Lock rate versus {called}", called=key_name)
+        caption = tr("Share of bursts locked in the last window versus the {called}.", called=key_name)
     caption += f" {_sample(members[0])}{remark}"
     figure = Figure(name, title, caption, (panel,), width_mm=panel_layout.WIDE_MM, panel_height_mm=70.0)
     return figure
@@ -250,7 +250,7 @@ def lock_map(name: str, keys: tuple[str, ...], members: Sequence[CaseResult], ta
     second = key_labels.key_label(members[0], keys[1]).text
     caption = tr(
         "Share of bursts locked at the end, from {count:,} per cell. Last panel: the largest {second} up to which "
-        "the interval is above {sure:g}; no line: nowhere.",
+        "the interval is above {sure:g}; no line: for none.",
         second=second,
         count=members[0].count,
         sure=CERTAIN_LOCK_RATE,

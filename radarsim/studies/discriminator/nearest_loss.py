@@ -25,7 +25,7 @@ from radarsim.bursts.kernels.scoring_lanes import COLUMNS, END, PASSES, PRIOR
 from radarsim.engine.sums import Layout
 from radarsim.kernels.lanes import WIDTH, rows
 
-LOCK_FACTOR = 5.0  # potential σ that a locked component is within
+LOCK_FACTOR = 5.0  # Cramér–Rao bounds that a locked component is within
 # All distances are multiples of STEP/64, without rounding: a search takes the same turns everywhere.
 SEARCH_BEGIN, STEP, END_OF_SEARCH = 1.0, 0.25, 12.0  # σ along a direction at which a loss is looked for
 MAX_LOSS_DISTANCE = 8.0  # σ of a loss that is told: once in 10¹⁵

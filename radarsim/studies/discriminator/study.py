@@ -26,9 +26,9 @@ from radarsim.studies.noise import noise_key
 COMPONENTS = (("phi0", "rad"), ("f0", "Hz"), ("f1", "Hz/s"), ("f2", "Hz/s2"), ("f3", "Hz/s3"), ("f4", "Hz/s4"))
 BLOCK = 64  # 20 ms with nine estimators on block sums, half a second with two on samples
 MODES = {"block_sums": BLOCK_SUMS, "samples": SAMPLES, "demodulated": DEMODULATED}
-# Estimates are within 0.016 potential σ of those from samples, and 0.024 (demodulated). Where the image at twice the
-# frequency counts, phases turn twice as fast within a block: with 16 of them 1.3 % of the bursts that may lock or not
-# change sides, with 24 of them 0.5 %.
+# Estimates are within 0.016 Cramér–Rao bounds of those from samples, and 0.024 (demodulated). Where the image at twice
+# the frequency counts, phases turn twice as fast within a block: with 16 of them 1.3 % of the bursts that may lock or
+# not change sides, with 24 of them 0.5 %.
 BLOCKS_PER_WINDOW = {BLOCK_SUMS: 20, SAMPLES: 20, DEMODULATED: 32}
 IMAGE_BLOCKS_PER_WINDOW = {BLOCK_SUMS: 24, SAMPLES: 24, DEMODULATED: 32}
 # Of the cure at a hand-over: points closer than the main lobe reaches, 1 rad rms by (10), so that it is between no two;
@@ -46,7 +46,7 @@ class DiscriminatorAxes(Axes):
     pulses: tuple[tuple[int, ...], ...]  #: the same in pulses
     posterior_sigma: np.ndarray  #: (F, K, C) bounds with the prior; not-a-number likewise
     prior_sigma: np.ndarray  #: (C,) of the forecast
-    potential_closed_form: np.ndarray  #: (C,) potential standard deviations of the whole burst
+    potential_closed_form: np.ndarray  #: (C,) Cramér–Rao bounds of the whole burst
     potential_covariance: np.ndarray  #: (C, C) their covariance
     energy_ratio: np.ndarray  #: (F, K) a window's μ, no unit; not-a-number likewise
     burst_s: float  #: length of the whole burst
@@ -176,7 +176,7 @@ def estimator_design(estimator: Estimator, windows: list[int]) -> estimators.Des
 def bounds(
     burst: model.Burst, windows: list[list[int]], theta: np.ndarray, sigma: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Potential spreads (F, K, size) of each window without and with the prior; ones where there is no window."""
+    """Cramér–Rao bounds (F, K, size) of each window without and with the prior; ones where there is no window."""
     size, max_windows = len(sigma), max(map(len, windows))
     shape = (len(windows), max_windows, size)
     potential, posterior = np.ones(shape), np.ones(shape)

@@ -390,7 +390,7 @@ def cost(results: Sequence[CaseResult], tables_by_name: Mapping) -> Figure | Non
     keys = [(joined_rules.get(text.replace(" ", "_"), text), style) for text, style in cost_panels[-1].keys]
     cost_panels[-1] = replace(cost_panels[-1], keys=tuple((text, style) for text, style in keys if text))
     caption = tr(
-        "RMS error of the height over each stage against arithmetic operations per update. Coinciding points: small "
+        "RMS error of the height of each stage versus arithmetic operations per update. Coinciding points: small "
         "marks on large ones.{of_case}",
         of_case=_case_sentence(result, results),
     )

@@ -8,8 +8,9 @@ import numpy as np
 
 from radarsim.config.experiment import Experiment
 from radarsim.language.numerals import numeral
-from radarsim.language.translate import join_names, quote_name, term, tr
+from radarsim.language.translate import list_filters, quote_name, term, tr
 from radarsim.report import case_selection, compared_value, key_labels, sentences, statistics, tables, wording
+from radarsim.report.compared_value import ComparedValue
 from radarsim.report.quantities import LOCK, Quantity
 from radarsim.report.sentences import Sentence
 from radarsim.studies.pulses_to_tracks.tables import Result
@@ -51,9 +52,12 @@ def question(experiment: Experiment) -> str:
     if len(names) > 1:
         return tr(
             "How well do {radars} track from their pulse bursts, and what does a failed burst cost?",
-            radars=join_names(names),
+            radars=key_labels.list_radars(names),
         )
-    return tr("How well does {radar} track from its pulse bursts, and what does a failed burst cost?", radar=names[0])
+    return tr(
+        "How well does {radar} track from its pulse bursts, and what does a failed burst cost?",
+        radar=key_labels.list_radars(names),
+    )
 
 
 def answer(results: Sequence[Result], tables_by_name: TablesByName) -> list[Sentence]:
@@ -83,9 +87,8 @@ def _worst_of_all_cases(results: Sequence[Result], tables_by_name: TablesByName)
         for row in worst.to_dict("records")
     ]
     text = tr(
-        "Largest RMS range error at the last scan over that of ideal bursts, in {count} cases ({together}): {found}.",
-        count=len(results),
-        together=compared_value.simultaneity_text(len(results)),
+        "Largest RMS range error at the last scan relative to ideal bursts ({together}): {found}.",
+        together=compared_value.cases_together(len(results)),
         found="; ".join(ratios),
     )
     return [Sentence(text, _ratio_intervals(worst))], _ratio_keys(worst)
@@ -104,6 +107,10 @@ def _case_sentences(result: Result, tables_by_name: TablesByName, ratio_keys: Ra
     case_sentences: list[Sentence] = []
     if len(filters) > 1 and not any(case_name == result.name for case_name, _ in ratio_keys):
         case_sentences, ratio_keys = _nearest_and_furthest(result, tables_by_name, filters, case)
+    always_locked = [name for name in filters if _always_locks(result, tables_by_name, name)]
+    if len(always_locked) > 1:
+        case_sentences += _without_failures(result, tables_by_name, always_locked, case, ratio_keys)
+        filters = [name for name in filters if name not in always_locked]
     for name in filters:
         clauses = [
             _locks(result, tables_by_name, name),
@@ -146,8 +153,8 @@ def _nearest_and_furthest(
     if not compared_value.are_distinguished(*values):
         return [], ()
     text = tr(
-        "RMS range error at the last scan over that of ideal bursts{chosen}: least with {best}, {near}; greatest with "
-        "{worst}, {far}",
+        "RMS range error at the last scan relative to that with ideal bursts{chosen}: least with {best}, {near}; "
+        "greatest with {worst}, {far}",
         best=quote_name(nearest["filter"]),
         near=_ratio(nearest, looks=len(filters)),
         worst=quote_name(furthest["filter"]),
@@ -162,17 +169,54 @@ def _locks(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:
     locks = tables.select_rows(tables_by_name["locks"], case=result.name, filter=name)
     _, least = compared_value.extreme(locks, LOCK, largest=False)
     if least.value == 1:
-        text = tr(
-            "none of {count:,} bursts failed to lock (at each scan {low} % or more lock{chosen})",
-            count=int(locks["n"].sum()),
-            low=numeral(f"{math.floor(1e4 * least.estimate.lo) / 100:.2f}"),
-            chosen=f", {compared_value.scans_together(least.looks)}" if least.looks > 1 else "",
-        )
+        text = tr("none of {count:,} bursts failed to lock ({least})", **_no_failures(locks, least))
     else:
         share = wording.share(*(100 * end for end in least.estimate))
         text = tr("at the worst scan {share} of the bursts lock", share=share)
         text += least.choice_remark(compared_value.scans_together)
     return Sentence(text, least.intervals)
+
+
+def _no_failures(locks: "pd.DataFrame", least: ComparedValue) -> dict[str, Any]:
+    """The number of bursts of which none failed to lock, and how many of a scan lock at least, in words."""
+    low = numeral(f"{math.floor(1e4 * least.estimate.lo) / 100:.2f}")
+    chosen = f", {compared_value.scans_together(least.looks)}" if least.looks > 1 else ""
+    return {
+        "count": int(locks["n"].sum()),
+        "least": tr("at each scan {low} % or more lock{chosen}", low=low, chosen=chosen),
+    }
+
+
+def _always_locks(result: Result, tables_by_name: TablesByName, name: str) -> bool:
+    """Whether none of a filter's bursts failed to lock."""
+    locks = tables.select_rows(tables_by_name["locks"], case=result.name, filter=name)
+    return bool((locks[LOCK.value] == 1).all())
+
+
+def _without_failures(
+    result: Result, tables_by_name: TablesByName, names: Sequence[str], case: str, ratio_keys: RatioKeys
+) -> list[Sentence]:
+    """That none of the bursts of several filters failed to lock; and their σ over those of their idealisations."""
+    locks = tables.select_rows(tables_by_name["locks"], case=result.name, filter=names[0])
+    _, least = compared_value.extreme(locks, LOCK, largest=False)
+    text = tr(
+        "{case}: with {filters} none of {count:,} bursts failed to lock ({least}).",
+        case=case,
+        filters=list_filters(names),
+        **_no_failures(locks, least),
+    )
+    finals = [
+        tables.select_rows(tables_by_name["idealisations"], case=result.name, filter=name, component="r").iloc[-1]
+        for name in names
+        if (result.name, name) not in ratio_keys
+    ]
+    ratios = tr(
+        "{case}, RMS range error at the last scan relative to that with ideal bursts: {found}.",
+        case=case,
+        found="; ".join(f"{quote_name(final['filter'])} {_ratio(final, '.4g')}" for final in finals),
+    )
+    intervals = [interval for final in finals for interval in _ratio_intervals(final)]
+    return [Sentence(text, least.intervals), *([Sentence(ratios, tuple(intervals))] if finals else [])]
 
 
 def _ratio_of_ideal(result: Result, tables_by_name: TablesByName, name: str) -> Sentence:

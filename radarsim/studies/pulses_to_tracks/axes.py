@@ -11,7 +11,7 @@ from radarsim.engine.results import Axes
 class PulsesAxes(Axes):
     """Labels of the sums, F filters over K scans, components r, Vr, ar."""
 
-    #: (F, K, 2) Fisher bounds of the burst's velocity (m/s) and acceleration (m/s²); not-a-number where not taken
+    #: (F, K, 2) Cramér–Rao bounds of the burst's velocity (m/s) and acceleration (m/s²); not-a-number where not taken
     bound: np.ndarray
     takes: np.ndarray  #: (F,) the number of these that a filter takes
     energy_db: np.ndarray  #: (K,) energy of the burst over the noise's density, dB

@@ -13,7 +13,7 @@ from radarsim.studies.pulses_to_tracks.axes import PulsesAxes
 def floor(spec: Any, axes: PulsesAxes) -> Floor | None:
     """The floor of each filter; None for targets that are no polynomial.
 
-    A burst measures velocity and acceleration no better than its Fisher bounds; the designation counts as a
+    A burst measures velocity and acceleration no better than its Cramér–Rao bounds; the designation counts as a
     measurement. The polynomial estimated is of the second degree, or of the target's if that is higher."""
     if spec.target.kind != "polynomial":
         return None

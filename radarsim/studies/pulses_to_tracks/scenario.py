@@ -60,7 +60,7 @@ def centre_row(burst: Burst, size: int, order: int) -> np.ndarray:
 
 
 def fisher_bounds(burst: Burst, size: int) -> tuple[float, float]:
-    """The Fisher bound of a burst's velocity and acceleration at its middle, m/s and m/s²; infinite if not estimated.
+    """The Cramér–Rao bound of a burst's velocity and acceleration at its middle, m/s, m/s²; infinite if not estimated.
 
     size is the number of parameters: phase, frequency, its derivatives."""
     (information,) = fisher_sums(burst, size, [burst.pulses])

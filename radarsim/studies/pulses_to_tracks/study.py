@@ -125,7 +125,7 @@ def bit_reversed_order(lines: int) -> np.ndarray:
 def axes(
     spec: Any, t: np.ndarray, bursts: list[Burst], arrays: kernels_layout.Filters, defects: np.ndarray
 ) -> PulsesAxes:
-    """Labels, Fisher bounds, and the exact values where all errors are Gaussian."""
+    """Labels, Cramér–Rao bounds, and the exact values where all errors are Gaussian."""
     shape = (len(spec.filters), spec.scans, 3)
     sigma, bias, bound = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape[:2], 2), np.nan)
     losses, max_losses = np.zeros(shape), np.zeros(len(spec.filters))

@@ -25,10 +25,10 @@ def question(experiment: Experiment) -> str:
     filters = list(dict.fromkeys(f.name for case in experiment.cases for f in case.spec.filters))
     names = list(dict.fromkeys(getattr(case.spec.radar, "name", None) or case.stem for case in experiment.cases))
     if any("velocity" in f.observes for case in experiment.cases for f in case.spec.filters):
-        return tr("How much does Doppler reduce the tracking errors of {radars}?", radars=join_names(names))
+        return tr("How much does Doppler reduce the tracking errors of {radars}?", radars=key_labels.list_radars(names))
     return tr(
         "How large are the errors of {radars} with {filters}?",
-        radars=join_names(names),
+        radars=key_labels.list_radars(names),
         filters=join_names([*map(quote_name, filters)]),
     )
 

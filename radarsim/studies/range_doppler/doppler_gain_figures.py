@@ -65,9 +65,10 @@ def gain_against_time_figure(places: Sequence[RadarOnChart]) -> Figure:
             Panel(x, y, tuple(marks), tr(name), keys, legend="lower left", remark="$c$ =" if i == 0 else "")
         )
     caption = tr(
-        "From c of about 0.7 on, the larger c, the more of the first gain lasts. Gain in the RMS error against time in "
-        "units of τ₁ = σ_r/σ_V, for lines of c = (τ₁/τ₂)², as the scan period becomes short (drawn with {fine} scans "
-        "in the shorter of τ₁ and τ₂). Markers: exact gains at the scans of real radars, whose period is not short.",
+        "From c of about 0.7 on, the larger c, the more of the first gain lasts. Gain in the RMS error versus time "
+        "in units of τ₁ = σ_r/σ_V, for lines of c = (τ₁/τ₂)², as the scan period becomes short (drawn with {fine} "
+        "scans in the shorter of τ₁ and τ₂). Markers: exact gains at the scans of real radars, whose period is not "
+        "short.",
         fine=SCANS_PER_TIME,
     )
     return Figure(
@@ -97,10 +98,10 @@ def steady_gain_figure(user_places: Sequence[RadarOnChart], reference_places: Se
         marks.append(Note(top.groups.c, float(top.exact_gain.max()), "\n".join(place.name for place in group), "nw"))
     marks.append(Reference(closed_form.no_acceleration_gain(), "x", f"$c$ = {numeral('0.698')}"))
     caption = tr(
-        "Left of c = 0.698 Doppler makes the acceleration estimate of a non-manoeuvring target worse; "
-        "right of it everything gains, the more the larger c. Steady gain of the velocity against c = "
-        "(τ₁/τ₂)². Lines: closed form in the limit of a short period. Markers: the exact steady gain of "
-        "a radar with its own period (large: yours)."
+        "Left of c = 0.698 Doppler makes the acceleration estimate of a non-manoeuvring target worse; right of it "
+        "everything gains, the more the larger c. Steady gain of the velocity versus c = (τ₁/τ₂)². Lines: closed "
+        "form in the limit of a short period. Markers: the exact steady gain of a radar with its own period (large: "
+        "yours)."
     )
     x = Axis("$c = (\\tau_1/\\tau_2)^2$", "log", (0.03, 300))
     panel = Panel(x, Axis(tr("steady gain, %"), limits=(-15, 100)), tuple(marks), tr("In the long run"))

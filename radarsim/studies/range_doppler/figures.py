@@ -141,14 +141,14 @@ def settling_figure(results: Sequence[Result], table: "pd.DataFrame") -> Figure 
     if not panels:
         return None
     caption = tr(
-        "Exact steady RMS error of the range against the time to settle within 5 % of it. Grey lines join equal "
+        "Exact steady RMS error of the range versus the time to settle within 5 % of it. Grey lines join equal "
         "manoeuvre variances. Star: the least that settles within ten scan periods (dotted)."
     )
     if names := _unsettled_filters(panels):
         caption += " " + tr("Without one: {names}.", names=caption_remarks.join_few_names(map(quote_name, names)))
     caption += case_selection.left_out_remark(titles, [panel.title for panel in panels])
     return panel_layout.arrange_columns(
-        Figure("settling", tr("Steady error against settling time"), caption, tuple(panels))
+        Figure("settling", tr("Steady error versus settling time"), caption, tuple(panels))
     )
 
 

@@ -63,10 +63,10 @@ def _best_settled_variances(results: Sequence[Result], tables_by_name: TablesByN
             best = [_best_variance(rows, str(name)) for name, rows in rows_with_variance.groupby("filter", sort=False)]
             name = key_labels.without_markup(key_labels.config_device(members[0]))
             text = plural(
-                "{name}, best D_M, with the least steady RMS range error of those that settle in under {count} scan "
-                "period: {filters}.",
-                "{name}, best D_M, with the least steady RMS range error of those that settle in under {count} scan "
-                "periods: {filters}.",
+                "{name}, best D_M (least steady RMS range error among those that settle in under {count} scan "
+                "period): {filters}.",
+                "{name}, best D_M (least steady RMS range error among those that settle in under {count} scan "
+                "periods): {filters}.",
                 PERIODS,
                 name=name,
                 filters="; ".join(best),

@@ -159,9 +159,10 @@ def _is_surely_less(
 
 
 def _filters_and_sigma(rows: "pd.DataFrame", sigma: ComparedValue) -> str:
-    """Filters of equal σ, and it with the interval."""
-    names = list_filters(rows["filter"])
-    return f"{names}, {sigma.text(key_labels.unit_label(rows['unit'].iloc[0]))}"
+    """Filters of equal σ, and it with the interval; of an angle in degrees."""
+    factor, unit = key_labels.degrees_factor_and_unit(rows["unit"].iloc[0])
+    value = sigma if factor == 1.0 else sigma.mapped(lambda angle: factor * angle)
+    return f"{list_filters(rows['filter'])}, {value.text(key_labels.unit_label(unit))}"
 
 
 def _most_optimistic(
@@ -196,7 +197,7 @@ def _most_optimistic(
         "Most optimistic {since}: {filter}; the RMS error is {ratio} times the filter's own σ ({quantity}, scan {k}).",
         since=wording.since(*scans[worst["case"]]),
         filter=f"{equal} ({swept})" if swept else equal,
-        ratio=ratio.text(form=".2f"),
+        ratio=ratio.text(form=".3g"),
         quantity=COMPONENTS_BY_NAME[worst["component"]].words,
         k=f"{worst['k']}{ratio.choice_remark()}",
     )

@@ -105,11 +105,7 @@ class Sensor(Model):
     )
     further: tuple[FurtherSensor, ...] = key("further sonars", "further sonars on the same target", (), max_length=4)
     false_plots_per_km2: Annotated[NonNegative, Field(le=1e4), DesignMark()] = key(
-        "false plots per scan",
-        "mean number of false plots per scan and km² of the surveyed sector",
-        0.0,
-        symbol="λ",
-        unit="km⁻²",
+        "clutter density", "mean number of false plots per scan and km² of the surveyed sector", 0.0, unit="km⁻²"
     )
     sector: Annotated[Sector | None, DesignMark()] = key(
         "surveyed sector", "the surveyed sector of filters with an association; there are no plots outside it", None

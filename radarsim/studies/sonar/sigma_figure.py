@@ -53,7 +53,7 @@ def sigma_figure(
         return None
     caption = (
         tr(
-            "Root-mean-square error of the {name} against time, from {count:,} realisations.",
+            "Root-mean-square error of the {name} versus time, from {count:,} realisations.",
             name=component.words,
             count=results[0].count,
         )

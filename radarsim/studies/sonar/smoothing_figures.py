@@ -85,7 +85,7 @@ def gains_figure(table: "pd.DataFrame") -> Figure:
     if table["case"].nunique() > 1:
         caption += tr(" Case: {case}.", case=first["case"])
     x = panel_layout.count_axis(tr("plots n"), float(rows["plots"].max()))
-    panel = Panel(x, Axis(tr("gain"), "log"), tuple(marks), crosses=tr("the paper's (14)"))
+    panel = Panel(x, Axis(tr("gain"), "log"), tuple(marks), crosses=tr("equation (14) of the paper"))
     return Figure("smoothing_gains", tr("Gains of growing memory"), caption, (panel,))
 
 
@@ -176,8 +176,8 @@ def conversion_figure(table: "pd.DataFrame") -> Figure | None:
         label = tr("plain") if frame == "cartesian" else tr("unbiased")
         marks.append(figure_lines.line_from_rows(rows, ("across_m", *names), label, n))
     caption = tr(
-        "Mean error of the converted plot along the line of sight, in σ of the range, over range × σ "
-        "of the bearing. Exact: (exp(−σ²/2) − 1) r, and zero."
+        "Mean error of the converted plot along the line of sight, divided by σ of the range, versus range "
+        "× σ of the bearing. Exact: (exp(−σ²/2) − 1) r, and zero."
     )
     x, y = Axis(tr("range × σ of the bearing, m"), limits=(0, None)), Axis(tr("bias / σ of the range"))
     return Figure(

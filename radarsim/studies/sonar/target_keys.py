@@ -39,8 +39,7 @@ class Polynomial(Model):
     )
     fluctuation_mps2: NonNegative = key(
         "σ of the random acceleration of the target",
-        "standard deviation, m/s², of a random acceleration drawn anew at every scan, so that the "
-        "velocity is a random walk",
+        "standard deviation, m/s², of a random acceleration drawn at every scan, so that the velocity is a random walk",
         0.0,
     )
 

@@ -45,7 +45,7 @@ def test_a_target_without_time_has_that_of_the_logger(tmp_path):
 def test_what_is_not_read_is_named(tmp_path):
     log = "".join(sentence(TARGET.format(10, 45)) + AIS for _ in range(N)).encode()
     done, _, _ = imported(tmp_path, log, Options(site=SITE, allow_loss=True))
-    assert f"targets of a radar beside AIS: {N} ($RATTM or $RATLL; --from nmea reads them)" in done.notes
+    assert f"targets of a radar in addition to AIS: {N} ($RATTM or $RATLL; --from nmea reads them)" in done.notes
     (tmp_path / "plots.csv").unlink()
     (line,) = refused(tmp_path, sentence("GPGSV,1,1,04,01,40,083,46").encode() * 9)
     assert line.endswith("RMC, GGA, GLL, TTM, TLL or VDM; it begins with GSV")

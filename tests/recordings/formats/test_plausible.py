@@ -157,7 +157,7 @@ def test_single_impossible_positions_are_left_out_and_counted(tmp_path):
     assert columns["range_m"].max() < 1e5
     assert done.skipped == [
         "positions at 0°, 0°, which stand for no fix (1)",
-        "rows that no target reaches from those beside them (1)",
+        "rows that no target reaches from neighbouring rows (1)",
     ]
     (tmp_path / "plots.csv").unlink()
     fix = '<trkpt lat="{}" lon="{}"><time>2026-07-24T13:45:{:02}Z</time></trkpt>'
@@ -169,7 +169,7 @@ def test_single_impossible_positions_are_left_out_and_counted(tmp_path):
     text = "time,track,range_m\n" + "".join(f"{4 * k},7,{r}\n" for k, r in enumerate(ranges))
     done, columns, _ = imported(tmp_path, text.encode())
     np.testing.assert_array_equal(columns["t_s"], 4.0 * np.array([k for k in range(1, N) if k != 25]) - 4)
-    assert done.skipped == ["rows that no target reaches from those beside them (2)"]
+    assert done.skipped == ["rows that no target reaches from neighbouring rows (2)"]
     (tmp_path / "plots.csv").unlink()
     text = "time,quality,range_m\n" + "".join(f"{4 * k},{k % 3},{r}\n" for k, r in enumerate(ranges))
     assert imported(tmp_path, text.encode())[0].skipped == done.skipped  # no column names the track

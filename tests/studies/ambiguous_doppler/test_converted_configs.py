@@ -174,8 +174,8 @@ def test_a_loss_names_what_turns_it_into_a_gain():
     first, second = [line for line in result.answer if "--out cured helps" in line]
     assert any("σ of the velocity 14.4 m/s, of the acceleration 0.48 m/s²" in line for line in result.answer)
     setting = "filters.1.manoeuvre_variance=0.1"
-    assert f": --set {setting} --out cured helps: 0 % are lost, " in first
-    gain = float(first.partition("0 % are lost, ")[2].split()[0])
+    assert f": --set {setting} --out cured helps: 0 % of the tracks are lost, " in first
+    gain = float(first.partition("0 % of the tracks are lost, ")[2].split()[0])
     gains = radarsim.run(BOAT, overrides=[setting]).gains
     row = gains[(gains["filter"] == "r+Vr") & (gains["component"] == "r")].iloc[-1]
     assert row["gain_percent"] == pytest.approx(gain, abs=3)

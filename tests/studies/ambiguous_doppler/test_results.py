@@ -74,7 +74,8 @@ def test_answer_names_the_scan_from_which_folded_velocity_is_as_good(result):
     experiment = load("ambiguous_rls4")
     folded = registry.study("ambiguous_doppler")
     assert (
-        folded.question(experiment) == "From which scan on is ambiguous Doppler as good as unfolded velocity for RLS 4?"
+        folded.question(experiment)
+        == "From which scan on is ambiguous Doppler as good as unfolded velocity for the radar RLS 4?"
     )
     sentence, _ = answer_texts(folded, result.cases, result.tables)
     assert sentence.startswith("RLS 4, D = 15 m/s, “memory”: ")
@@ -99,9 +100,9 @@ def test_orders_and_their_sentence():
     curves = curves[curves["k"] >= curves["case"].map({name: counted.k for name, counted in scans.items()})]
     largest = curves.assign(exact=curves["exact_sigma"].fillna(curves["sigma"])).groupby("filter")["exact"].max()
     singles = largest[["order 0", "order 1", "order 2", "order 2 range only"]]
-    text = "Smallest worst-case RMS range error after the start of the track, over 3 cases: "
-    assert first.startswith(f"{text}{quote_name(largest.idxmin())}, ")
-    assert f"the best single model order, {quote_name(singles.idxmin())}, reaches " in first
+    text = "The largest RMS range error after the start of the track in 3 cases is smallest with "
+    assert first.startswith(f"{text}{quote_name(largest.idxmin())}: ")
+    assert f"with the best single model order, {quote_name(singles.idxmin())}, it is " in first
     by_filter = curves.assign(exact=curves["exact_sigma"].fillna(curves["sigma"])).groupby(["case", "filter"])["exact"]
     singles_by_case = by_filter.max().unstack()[list(singles.index)]
     assert (

@@ -34,4 +34,4 @@ def test_a_share_of_failures_is_said_to_be_one():
 @pytest.mark.parametrize("rare", [None, object()])
 def test_weighted_bursts_are_said_to_be_so(rare):
     figure = figure_of_locks({"wide": [0.99, 0.999, 1]}, rare)
-    assert ("Importance sampling; weighted bursts per case: 1,000." in figure.caption) == (rare is not None)
+    assert ("Importance sampling; weighted bursts per case: 1000." in figure.caption) == (rare is not None)

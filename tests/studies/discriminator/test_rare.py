@@ -311,7 +311,7 @@ def test_tables_tell_the_rate_and_how_well_it_is_known():
     assert curves["n"].max() <= row["n_plain"]
     first, second, *_ = result.answer
     assert "(importance sampling; " in second
-    # Not "locked in 100.00 % of 3,000 bursts": most are shifted.
+    # Not "locked in 100.00 % of 3000 bursts": most are shifted.
     assert "locked in" not in first
     assert "bursts without importance sampling" in first
     assert not any("rare event" in line for line in result.warnings)

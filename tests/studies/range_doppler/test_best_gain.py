@@ -90,7 +90,7 @@ def test_gain_in_a_turn_is_that_between_the_two_best():
     sentence = gain_sentence(result)
     at_best = 100 * (1 - min(sigma[2].values()) / min(sigma[1].values()))
     alike = [100 * (1 - sigma[2][v] / sigma[1][v]) for v in TRIED]
-    assert sentence.startswith("mine, gain in RMS error of the range at worst, r+Vr over r: ")
+    assert sentence.startswith("mine, gain of r+Vr over r in RMS error of the range at worst: ")
     low, high, *of_both = numbers(sentence)  # of r 10⁻¹ and 1 do equally well
     assert 60.75 < low <= at_best + 0.06
     assert at_best - 0.06 <= high < 60.95
@@ -156,12 +156,12 @@ def test_values_that_tie_make_a_span():
     r = FilterChoices("r", {0.1: Estimate(10, 10, 10), 1.0: Estimate(10.05, 10.05, 10.05)}, (0.1, 1.0))
     v = FilterChoices("v", {0.1: Estimate(5, 5, 5), 1.0: Estimate(5.02, 5.02, 5.02)}, (0.1, 1.0))
     (sentence,) = gain_sentences("mine", "range", "worst", D_M, r, [v])
-    assert "49.8 to 50.2 % with each at its best D_M; with one D_M for both" in sentence.text
+    assert "49.8 to 50.2 % with each at its best D_M; " in sentence.text
     alone = [choice._replace(best=(0.1,)) for choice in (r, v)]
     (sentence,) = gain_sentences("mine", "range", "worst", D_M, *alone[:1], alone[1:])
     assert ": 50.0 % with each at its best D_M" in sentence.text
     (sentence,) = gain_sentences("mine", "range", "worst", D_M, r._replace(best=()), [v])
-    assert ": no D_M settles in time with r; with one D_M for both 50.0 % (10⁻¹)" in sentence.text
+    assert ": no D_M settles in time with r; 50.0 % (10⁻¹) to 50.0 % (1) with the same D_M for both" in sentence.text
 
 
 def test_interval_of_the_gain_holds_whichever_was_picked():

@@ -300,12 +300,12 @@ def test_answer_tells_the_variance_of_its_gains_where_others_are_swept(paper, sw
     assert "D_M" not in answer_texts(answer, paper[:1], made_of(paper[:1]))[0]
 
 
-BEST = "with the least steady RMS range error of those that settle"
+BEST = "(least steady RMS range error among those that settle"
 
 
 def test_answer_tells_the_best_variance(swept):
     told = answer_texts(answer, swept, made_of(swept))[0]  # before the gains: it is what is asked
-    assert told.startswith(f"RLS 2, best D_M, {BEST} in under 10 scan periods: ")
+    assert told.startswith(f"RLS 2, best D_M {BEST} in under 10 scan periods): ")
     assert ": r 10⁻³ (189.1 m, settled after 90 s); r+Vr 10⁻³ (154." in told
 
 

@@ -49,7 +49,7 @@ def test_filters_of_equal_accuracy_are_named_together(results):
     first, second, *_ = results["sonar_correlated"].answer
     assert first.startswith("Most optimistic from the first scan on: “naive” (ρ = 0.9")
     curves = results["sonar_correlated"].tables["curves"]
-    assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.2f} times" in first
+    assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.3g} times" in first
     assert "least with “augmented” and “differenced”, " in second
 
 
@@ -203,14 +203,14 @@ def test_what_is_known_exactly_is_judged_exactly(results):
     assert_rounded(formulas["exact"], np.ones(20), **precision)
     curves = result.tables["curves"].set_index(["filter", "component", "k"])["exact_sigma"]
     sigma = curves["growing", "r", 1]
-    bought = own[own["quantity"].str.startswith("σ of the recursion after 20")]["exact"].item()
+    bought = own[own["quantity"].str.startswith("RMS error of the recursion after 20")]["exact"].item()
     assert_rounded(bought, curves["growing", "r", 20] / curves["growing", "r", 6], **precision)
     ahead = own.loc[own["claim"] == "P3.18", "exact"].to_numpy()
     assert_rounded(
         ahead[:2], closed_forms.sigma_extrapolated(np.array([3, 6])) / closed_forms.sigma_extrapolated(2), **precision
     )
     for n in (2, 3, 5, 8, 20):
-        row = own[own["quantity"] == f"smoothed σ after {n} plots, over the formula"]
+        row = own[own["quantity"] == f"smoothed RMS error after {n} plots, over the formula"]
         smoothed = row["exact"].item() * closed_forms.sigma_smoothed(n)
         assert_rounded(smoothed, curves["growing", "r", n] / sigma, **precision)
 

@@ -8,15 +8,15 @@ from radarsim.kernels.compiler import inline, kernel
 
 BINS_PER_OCTAVE, MIN_OCTAVE, OCTAVES = 4, -6, 18  # of |e|/σ: from 1/64 to 4096, outer bins open
 BINS = BINS_PER_OCTAVE * OCTAVES
-# What `locks` counts, in its order: bursts within 5 and 3 potential bounds, within 5 and 3 posterior ones, and within 3
-# of either at this and all earlier windows.
+# What `locks` counts, in its order: bursts within 5 and 3 Cramér–Rao bounds, within 5 and 3 posterior ones, and within
+# 3 of either at this and all earlier windows.
 LOCKS = ("lock", "three", "posterior", "posterior_three", "always_three", "always_posterior_three")
 
 
 class Sums(NamedTuple):
     """Sums over bursts of F estimators, K windows and C components of θ, with their shapes."""
 
-    error: np.ndarray  #: (F, K, C, 4) Σe … Σe⁴ of the locked bursts, in units of the potential bound of the window
+    error: np.ndarray  #: (F, K, C, 4) Σe … Σe⁴ of the locked bursts, in units of the Cramér–Rao bound of the window
     error_all: np.ndarray  #: (F, K, C, 4) the same of all bursts
     locks: np.ndarray  #: (F, K, 6) counted bursts, see LOCKS
     residuals: np.ndarray  #: (F, K, C, BINS) histograms of |e| over the posterior bound

@@ -59,7 +59,7 @@ def put_forecast(world, forecast, work):
 
 @kernel_part
 def put_ideal_estimate(world, k, window, work, sums, block_sums):
-    """Write the ideal estimate, which reaches the Fisher bound: one step from the truth, linear in the noise."""
+    """Write the ideal estimate, which reaches the Cramér–Rao bound: one step from the truth, linear in the noise."""
     zero = full(0.0)
     physics, table = world.physics[k], address(world.tables[0])
     for j in range(SIZE):

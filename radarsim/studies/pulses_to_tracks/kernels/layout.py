@@ -75,7 +75,7 @@ class Filters(NamedTuple):
     first_window: np.ndarray  #: (F, K, E) index of the first window of an entry of the menu
     window_count: np.ndarray  #: (F, K, E) number of windows of an entry
     whole_burst: np.ndarray  #: (F, K) index of the window of the whole burst without forecast
-    sigma: np.ndarray  #: (F, K, 2) Fisher bounds of velocity and acceleration
+    sigma: np.ndarray  #: (F, K, 2) Cramér–Rao bounds of velocity and acceleration
     baseline: int  #: number of the filter that gains are relative to
     ideals: np.ndarray  #: (F,) numbers of their idealisations; −1: none
 

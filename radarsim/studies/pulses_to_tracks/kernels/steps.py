@@ -61,7 +61,7 @@ def fold(x, span):
 def score_burst(sigma, takes, v, a, i, ages, locks, error_sums):
     """Add a burst of realisation i with errors v and a to the sums: whether it locked, and the powers of its errors.
 
-    sigma (2,) are the Fisher bounds; ages (n,) scans since a burst was lost."""
+    sigma (2,) are the Cramér–Rao bounds; ages (n,) scans since a burst was lost."""
     worst = abs(v) / sigma[0]
     if takes == 2:
         worst = max(worst, abs(a) / sigma[1])

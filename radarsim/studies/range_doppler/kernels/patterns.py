@@ -241,7 +241,7 @@ def add_companion(rows, n, columns, companion, sums):
 
 @kernel_part
 def add_waiting(waiting, waiting_count, columns, world, sums):
-    """The same of those that have not started: where a plot came it is the estimate, of what it holds."""
+    """As above, for tracks not yet started: the plot itself is the estimate."""
     last = 6 + 3 * columns
     for b in range(waiting_count):
         if waiting[b, last + 2] == 1.0:

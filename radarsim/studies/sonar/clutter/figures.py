@@ -198,8 +198,8 @@ def _life_quantities(
         if len(ended):
             name, rates = tr("share of tracks ended by the last scan"), ended.merge(cases, on="case", how="left")
             life = _LifeQuantity("event_rate", name, "", True, rates, tr(ENDS_CAPTION))
-    time, wrong, sigma = (tr("time to confirmation"), tr("share of wrong plots"), tr("$\\sigma$ of $r$ of kept tracks"))
-    time_clause, wrong_clause = tr("mean time to confirmation"), tr("weight of false plots used")
+    time, wrong, sigma = (tr("time to confirmation"), tr("share of wrong plots"), tr("RMS range error of kept tracks"))
+    time_clause, wrong_clause = tr("mean time to confirmation"), tr("weight of false plots in the estimates")
     sigma_clause = tr("range error of kept tracks")
     return (
         life,

@@ -124,8 +124,8 @@ def roc_figure(results: Results, detections: "pd.DataFrame") -> Figure | None:
             y = Axis(tr("detection probability"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
     caption = tr(
-        "Detectors of manoeuvres in the range: alarm probability at the last scan of the manoeuvre against "
-        "that at the last scan before it. Lines: exact; markers: measured, from {count:,} realisations.",
+        "Detectors of manoeuvres in the range: alarm probability at the last scan of the manoeuvre versus that at "
+        "the last scan before it. Lines: exact; markers: measured, from {count:,} realisations.",
         count=results[0].count,
     )
     return _figure_of_panels("roc", tr("Detections and false alarms"), caption, figure_panels)
@@ -159,10 +159,10 @@ def detection_figure(results: Results, detections: "pd.DataFrame") -> Figure | N
         figure_panels.append(Panel(x, y, tuple(marks), title, direct=False))
     caption = tr(
         "Detection probability of detectors in the range at the last scan of the manoeuvre (of the run, if there is "
-        "none), for P_FA ≈ {usual:g} per test, against the strength of the manoeuvre.",
+        "none), for P_FA ≈ {usual:g} per test, versus the strength of the manoeuvre.",
         usual=USUAL_FALSE_ALARM_RATE,
     )
-    return _figure_of_panels("detection", tr("Detection against the strength of the manoeuvre"), caption, figure_panels)
+    return _figure_of_panels("detection", tr("Detection versus manoeuvre strength"), caption, figure_panels)
 
 
 def _last_row(result: CaseResult[ManoeuvreAxes], detections: "pd.DataFrame", name: str) -> "pd.Series":
@@ -194,8 +194,8 @@ def delay_figure(results: Results, delays: "pd.DataFrame") -> Figure | None:
             x, y = Axis(tr("time since it began, s"), limits=(0, None)), Axis(tr("alarm raised"), limits=(0, 1))
             figure_panels.append(Panel(x, y, tuple(marks), _swept_values(result), direct=False))
     caption = tr(
-        "Probability that a detector in the range has alarmed against the time since the manoeuvre "
-        "began, for P_FA ≈ {usual:g} per test; exact if windows do not overlap.",
+        "Probability that a detector in the range has alarmed versus the time since the manoeuvre began, for P_FA ≈ "
+        "{usual:g} per test; exact if windows do not overlap.",
         usual=USUAL_FALSE_ALARM_RATE,
     )
     return _figure_of_panels("delay", tr("How soon a manoeuvre is detected"), caption, figure_panels)
@@ -245,7 +245,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
     case = f" ({key_labels.without_markup(_swept_values(result))})" if result.swept_values else ""
     caption = (
         tr(
-            "True σ divided by that computed from the track's covariance to first order{case}, from {count:,} "
+            "RMS error divided by σ computed from the track's covariance to first order{case}, from {count:,} "
             "realisations.",
             case=case,
             count=result.count,

@@ -51,7 +51,7 @@ def test_the_answer_has_each_case_and_ranks_no_tracker_by_its_life(result):
         by_case.setdefault(sentence.partition(": ")[0], []).append(sentence)
     assert len(by_case) == rows["case"].nunique()
     for (subject, of_case), (_, case_rows) in zip(by_case.items(), rows.groupby("case", sort=False), strict=True):
-        assert subject.startswith("λ = ")
+        assert subject.startswith("clutter density = ")
         sentence = " ".join(of_case)
         for row in case_rows.to_dict("records"):
             assert f"{quote_name(row['filter'])} confirms " in sentence
