@@ -1,6 +1,7 @@
 """The likelihood of recorded plots under a bank of models."""
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -63,24 +64,21 @@ class PlotLikelihood:
         self.problems = [problem for problem in problems if problem is not None]
         self.frame = sensor_frame(self.spec.sensor)
         self.probabilities = model_bank.stationary(model_bank.transition_matrix(self.options.transition))
+        # A search moves one key at a time.
+        self._bank, self._plots = lru_cache(2)(self._calculate_bank), lru_cache(2)(self._calculate_plots)
 
     def _track_scores(
         self, values: np.ndarray, merge: str, law: ErrorLaw
     ) -> list[tuple["_Problem", np.ndarray, np.ndarray]]:
         """For each track the log-densities (n,) of its later plots, and their probabilities to be no outliers, for
         given values of the keys and a merging rule."""
-        names = [key.partition(".")[2] for key in self.keys[:3]]
-        sensor = self.spec.sensor.model_copy(update=dict(zip(names, values[:3].tolist(), strict=True)))
-        models = list(self.options.models)
-        update = {"sigma_acceleration_mps2": float(values[3])}
-        models[self.hardest] = models[self.hardest].model_copy(update=update)
-        options = self.options.model_copy(update={"models": tuple(models), "merge": merge})
-        filter_bank = banks(self.spec.model_copy(update={"filters": (options,)}), np.ones(1))
-        design, numbers = filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
-        z, R, is_valid = local_plots(sensor, self.measured)
-        plots, result = np.concatenate([z, R, is_valid[:, None]], axis=1), []
+        design, numbers = self._bank(float(values[3]), merge)
+        plots, far_widths = self._plots(*values[:3].tolist())
+        result = []
         outliers = law.outlier_rows(1)[0]
-        widths = self._widths(R, OutlierLaw(*outliers.tolist()).near_width)
+        near_width = np.full((len(plots), 1), OutlierLaw(*outliers.tolist()).near_width ** 2)
+        unused = np.ones((len(plots), WIDTH - 2 - FAR_COUNT))
+        widths = np.hstack([np.ones_like(near_width), near_width, far_widths, unused])
         for problem in self.problems:
             work, state = work_arrays()
             start = plots[problem.start_rows]
@@ -96,9 +94,26 @@ class PlotLikelihood:
             result.append((problem, score, soundness))
         return result
 
-    def _widths(self, R: np.ndarray, near_width: float) -> np.ndarray:
-        """The factors (n, WIDTH) on the packed covariances R (n, 6) of plots in the lanes, for each law of errors; the
-        widest spans the data in the direction of the smallest error."""
+    def _calculate_bank(self, sigma_acceleration_mps2: float, merge: str) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers of the models, and those of the filter, for the largest acceleration and a merging rule."""
+        models = list(self.options.models)
+        update = {"sigma_acceleration_mps2": sigma_acceleration_mps2}
+        models[self.hardest] = models[self.hardest].model_copy(update=update)
+        options = self.options.model_copy(update={"models": tuple(models), "merge": merge})
+        filter_bank = banks(self.spec.model_copy(update={"filters": (options,)}), np.ones(1))
+        return filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
+
+    def _calculate_plots(self, *sensor_sigmas: float) -> tuple[np.ndarray, np.ndarray]:
+        """The plots as the kernel takes them, and the factors (n, FAR_COUNT) on their covariances in the wide laws of
+        outliers, for given σ of the sensor."""
+        names = [key.partition(".")[2] for key in self.keys[:3]]
+        sensor = self.spec.sensor.model_copy(update=dict(zip(names, sensor_sigmas, strict=True)))
+        z, R, is_valid = local_plots(sensor, self.measured)
+        return np.concatenate([z, R, is_valid[:, None]], axis=1), self._far_widths(R)
+
+    def _far_widths(self, R: np.ndarray) -> np.ndarray:
+        """The factors (n, FAR_COUNT) on the packed covariances R (n, 6) of plots in the wide laws; the widest spans the
+        data in the direction of the smallest error."""
         xx, xy, xz, yy, yz, zz = R.T
         matrices = np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), 2, 0)
         smallest = np.full(len(R), np.nan)
@@ -106,10 +121,7 @@ class PlotLikelihood:
         smallest[finite] = np.linalg.eigvalsh(matrices[finite])[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(smallest > 0, np.maximum(self.span**2 / (FAR_WIDTH**2 * smallest), 1.0), 1.0)
-        far = FAR_WIDTH**2 * ratio[:, None] ** np.linspace(0, 1, FAR_COUNT)
-        result = np.ones((len(R), WIDTH))
-        result[:, 1], result[:, 2 : 2 + FAR_COUNT] = near_width**2, far
-        return result
+        return FAR_WIDTH**2 * ratio[:, None] ** np.linspace(0, 1, FAR_COUNT)
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The log likelihood; of the explanations only outliers are part of the model."""
