@@ -28,6 +28,9 @@ MIN_FOREIGN_SHARE, MIN_FOREIGN_MPS = 0.5, 3.0  # by which velocities of another 
 FOREIGN_VELOCITY_SIGMAS, FOREIGN_RANGE_SIGMAS = 10.0, 3.0  # of noise that such a miss exceeds, in the median
 MIN_WILD_MISSES, MAX_WILD_SHARE = 10.0, 0.2  # of an interval, in median misses; of the intervals of a track
 FOREIGN_CAUSE = term("they are no radial velocities: a column may be swapped")
+LOST_SIGN_CAUSE = term("their sign is lost; take it from the source, or leave the column out")
+RATE_ROWS, MIN_SIGN_ROWS = 3, 10  # beside a row, over which its range changes; of each sign of that change
+MAX_SIGN_MISS = 0.25  # of the speeds, by which the size of the change of the range misses them
 MIN_FOLDABLE, MAX_FOLDABLE = -1.05, 1 / 3  # multiples that folds may leave
 MAX_DRIFT_CHANGE = 0.2  # of such a multiple, relative, where a drift is allowed for
 MIN_WAVELENGTH_M, MAX_WAVELENGTH_M = 0.003, 0.5  # of radars whose Doppler frequencies may stand for speeds
@@ -42,6 +45,7 @@ CAUSES = {  # multiples, and what leaves them
     FOOT_M: term("the ranges are in feet, not in m"),
     1.852: term("the ranges are in nautical miles, not in km"),
     1852.0: term("the ranges are in nautical miles, not in m"),
+    1 / 1.852: term("the ranges are in km, not in nautical miles"),
     3000 * FOOT_M: term("the ranges are in kiloyards, not in m"),
     6000 * FOOT_M: term("the ranges are in data miles, not in m"),
     100 * FOOT_M: term("the ranges are in hundreds of feet, not in m"),
@@ -125,6 +129,26 @@ def detect_foreign_velocities(tracks: Sequence[Mapping[str, np.ndarray]]) -> Dop
     miss, size, noise_mps = np.median(joined, axis=1).tolist()
     is_foreign = miss > max(MIN_FOREIGN_SHARE * size, noise_mps, MIN_FOREIGN_MPS)
     return DopplerScale(size / miss, False, (FOREIGN_CAUSE,)) if is_foreign else None
+
+
+def detect_lost_signs(tracks: Sequence[Mapping[str, np.ndarray]]) -> DopplerScale | None:
+    """Velocities of one sign alone that are as large as the change of the range, whether that rises or falls."""
+    rows = [np.empty((2, 0))]
+    for columns in tracks:
+        track = np.stack([np.asarray(columns[name], dtype=float) for name in COLUMNS])
+        t, r, v = track[:, np.isfinite(track).all(axis=0)]
+        if t.size > 2 * RATE_ROWS and (np.diff(t) > 0).all():
+            spans, changes = (values[2 * RATE_ROWS :] - values[: -2 * RATE_ROWS] for values in (t, r))
+            is_close = spans < MAX_GAP_S * 2 * RATE_ROWS
+            rows.append(np.stack([v[RATE_ROWS:-RATE_ROWS], changes / spans])[:, is_close])
+    speeds, rates = np.concatenate(rows, axis=1)
+    if not speeds.size or (speeds.min() < 0 < speeds.max()):
+        return None
+    for is_sign in (rates > 0, rates < 0):
+        miss = np.abs(np.abs(speeds[is_sign]) - np.abs(rates[is_sign]))
+        if miss.size < MIN_SIGN_ROWS or np.median(miss) > MAX_SIGN_MISS * np.median(np.abs(speeds[is_sign])):
+            return None
+    return DopplerScale(1.0, False, (LOST_SIGN_CAUSE,))
 
 
 def _courses_without_jumps(t: np.ndarray, r: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -214,6 +238,9 @@ def doppler_scale_message(scale: DopplerScale) -> str:
         return tr(
             "the Doppler speeds have nothing to do with the change of the range: {cause}", cause=tr(FOREIGN_CAUSE)
         )
+    if scale.causes == (LOST_SIGN_CAUSE,):
+        return tr("the Doppler speeds have one sign where the ranges rise and where they fall: {cause}",
+                  cause=tr(LOST_SIGN_CAUSE))  # fmt: skip
     if scale.is_sign:
         return tr("the velocities have the opposite sign of the change of the range: import the recording with "
                   "--doppler-towards, or without it if it was given")  # fmt: skip

@@ -5,7 +5,7 @@ import pytest
 
 import radarsim
 from radarsim.errors import ConfigError
-from radarsim.recordings.doppler_scale import detect_doppler_scale, doppler_scale_message
+from radarsim.recordings.doppler_scale import DopplerScale, detect_doppler_scale, doppler_scale_message
 from radarsim.recordings.fit.folded_doppler import folding_message
 from radarsim.recordings.fit.velocity_faults import detect_velocity_fault
 from radarsim.recordings.formats.import_options import Options
@@ -46,6 +46,32 @@ def test_the_multiple_names_the_unit(kind, multiple, cause):
         assert cause in message
         assert ("--doppler-towards" in message) == (multiple < 0)
         assert " or " not in message.partition("smaller")[0].replace("or without", "")
+
+
+def lost_sign_tracks(kind, seed):
+    """Sizes of the velocities of one that passes, or of two that come and go."""
+    if kind == "past":
+        tracks = [recording("past", 150.0, 1.0, seed)]
+    else:
+        tracks = [recording("away", speed, 1.0, seed + k) for k, speed in enumerate((120.0, -80.0))]
+    return [track | {"velocity_mps": np.abs(track["velocity_mps"])} for track in tracks]
+
+
+@pytest.mark.parametrize("kind", ["past", "two"])
+def test_velocities_without_sign_are_not_taken_for_folded(kind):
+    for seed in range(10):
+        tracks = lost_sign_tracks(kind, seed)
+        fault = detect_velocity_fault(tracks)
+        assert fault.folding is None
+        assert "one sign where the ranges rise and where they fall" in doppler_scale_message(fault.scale)
+        towards = [track | {"velocity_mps": -track["velocity_mps"]} for track in tracks]
+        assert detect_velocity_fault(towards).scale == fault.scale
+        signed = recording("past", 150.0, 1.0, seed)
+        folded = signed | {"velocity_mps": np.mod(signed["velocity_mps"], 70.0)}
+        for track in (signed, folded):
+            assert "one sign" not in doppler_scale_message(
+                detect_velocity_fault([track]).scale or DopplerScale(2, 0, ())
+            )
 
 
 def test_sound_and_folded_velocities_are_left_alone():

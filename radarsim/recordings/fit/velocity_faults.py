@@ -7,7 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.recordings.doppler_scale import COLUMNS, DopplerScale, detect_doppler_scale, detect_foreign_velocities
+from radarsim.recordings.doppler_scale import (
+    COLUMNS,
+    DopplerScale,
+    detect_doppler_scale,
+    detect_foreign_velocities,
+    detect_lost_signs,
+)
 from radarsim.recordings.fit.folded_doppler import Folding, detect_folding
 from radarsim.recordings.study_part import recording_interface
 
@@ -24,6 +30,8 @@ def detect_velocity_fault(tracks: Sequence[Mapping[str, np.ndarray]], span_mps: 
 
     A constant speed that is folded is also a multiple of the change of the range. Where folds by the stated span
     explain it, they are taken; else a multiple that folds cannot leave."""
+    if span_mps is None and (lost := detect_lost_signs(tracks)) is not None:
+        return VelocityFault(scale=lost)
     scale = detect_doppler_scale(tracks)
     fault = _explained_fault(scale, tracks, span_mps)
     if fault == VelocityFault() and span_mps is None:

@@ -12,8 +12,10 @@ SIXTY = 60  # minutes in a degree, seconds in a minute
 MISSING_TEXTS = {
     *("nan", "-nan", "null", "none", "na", "n/a", "n.a.", "n/d", "nd", "\\n", "<na>", "missing", "void", "invalid"),
     *("error", "err", "unknown", "1.#qnan", "-1.#ind", "1.#ind", "nan(ind)", "-nan(ind)", "k.a.", "kein wert", "fehlt"),
-    *("нет", "н/д", "нет данных"),
+    *("inf", "-inf", "+inf", "infinity", "-infinity", "nil", "no data", "nodata", "b.d", "b.d.", "brak", "s/d"),
+    *("sin dato", "sin datos", "нет", "н/д", "нет данных", "нет изм.", "无"),
 }
+MISSING_BRACKETS = "()[]<>{}"  # about such a text
 MISSING_PATTERN = re.compile(r"[-–—*?._~]+|#[^\W\d]+(?:/[^\W\d0]*0?)?[!?]?")  # --, ***, and errors of a spreadsheet
 MINUS_SIGNS = "\u2212\u2013\u2012\ufe63\uff0d"  # that are typeset
 THOUSANDS_PATTERN = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")  # a number that may be a thousand or a decimal
@@ -58,11 +60,11 @@ class CellNumbers:
     def quantity(self, text: str, ours: str, factor: float, units: Mapping[str, float]) -> float:
         """A quantity of ours in a cell, by the factor of its column or the unit in the cell; not-a-number where it
         stands for none. Raises ValueError."""
+        if is_missing(text):
+            return math.nan
         try:
             value = float(text)
         except ValueError:
-            if is_missing(text):
-                return math.nan
             value, factor = self._split_quantity(text, ours, factor, units)
         if not abs(value) <= LARGEST_NUMBER and not math.isnan(value):
             raise ValueError(text)
@@ -113,7 +115,9 @@ class CellNumbers:
 
 def is_missing(text: str) -> bool:
     """Whether a cell stands for no value."""
-    return not text or text.lower() in MISSING_TEXTS or MISSING_PATTERN.fullmatch(text) is not None
+    if not text or text.lower() in MISSING_TEXTS or MISSING_PATTERN.fullmatch(text) is not None:
+        return True
+    return text[0] in MISSING_BRACKETS and text.strip(MISSING_BRACKETS).lower() in MISSING_TEXTS
 
 
 def spoiled_number_cure(text: str) -> str:

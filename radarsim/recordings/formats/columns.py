@@ -30,7 +30,17 @@ from radarsim.recordings.formats.units import (
     split_unit,
 )
 
+MILES = re.compile(r"dm|rm|.*miles?|.*мил[ияь]|.*meilen?|mil+as?|mile|mille?s?")  # that may be of several lengths
 MINUTE_NAME = re.compile(r"(?:lat|lon|lng|long)(?:itude)?[_ ]*(?:min|minutes?|sec|seconds?)")
+FORMULAS = {  # what no option makes a range or a time, by the names of its columns
+    r"(?:.*_)?(?:gate|bin|cell|sample)s?(?:_(?:no|nr|num|number|index|id))?": "a number of range gates times their "
+    "length is the range",
+    r"(?:ground|horizontal|horiz|surface)_?(?:range|distance|dist)": "the root of the squares of ground range and "
+    "height is the slant range",
+    r"(?:.*_)?(?:delay|tof|time_of_flight|round_?trip)(?:_.*)?": "half the delay times the speed of light is the range",
+    r"x|east|easting|y|north|northing": "the root of x² + y² is the range, the angle from north to east the bearing",
+    r"hour|hours|hh|minute|minutes|second|seconds": "hours, minutes and seconds are a time in one column, HH:MM:SS",
+}
 FREQUENCY_UNITS = ("hz", "khz", "гц", "кгц")
 MAX_NAMED_UNITS = 4  # in a fault, beside the first
 
@@ -306,6 +316,8 @@ class Header:
             if len(guesses) < len(missing):
                 hints = "; ".join(f"{name}: {', '.join(QUANTITIES[name].names)}" for name in missing)
             ready = f"; perhaps {' '.join(guesses)}" if guesses else ""
+            formulas = {text for text in map(_formula, (stem for stem, _ in self.stems)) if text}
+            ready += "".join(f"; {text}: make such a column" for text in sorted(formulas))
             faults.append(f"{self.path}:1: must have {needed}; missing ({hints}); got {got}{ready}")
         minutes = [name for name in self.names if MINUTE_NAME.fullmatch(name.lower())]
         if self.reads_positions and minutes:
@@ -330,6 +342,9 @@ class Header:
             cure = "half the wavelength times a Doppler frequency is the speed: make such a column"
             return f"{self.path}:1: {name}: must be a speed, in one of {units}; got {unit!r}; {cure}"
         cure = f"--column {name_by_cells(ours, self._cells(ours))}={shlex.quote(name)}"
+        if ours == "range_m" and MILES.fullmatch(unit):
+            cure = " or ".join(f"--column {option}={shlex.quote(name)}" for option in ("range_nm", "range_dmi"))
+            cure += ", of nautical or data miles"
         return f"{self.path}:1: {name}: the unit must be one of {units}; got {unit!r}; it is stated by {cure}"
 
     def _cells(self, ours: str) -> list[str]:
@@ -343,7 +358,7 @@ class Header:
         used = {column.position for column in self.columns.values()}
         other_names = {name for ours in QUANTITIES if ours not in quantities for name in known_names(ours)}
         stems = [
-            ("", "") if i in used or stem in other_names else (stem, unit if unit in UNITS else "")
+            ("", "") if i in used or stem in other_names or _formula(stem) else (stem, unit if unit in UNITS else "")
             for i, (stem, unit) in enumerate(self.stems)
         ]
         return suggest_options({ours: known_names(ours) for ours in quantities}, _name_with_unit, stems, self.names,
@@ -384,6 +399,11 @@ class Header:
             column = f"--column range_UNIT={shlex.quote(ranges[0])}"
             lines.append(tr("positions are read, not plots; for these: {column}", column=column))
         return lines
+
+
+def _formula(stem: str) -> str:
+    """How a range or a time is made of a column that is none, by its name; '' of another."""
+    return next((text for pattern, text in FORMULAS.items() if re.fullmatch(pattern, stem)), "")
 
 
 def _names_with_units(ours: str) -> list[str]:

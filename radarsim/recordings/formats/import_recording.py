@@ -408,7 +408,10 @@ class _Import:
             )
         reasons = skip_counts(self.skipped)
         why = f"; left out: {', '.join(reasons)}" if reasons else ""
-        return f"{path}: has no plots; {self.reader.records} records were read{why}"
+        cure = ""
+        if self.result.format == "gpx" and self.reader.records:
+            cure = "; if its points have no times, it is a route: export the track that was recorded"
+        return f"{path}: has no plots; {self.reader.records} records were read{why}{cure}"
 
     def faults(self) -> list[str]:
         """Faults in the rows written, known when all are read."""

@@ -63,6 +63,8 @@ def _documents(path: str, file: BinaryIO) -> Iterator[Any]:
 
 def _document_rows(document: Any, sheet: Sheet) -> Iterator[list[str]]:
     """The rows of a document; the first one gives the sheet its header."""
+    if isinstance(document, dict) and str(document.get("type", "")).startswith("Feature"):
+        raise ConfigError(f"{sheet.path}: must be positions with times; it is GeoJSON: export the track as CSV or GPX")
     if not isinstance(document, dict):
         rows = _record_rows(document, sheet) if isinstance(document, list) else iter(())
     elif isinstance(document.get("trace"), list):

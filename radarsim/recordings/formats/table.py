@@ -37,12 +37,14 @@ from radarsim.recordings.formats.units import (
     TIME_UNITS,
     TURNS,
     degrees_of_minutes,
+    turn_of,
 )
 from radarsim.recordings.row_faults import Faults
 from radarsim.recordings.time_spans import HOUR_S
 
 LARGEST_DEGREES, LARGEST_DDMM, MINUTES_OF_DEGREE = 360.0, 36_000.0, 60  # of coordinates as degrees and minutes, 5236.5
 COMMENT_MARKS = ("#", "//")
+BLANKS = " \t\ufeff"  # about a name, with the mark at the beginning of a file that another was added to
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
 MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * KNOT_MPS, 360.0  # of AIS: what is not below them means missing
 UNKNOWN_POSITION, UNKNOWN_DEGREES = (91.0, 181.0), (999.0, 9999.0, 99999.0)  # of AIS, and of other exports
@@ -67,7 +69,13 @@ class Table:
         self.numbers = CellNumbers(sheet.decimal_comma)
         self.faults = Faults(self.path)
         self.width = len(sheet.header)
-        self.header = Header(self.path, sheet.header, assigned or {}, sheet.sample)
+        try:
+            self.header = Header(self.path, sheet.header, assigned or {}, sheet.sample)
+        except ConfigError as error:
+            if sheet.encoding == "UTF-8" or "".join(sheet.header).isascii():
+                raise
+            encoding = f"the text is read as {sheet.encoding}; for another: --encoding NAME"
+            raise ConfigError(*error.lines[:-1], f"{error.lines[-1]}; {encoding}") from error
         self.columns, self.numbers.o_sign = self.header.columns, self.header.o_sign
         self.kind = records.POSITIONS if self.header.reads_positions else records.PLOTS
         self.time_index = self.columns["t_s"].position
@@ -213,7 +221,9 @@ class Table:
         if len(cells) != self.width:
             self._check_other_line(cells)
             return
-        if cells[self.time_index] == self.time_name and self._is_second_header(cells):
+        time_cell = cells[self.time_index]
+        if time_cell.endswith(self.time_name) and time_cell.strip(BLANKS) == self.time_name.strip(BLANKS):
+            self._check_second_header(cells)
             return
         row = row_of(cells)
         if self.faults:  # the rest is only read for further ones
@@ -250,15 +260,14 @@ class Table:
     def _add_width_fault(self, line: int, width: int) -> None:
         self.faults.add(line, "", f"must have {self.width} cells as the header", width)
 
-    def _is_second_header(self, cells: list[str]) -> bool:
-        """Whether a row repeats the header; one with other columns is a fault."""
+    def _check_second_header(self, cells: list[str]) -> None:
+        """Count a row that repeats the header; one with other columns is a fault."""
         names = zip(cells, self.sheet.header, strict=True)
-        if other_names := [name.strip() for name, own in names if name.strip() != own.strip()]:
+        if other_names := [name.strip() for name, own in names if name.strip(BLANKS) != own.strip(BLANKS)]:
             must = "must be a row of the table, not the header of another: import that from a file of its own"
             self.faults.add(self.line, "", must, ", ".join(other_names))
         else:
             self.skipped[term("headers repeated within the table")] += 1
-        return True
 
     def _position(self, cells: list[str]) -> tuple[float, ...]:
         """POSITION_COLUMNS of a row."""
@@ -307,6 +316,8 @@ class Table:
         bearing, column = self._parse_number(cells, "bearing_rad"), self.columns.get("bearing_rad")
         if column is not None and abs(bearing) > 2 * math.pi:
             number = bearing / column.factor
+            if round(abs(number), 6) in UNKNOWN_DEGREES and round(abs(number), 6) > turn_of(column.unit):
+                return math.nan
             most = 4 * math.pi if not column.unit.startswith("acp") else 2 * math.pi  # counts have no noise
             if not -2 * math.pi <= bearing <= most:
                 must = f"must be within a turn, in {column.unit}"
@@ -482,8 +493,16 @@ class Table:
         try:
             return self.numbers.quantity(text, name, column.factor, QUANTITIES[name].units)
         except ValueError:
-            self._add_fault(name, "must be a number", repr(text[:60]), spoiled_number_cure(text))
+            cure = spoiled_number_cure(text) or self._missing_cure(text, column.position)
+            self._add_fault(name, "must be a number", repr(text[:60]), cure)
             return math.nan
+
+    def _missing_cure(self, text: str, index: int) -> str:
+        """What helps with a word among the numbers of a column; '' of any other text."""
+        numbers = [cell_number(row[index]) for row in self.sheet.sample if index < len(row)]
+        is_word = not any(letter.isdigit() for letter in text)
+        is_rare = sum(map(math.isnan, numbers)) < len(numbers) / 2
+        return "if it stands for no value, leave such cells empty" if is_rare and is_word else ""
 
     def _add_fault(self, ours: str, must: str, got: str, cure: str = "") -> None:
         column, always = self.columns[ours], bool(cure)

@@ -171,3 +171,75 @@ def test_coordinates_with_their_hemispheres(tmp_path, form):
     (tmp_path / "plots.csv").unlink()
     _, expected, _ = imported(tmp_path, text([header, *plain]), at)
     np.testing.assert_allclose(columns["range_m"], expected["range_m"], rtol=0, atol=1)
+
+
+@pytest.mark.parametrize("cell", ["(null)", "inf", "<none>", "b.d.", "sin dato"])
+def test_cells_of_other_programs_that_stand_for_no_value(tmp_path, cell):
+    table = rows()
+    table[3][4] = table[9][4] = cell
+    _, columns, _ = imported(tmp_path, text([NAMES, *table]))
+    assert np.flatnonzero(np.isnan(columns["velocity_mps"])).tolist() == [3, 9]
+
+
+def test_a_word_among_numbers_may_stand_for_none(tmp_path):
+    table = rows()
+    table[3][4] = table[9][4] = "weg"
+    (line,) = refused(tmp_path, text([NAMES, *table]))
+    assert line.endswith("(and 1 more, in line 11); if it stands for no value, leave such cells empty")
+
+
+def test_a_bearing_that_stands_for_none_is_an_empty_cell(tmp_path):
+    table = rows()
+    table[3][3] = table[9][3] = "-999"
+    _, columns, _ = imported(tmp_path, text([NAMES, *table]))
+    assert np.flatnonzero(np.isnan(columns["bearing_rad"])).tolist() == [3, 9]
+
+
+def test_files_one_after_the_other_with_their_marks(tmp_path):
+    first, second = text([NAMES, *rows()[:12]]), text([NAMES, *rows()[12:]])
+    data = b"\xef\xbb\xbf" + first + b"\n\xef\xbb\xbf" + second
+    check(tmp_path, data, ["headers repeated within the table (1)"])
+
+
+@pytest.mark.parametrize(
+    ("names", "cure"),
+    [
+        ("time,track,range_gate,azimuth_deg", "range gates times their length is the range"),
+        ("time,track,Ground range (km),azimuth_deg", "the squares of ground range and height is the slant range"),
+        ("time,track,delay_us,azimuth_deg", "half the delay times the speed of light is the range"),
+        ("time,track,x_km,y_km", "the root of x² + y² is the range"),
+        ("hour,minute,second,range_m", "are a time in one column, HH:MM:SS"),
+    ],
+)
+def test_columns_of_which_a_range_or_a_time_is_made_are_not_offered_as_such(tmp_path, names, cure):
+    (line,) = refused(tmp_path, text([names.split(","), *(row[:4] for row in rows())]))
+    assert line.endswith(f"{cure}: make such a column") or f"{cure}, the angle" in line
+    assert "--column range" not in line.partition("got")[2]
+
+
+@pytest.mark.parametrize("unit", ["DM", "radar miles"])
+def test_miles_may_be_of_two_lengths(tmp_path, unit):
+    name = f"Range ({unit})"
+    (line,) = refused(tmp_path, text([["time", name], *([row[0], row[2]] for row in rows())]))
+    assert line.endswith(f"--column range_nm='{name}' or --column range_dmi='{name}', of nautical or data miles")
+
+
+def test_a_refused_header_names_the_encoding_that_it_was_read_in(tmp_path):
+    names = ["时间", "距离(km)", "方位角(°)"]
+    data = text([names, *([row[0], f"{30 + 0.1 * k:.3f}", row[3]] for k, row in enumerate(rows()))])
+    (line,) = refused(tmp_path, data.decode().encode("gb18030"))
+    assert line.endswith("; the text is read as Windows-1252; for another: --encoding NAME")
+    given = Options(encoding="gb18030", columns={"t_s": names[0], "range_km": names[1], "bearing_deg": names[2]})
+    _, columns, _ = imported(tmp_path, data.decode().encode("gb18030"), given)
+    assert columns["range_m"][1] == 30_100
+
+
+def test_a_route_without_times_is_called_one(tmp_path):
+    points = "".join(f'<trkpt lat="{52 + k / 100}" lon="4.8"/>' for k in range(9))
+    (line,) = refused(tmp_path, f"<gpx><trk><trkseg>{points}</trkseg></trk></gpx>".encode(), AT)
+    assert line.endswith("if its points have no times, it is a route: export the track that was recorded")
+
+
+def test_geojson_is_called_by_its_name(tmp_path):
+    (line,) = refused(tmp_path, b'{"type": "FeatureCollection", "features": []}', AT)
+    assert line.endswith("it is GeoJSON: export the track as CSV or GPX")

@@ -480,7 +480,7 @@ def test_all_faults_of_a_table_at_once(tmp_path):
     assert refused(tmp_path, f"time,range_m,azimuth [deg]\n{rows}".encode()) == [
         "recording:3:2: range_m: must be a number, got 'x' (and 1999 more, in lines 5, 7, 9, …); if this is not "
         "range_m, name the column: --column range_m=THEIRS",
-        "recording:9:3: azimuth [deg]: must be a number, got 'y'",
+        "recording:9:3: azimuth [deg]: must be a number, got 'y'; if it stands for no value, leave such cells empty",
     ]
 
 
