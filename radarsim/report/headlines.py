@@ -45,14 +45,14 @@ def with_headlines(
 
     def headline(name: str, figure: Figure) -> str:
         values = drawn_values(figure)
-        words = _words_of(figure)
-        foreign_keys = [f"{key} = " for key in swept_keys if key not in words]
+        foreign_keys = [key for key in swept_keys if key not in _words_of(figure)]
+        titles = {part for panel in figure.panels for part in plain_text(panel.title).split(", ")}
         kind, _, component = name.partition("_")
         is_of_component = kind in COMPONENT_KINDS and any(component == other.name for other in components)
         for sentence, sources in zip(answer, sources_of_answer, strict=True):
             text = first_statement(sentence)
             is_on_one_case = any(case in text.partition(":")[0] for case in single_cases)
-            is_elsewhere = is_on_one_case or any(key in text for key in foreign_keys)
+            is_elsewhere = is_on_one_case or any(_values_of_key(text, key) - titles for key in foreign_keys)
             is_on_other_component = is_of_component and first_component(text, components) != component
             if is_elsewhere or is_on_other_component or len(without_marks(text)) > MAX_LETTERS:
                 continue
@@ -61,6 +61,11 @@ def with_headlines(
         return plain_text(figure.title)
 
     return {name: emphasised(figure, headline(name, figure)) for name, figure in figures_by_name.items()}
+
+
+def _values_of_key(sentence: str, key: str) -> set[str]:
+    """The values of a swept key that a sentence gives; titles of panels may have them without the key."""
+    return set(re.findall(rf"{re.escape(key)} = ([^,;:()]+)", without_marks(sentence)))
 
 
 def emphasised(figure: Figure, headline: str) -> Figure:

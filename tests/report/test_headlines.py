@@ -87,6 +87,11 @@ def test_a_headline_is_of_the_tables_and_of_all_cases_of_its_figure():
         assert (named["f"].headline == without_marks(sentence)) == is_drawn
     other_key = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, swept_keys=["a"])
     assert other_key["f"].headline == "The title"
+    panel = replace(SIGMA.panels[0], title="1 m/s², late")
+    titled = headlines.with_headlines(
+        {"f": replace(SIGMA, panels=(panel,))}, [sentence], [()], {"f": ()}, swept_keys="a"
+    )
+    assert titled["f"].headline == without_marks(sentence)
     one_of_two = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, ["a = 1 m/s²"])
     assert one_of_two["f"].headline == "The title"
 

@@ -83,8 +83,9 @@ def _figure_of_panels(
     """A figure of one panel, or of several in two columns, or three if that fills the page better."""
     if not figure_panels:
         return None
-    width = panel_layout.WIDE_MM if len(figure_panels) == 1 else PAGE_MM
-    columns = 1 if len(figure_panels) == 1 else 3 if len(figure_panels) in (3, 5, 6, 9, 12) else 2
+    count = sum(bool(panel.marks) for panel in figure_panels)
+    width = panel_layout.WIDE_MM if count == 1 else PAGE_MM
+    columns = 1 if count == 1 else 3 if count in (3, 5, 6, 9, 12) else 2
     return Figure(name, title, caption, tuple(figure_panels), columns, width, height)
 
 
