@@ -46,6 +46,15 @@ FALL_NOTES = {  # by how much a clock is set back, s
         "are taken as 1024 weeks later"
     ),
 }
+COUNTER_SPANS_S = (  # of counters of 15, 16, 24 and 32 bits, in units from 1 µs to 0.1 s and in 128ths of a second
+    *(32.768, 65.536, 327.68, 655.36, 3276.8, 6553.6),
+    *(16.777216, 1677.7216, 16_777.216, 4294.967296, 256.0, 512.0),
+)
+MIN_COUNTER_FALLS, MAX_COUNTER_SHARE = 2, 0.2  # that show one; of the steps in the file
+MAX_COUNTER_STEPS = 5.0  # median steps by which a fall may be less than the span
+COUNTER_NOTE = term(
+    "times fall by {size:.9g} s again and again, as those of a counter that begins anew do: they run on"
+)
 SET_BACK_NOTE = term(
     "the clock was set back by {size:.6g} s{when}: the {count} rows before are taken as that much earlier"
 )
@@ -156,9 +165,12 @@ def sort_rows(batch: Batch, find_positions: Callable[[Batch], np.ndarray]) -> tu
 
 def _undo_clock_steps(batch: Batch, find_positions: Callable[[Batch], np.ndarray]) -> list[str]:
     """Continue times that are set back by one of FALL_NOTES, or step by 1024 weeks, once in a recording, or that are
-    set back by any time; in place, with notes."""
+    set back by any time, or those of a counter; in place, with notes."""
     t = batch.columns["t_s"]
     tracks = [rows for name, rows in rows_by_name(batch.track).items() if name]
+    if (span_s := _counter_span(t, tracks)) is not None:
+        t += span_s * np.cumsum(np.diff(t, prepend=t[0]) < 0)
+        return [tr(COUNTER_NOTE, size=span_s)]
     for size_s, note in FALL_NOTES.items():
         if shifted := _rows_after_fall(t, tracks, size_s):
             t[shifted] += size_s
@@ -180,6 +192,22 @@ def _undo_clock_steps(batch: Batch, find_positions: Callable[[Batch], np.ndarray
             notes.append(_set_back_note(set_back))
             t[set_back.before] -= set_back.size_s
     return notes
+
+
+def _counter_span(t: np.ndarray, tracks: list[np.ndarray]) -> float | None:
+    """The span of a counter that begins anew, if all falls of times (n,) in the order of the file are such, and the
+    rows of a track fall too: a file may be sorted by tracks."""
+    steps = np.diff(t)
+    falls = -steps[steps < 0]
+    has_fallen = any((np.diff(t[rows]) < 0).sum() >= MIN_COUNTER_FALLS for rows in tracks)
+    if not has_fallen or not MIN_COUNTER_FALLS <= len(falls) <= MAX_COUNTER_SHARE * len(steps):
+        return None
+    largest = MAX_COUNTER_STEPS * float(np.median(steps[steps > 0]))
+    for span in COUNTER_SPANS_S:
+        gaps = span - falls
+        if np.ptp(t) <= span and (gaps >= 0).all() and (gaps <= largest).all():
+            return span
+    return None
 
 
 def _set_back_note(set_back: SetBack) -> str:

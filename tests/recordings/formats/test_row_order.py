@@ -139,3 +139,26 @@ def test_a_missed_rollover_of_the_weeks_of_gps_is_named_and_undone(tmp_path):
     done, columns, _ = imported(tmp_path, text.encode(), AT)
     np.testing.assert_array_equal(columns["t_s"], 10 * np.arange(15))
     assert any(note.startswith("dates step by 1024 weeks") and "the 6 rows before" in note for note in done.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit_s", "span"), [("t_ms", 1e-3, 65_536), ("time_s", 1.0, 512), ("t_us", 1e-6, 2**24)]
+)
+def test_times_of_a_counter_that_begins_anew_run_on(tmp_path, name, unit_s, span):
+    step = round(span / 13.3)
+    first = 0.8 * span
+    rows = [(first + k * step + j * step / 3, j, 30_000 + 95 * k) for k in range(N) for j in (1, 2)]
+    text = "\n".join([f"{name},track,range_m", *(f"{round(t) % span},{j},{r}" for t, j, r in rows)])
+    done, columns, _ = imported(tmp_path, text.encode())
+    expected = np.array([round(t) * unit_s for t, *_ in rows])
+    np.testing.assert_allclose(columns["t_s"], expected - expected[0], rtol=0, atol=1e-6)
+    assert done.notes == [
+        f"times fall by {span * unit_s:.9g} s again and again, as those of a counter that begins anew do: they run on"
+    ]
+
+
+def test_tracks_one_after_the_other_are_no_counter(tmp_path):
+    rows = [f"{5 * k},{j},{30_000 + 95 * k}" for j in range(6) for k in range(103)]
+    done, columns, _ = imported(tmp_path, "\n".join(["time,track,range_m", *rows]).encode())
+    assert columns["t_s"].max() == 510
+    assert done.notes == []
