@@ -146,21 +146,32 @@ def _range_of_locks(results: Sequence[CaseResult], tables_by_name: TablesByName,
     rows = {result.name: last_locks(tables_by_name, result, name) for result in cases}
     cases.sort(key=lambda result: rows[result.name]["lock_rate"])
     extremes = (cases[0], cases[-1])
+    rates = [_lock_rate(rows[result.name], len(cases)) for result in extremes]
+    fields = {
+        "estimator": quote_name(name),
+        "realisations": case_selection.realisations_text(cases),
+        "together": compared_value.cases_together(len(cases)),
+    }
+    if len(cases) > 1 and rates[0] == rates[1]:
+        text = tr(
+            "{estimator}: locked in {rate} of the bursts of each of {count} cases of {realisations} ({together}).",
+            rate=rates[0],
+            count=len(cases),
+            **fields,
+        )
+        return Sentence(text, _lock_intervals(*(rows[result.name] for result in extremes)))
     lowest, highest = (
-        f"{_lock_rate(rows[result.name], len(cases))} ({case_name})"
-        for result in extremes
-        if (case_name := key_labels.without_markup(key_labels.swept_description(result)))
+        f"{rate} ({key_labels.without_markup(key_labels.swept_description(result))})"
+        for rate, result in zip(rates, extremes, strict=True)
     )
     text = plural(
         "{estimator}, share of bursts locked in {count} case of {realisations}: lowest {least}; highest {most}.",
         "{estimator}, share of bursts locked in {count} cases of {realisations} each ({together}): lowest {least}; "
         "highest {most}.",
         len(cases),
-        estimator=quote_name(name),
         least=lowest,
         most=highest,
-        realisations=case_selection.realisations_text(cases),
-        together=compared_value.cases_together(len(cases)),
+        **fields,
     )
     return Sentence(text, _lock_intervals(*(rows[result.name] for result in extremes)))
 

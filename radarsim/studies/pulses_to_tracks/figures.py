@@ -204,7 +204,7 @@ STUDY_FIGURES: dict[str, tuple[Draw, str, str]] = {
     "measured": (
         measured_panel,
         term("What the bursts measure"),
-        term("Root-mean-square error of the burst's velocity, of all bursts, those that did not lock included."),
+        term("Root-mean-square error of the burst's velocity over all bursts, including those that did not lock."),
     ),
     "losses": (
         losses_panel,

@@ -194,7 +194,7 @@ def _most_optimistic(
     )
     swept = key_labels.without_markup(key_labels.swept_description(result))
     text = tr(
-        "Most optimistic {since}: {filter}; the RMS error is {ratio} times the filter's own σ ({quantity}, scan {k}).",
+        "Most optimistic filter {since}: {filter}, whose RMS error is {ratio} times its own σ ({quantity}, scan {k}).",
         since=wording.since(*scans[worst["case"]]),
         filter=f"{equal} ({swept})" if swept else equal,
         ratio=ratio.text(form=".3g"),

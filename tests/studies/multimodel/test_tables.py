@@ -248,7 +248,7 @@ def test_time_per_update_is_only_in_the_record_and_the_report(tmp_path):
     assert list(measured) == ["MMA2-122", "MMA2-11", "Kalman-1 20", "Kalman-1 5", "Kalman-2 20", "Kalman-2 1"]
     assert all(seconds > 0 for seconds in measured.values())
     page = (folder / "report.html").read_text()
-    assert "Cost against accuracy" in page
+    assert "Cost versus accuracy" in page
     assert typeset.cell_text(1e9 * measured["Kalman-2 1"]) in page
     assert not any("measured, ns" in path.read_text() for path in folder.glob("*.csv"))
 

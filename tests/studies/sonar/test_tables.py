@@ -44,10 +44,12 @@ def test_filters_of_equal_accuracy_are_named_together(results):
     """Without process noise the Kalman filter is growing memory; and what is asked is answered first."""
     first, *_, optimistic, _ = results["sonar_fluctuating"].answer
     assert "least with “growing” and “kalman”, " in first
-    start = "Most optimistic from the manoeuvre on (120 s): “growing” and “kalman” (target = sonar turning); the RMS "
-    assert optimistic.startswith(f"{start}error is ")
+    start = (
+        "Most optimistic filter from the manoeuvre on (120 s): “growing” and “kalman” (target = sonar turning), whose "
+    )
+    assert optimistic.startswith(f"{start}RMS error is ")
     first, second, *_ = results["sonar_correlated"].answer
-    assert first.startswith("Most optimistic from the first scan on: “naive” (ρ = 0.9")
+    assert first.startswith("Most optimistic filter from the first scan on: “naive” (ρ = 0.9")
     curves = results["sonar_correlated"].tables["curves"]
     assert f" {(curves['exact_sigma'] / curves['believed_sigma']).max():.3g} times" in first
     assert "least with “augmented” and “differenced”, " in second

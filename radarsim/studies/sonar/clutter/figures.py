@@ -22,7 +22,7 @@ SWEPT_KEYS = {  # columns of the table `tracking`, and the keys whose values the
     "detection_probability": "sensor.detection_probability",
     "gate_probability": "gate_probability",
 }
-LIFE_CAPTION = term("mean time between ends of confirmed tracks, extrapolated")
+LIFE_CAPTION = term("mean time between ends of confirmed tracks (extrapolated)")
 ENDS_CAPTION = term("probability (importance sampling) that the target's first track has ended")
 CONFIRMATION_PANELS = 3  # in one row: the time to confirmation over the swept key is in `track_life`
 ZERO_FACTOR = 3.0  # between zero and the smallest positive value on a logarithmic axis
