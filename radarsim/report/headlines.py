@@ -208,7 +208,9 @@ def _is_among(value: tuple[float, float, str], column: DrawnColumn) -> bool:
 
 def quoted_values(sentence: str) -> list[tuple[float, float, str]]:
     """The values that a sentence quotes, each with the step of its last digit and its unit."""
-    marked = re.compile(rf"(?P<digits>{DIGITS}){POWER}(?P<unit>[ \u00a0][^\s\[({MARK}]+)?(?:[ \u00a0]\[|{MARK})")
+    marked = re.compile(
+        rf"(?P<digits>{DIGITS}){POWER}(?P<unit>(?:[ \u00a0]|(?=°))[^\s\[({MARK}]+)?(?:[ \u00a0]\[|{MARK})"
+    )
     return [(*_parsed(match), (match["unit"] or "").strip()) for match in marked.finditer(sentence)]
 
 

@@ -22,7 +22,7 @@ from radarsim.studies.multimodel.tables import stage_gain, stage_names
 from radarsim.studies.sonar.components import COMPONENTS_BY_NAME
 
 NUMBER = r"[−+-]?(?:\d[\d,\u202f\u00a0]*(?:\.\d+)?|∞)(?:·10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)?"
-UNIT = r"(?:[ \u00a0](?:%|°|k?m/s²|k?m/s|k?m|s|к?м/с²|к?м/с|к?м|с|Hz\S*|Гц\S*|rad\S*|рад\S*|m²|м²))?"
+UNIT = r"(?:°|[ \u00a0](?:%|k?m/s²|k?m/s|k?m|s|к?м/с²|к?м/с|к?м|с|Hz\S*|Гц\S*|rad\S*|рад\S*|m²|м²))?"
 MEASURED = re.compile(rf"(?P<value>{NUMBER}){UNIT} \[(?P<low>{NUMBER}), (?P<high>{NUMBER})\]")
 EXACT = re.compile(rf"(?P<value>{NUMBER}){UNIT}{MARK}")
 FOR_ALL = re.compile(r"95[ \u00a0]% (?:for (?:all|both)|сразу для)(?: (?:всех )?(\d+))?")
@@ -54,12 +54,13 @@ def _in_percent(x):
     return 100 * x
 
 
-CHANGES = (  # how sentences write a column: itself, in per cent, of a gain loss and factor, of a ratio the excess
+CHANGES = (  # how sentences write a column: itself, in per cent, of a gain loss and factor, of a ratio the excess, in °
     lambda x: x,
     _in_percent,
     lambda x: -x,
     lambda x: 1 - x / 100,
     lambda x: 100 * (x - 1),
+    np.degrees,
 )
 WORDS = {  # of components in English, which does not inflect them
     **{component.name: component.words for component in (*RADIAL, *COMPONENTS_BY_NAME.values())},

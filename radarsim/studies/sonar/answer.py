@@ -162,7 +162,7 @@ def _filters_and_sigma(rows: "pd.DataFrame", sigma: ComparedValue) -> str:
     """Filters of equal σ, and it with the interval; of an angle in degrees."""
     factor, unit = key_labels.degrees_factor_and_unit(rows["unit"].iloc[0])
     value = sigma if factor == 1.0 else sigma.mapped(lambda angle: factor * angle)
-    return f"{list_filters(rows['filter'])}, {value.text(key_labels.unit_label(unit))}"
+    return f"{list_filters(rows['filter'])}, {value.text(key_labels.unit_label(unit)).replace(' °', '°')}"
 
 
 def _most_optimistic(

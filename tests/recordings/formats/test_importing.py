@@ -541,7 +541,7 @@ def test_exports_of_positions(tmp_path, header, row, feet):
 
 def test_altitudes_that_no_aircraft_has_are_asked_about(tmp_path):
     done, _, _ = imported(tmp_path, b"time,lat,lon,altitude\n1,52,4,36000\n", Options(site=SITE))
-    assert done.notes[-1] == "altitudes up to 36000 m: if altitude is in feet, name it altitude_ft"
+    assert done.notes[-1] == "altitudes up to 36,000 m: if altitude is in feet, name it altitude_ft"
 
 
 def test_times_are_those_of_the_positions(tmp_path):
