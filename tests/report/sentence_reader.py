@@ -54,14 +54,20 @@ def _in_percent(x):
     return 100 * x
 
 
-CHANGES = (  # how sentences write a column: itself, in per cent, of a gain loss and factor, of a ratio the excess, in °
+CHANGES = (  # how sentences write a column: itself, in per cent, of a gain loss and factor, of a ratio the excess
     lambda x: x,
     _in_percent,
     lambda x: -x,
     lambda x: 1 - x / 100,
     lambda x: 100 * (x - 1),
-    np.degrees,
 )
+
+
+def _changes(text):
+    """How a number is written; one in degrees is of an angle in radians."""
+    return (*CHANGES, np.degrees) if "°" in text else CHANGES
+
+
 WORDS = {  # of components in English, which does not inflect them
     **{component.name: component.words for component in (*RADIAL, *COMPONENTS_BY_NAME.values())},
     **{"y": "height", "vy": "rate of climb"},
@@ -255,7 +261,7 @@ def read_sentence(
             is_known = any(
                 (near(change(column.exact), match["value"]) & place.rows(column, names)).any()
                 for column in columns
-                for change in CHANGES
+                for change in _changes(text)
             )
             (read if is_known else faults).append(text if is_known else f"{text}: in no exact column")
             continue
@@ -356,7 +362,7 @@ def _mentions(text: str, names: Mapping[str, str]) -> list[str]:
 
 def _rows(column: Table, match: re.Match, may_be_wider: bool, chosen: np.ndarray) -> Iterator[tuple[str, float]]:
     """The name and the exact value of the chosen rows of a column that hold a value and the ends of its interval."""
-    for change in CHANGES:
+    for change in _changes(match[0]):
         value, ends = change(column.value), np.sort([change(column.low), change(column.high)], axis=0)
         has_value = near(value, match["value"])
         if change is _in_percent and match["value"] in ("0", "100"):  # all or none, not nearly
