@@ -42,6 +42,12 @@ def picture(png):
         return np.asarray(image.convert("L")), image.width / PNG_DPI / MM
 
 
+def drawn_pixels(canvas):
+    """The grey values of a drawing, as those of its PNG without writing and reading that."""
+    canvas.canvas.draw()
+    return np.asarray(Image.fromarray(np.asarray(canvas.canvas.buffer_rgba())).convert("L"))
+
+
 def cut_edges(pixels):
     """The edges of a picture that have ink."""
     edges = {"left": pixels[:, 0], "right": pixels[:, -1], "top": pixels[0], "bottom": pixels[-1]}
@@ -55,9 +61,8 @@ def faults_of_widths(figures):
         for width in (None, *WIDTHS_MM):
             drawn_figure, canvas = drawing_canvas.render_at(figure, width)
             words = overlapping_words(canvas)
-            png = io.BytesIO()
-            canvas.savefig(png, format="png", dpi=PNG_DPI)
-            pixels, width_mm = picture(png.getvalue())
+            pixels = drawn_pixels(canvas)
+            width_mm = pixels.shape[1] / PNG_DPI / MM
             is_tall = len(pixels) / PNG_DPI / MM > A4_HEIGHT_MM
             if (edges := cut_edges(pixels)) or words or is_tall or round(width_mm) != round(drawn_figure.width_mm):
                 faults.append(f"{name} at {width} mm: {width_mm:.0f} mm, cut: {edges}, meet: {words}")
