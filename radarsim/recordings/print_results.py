@@ -97,6 +97,9 @@ def print_fit(fitted: "Fit") -> None:
             lines.append(tr("outliers: {share} % of {column}", share=share, column=column))
         else:
             lines.append(tr("outliers: {share} % of the plots", share=share))
+    if not fitted.knows_outliers:
+        words = tr("filter {filter} knows no outliers: each plot that is far off makes σ larger", filter=fitted.filter)
+        lines.append(labelled_line("", words))
     if fitted.has_overlap:
         width = significant_digits(max(fitted.outliers.values(), key=fit.share_within_sound).near_width, "#.2g")
         words = tr(

@@ -189,6 +189,26 @@ def test_the_end_of_several_fits_is_foretold_from_the_beginning(allowing):
     assert expected.max() < 2 * len(done)
 
 
+@pytest.mark.slow  # 2 s
+def test_the_robust_fit_does_not_depend_on_the_plain_one():
+    """A range 6000 km off spoils the plain fit, which lowers what counts as a manoeuvre variance of zero."""
+    overrides = "scans=60", "radar.sigma_range_m=60", "radar.sigma_velocity_mps=1"
+    columns = flown(*overrides, realisation=1)
+    columns["range_m"] = columns["range_m"] + 6e6 * (np.arange(60) == 30)
+    config = loaded(*overrides)
+    found = fit.fit_likelihood(likelihood(columns, config=config), None, [OUTLIERS])
+    assert found.keys == fit.fit_keys(likelihood(columns, config=config), [OUTLIERS]).keys
+
+
+def test_a_likelihood_without_outliers_says_so(capsys):
+    one = likelihood(recording(np.random.default_rng(1)))
+    said = "filter r+Vr knows no outliers: each plot that is far off makes σ larger"
+    for explains in (one.explains, ()):
+        one.explains = explains
+        print_results.print_fit(fit.fit_keys(one))
+        assert (said in " ".join(capsys.readouterr().out.split())) == (not explains)
+
+
 def test_what_cannot_be_allowed_for_is_refused_before_anything_is_computed():
     one = likelihood(recording(np.random.default_rng(5)))
     one.explains, told = (), []

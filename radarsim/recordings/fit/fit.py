@@ -43,7 +43,7 @@ from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
 from radarsim.recordings.rounding_guard import LOSS_GAP_PERIODS, gap_message
 from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
-from radarsim.recordings.target_speed import impossible_column_speed, speed_message
+from radarsim.recordings.target_speed import impossible_column_speed, speed_message, unreachable_column_rows
 from radarsim.recordings.track_jumps import column_fault
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
 from radarsim.studies.missed_scans import without_empty_rows
@@ -76,6 +76,7 @@ MAX_PLAUSIBLE_OUTLIERS = 0.3  # of numbers that may be far outliers; with more, 
 SOUND_SIGMAS = 3.0  # by which a sound number may differ
 MAX_OVERLAP = 0.002  # of the numbers that are near outliers and look sound: with more, a fit says so
 OUTLIER_PROBABILITY = 0.5  # from which a number is named as an outlier
+MAX_NAMED_ROWS = 5  # of plots far off, in a refusal
 CORRELATION_TIME_KEY = "correlation_time_s"
 ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
 CLEAR_RISE = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
@@ -97,6 +98,7 @@ class Fit:
     further_explanation: "FurtherExplanation | None" = None
     plain: "Fit | None" = None
     outlier_rows: tuple["OutlierRow", ...] = ()  # the numbers that are probably outliers
+    knows_outliers: bool = True  # whether the likelihood can allow for them
     doubles: int = 0  # further plots of a track in a scan, left out
     fills: int = 0  # velocities that stand for none, left out
 
@@ -211,6 +213,7 @@ def file_likelihoods(
                 case, filter_name, [name for name in filter_names if interface.likelihood(case, name, long_tracks)]
             )
         )
+    _refuse_gross_errors(source, likelihood, {name or "": tracks[name] for name in names})
     _refuse_lost_digits(source, case, likelihood, long_tracks)
     rough = interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked)))
     return FileLikelihoods(likelihood, rough, names, doubles, fills)
@@ -235,6 +238,27 @@ def _refuse_impossible_motion(
             raise ConfigError(f"{source}: {folding_message(fault.folding, case)}")
         if fault.scale is not None:
             raise ConfigError(f"{source}: {doppler_scale_message(fault.scale)}")
+
+
+def _refuse_gross_errors(
+    source: str | os.PathLike, likelihood: Likelihood, named: Mapping[str, Mapping[str, np.ndarray]]
+) -> None:
+    """Raise ConfigError if rows of tracks, by their names, are where no target comes, and the likelihood knows no
+    outliers: the σ fitted would be that of these rows."""
+    if OUTLIERS in likelihood.explains:
+        return
+    places = [
+        f"{columns['t_s'][row]:g} s{name and f' ({name})'}"
+        for name, columns in named.items()
+        for row in unreachable_column_rows(columns)
+    ]
+    if places:
+        more = f" and {len(places) - MAX_NAMED_ROWS} more" if len(places) > MAX_NAMED_ROWS else ""
+        raise ConfigError(
+            f"{source}: plots far off, where the target cannot be, at {', '.join(places[:MAX_NAMED_ROWS])}{more}; "
+            f"the likelihood of filter {likelihood.filter} knows no outliers, so that σ would be theirs: leave these "
+            "plots out"
+        )
 
 
 def _refuse_lost_digits(
@@ -374,6 +398,7 @@ def fit_keys(
         gain,
         _find_further_explanation(search, likelihood),
         outlier_rows=_outlier_rows(search, likelihood),
+        knows_outliers=OUTLIERS in likelihood.explains,
     )
 
 

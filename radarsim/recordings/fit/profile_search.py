@@ -71,7 +71,8 @@ class LikelihoodSearch:
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         self.end_count, self.ends_started_at = 0, 0
         self.steps = SMOOTH_STEPS if likelihood.is_smooth else LEAP_STEPS
-        start, self.lowest = np.log(starting_values(likelihood)), np.log(likelihood.zero_limits)
+        self.zero_limits = np.array(likelihood.zero_limits)  # refined in this search alone
+        start, self.lowest = np.log(starting_values(likelihood)), np.log(self.zero_limits)
         self.highest = start + math.log(INTERVAL_REACH)
         self.zero_reach = np.full(start.size, NEAR_ZERO_LOG)
         self.law_starts = range(start.size, start.size + LAW_SIZE * len(likelihood.outlier_kinds) * robust, LAW_SIZE)
@@ -210,7 +211,7 @@ class LikelihoodSearch:
     def to_values(self, point: np.ndarray) -> np.ndarray:
         """The values of the keys at a point."""
         keys = np.exp(np.clip(point[: len(self.likelihood.stated)], -200, 200))
-        return np.where(keys <= self.likelihood.zero_limits, 0.0, keys)
+        return np.where(keys <= self.zero_limits, 0.0, keys)
 
     def law(self, point: np.ndarray) -> ErrorLaw:
         """The law of errors at a point."""
@@ -339,15 +340,15 @@ class LikelihoodSearch:
 
     def refine_zero(self) -> bool:
         """Lower the values that count as zero where the likelihood leaps there; return whether any was lowered."""
-        limits_before = self.likelihood.zero_limits
+        was_refined = False
         while leaping_keys := [i for i in range(len(self.likelihood.keys)) if self._has_leap_at_zero(i)]:
             is_zero = self.best <= self.lowest
-            self.likelihood.zero_limits = np.array(self.likelihood.zero_limits)
-            self.likelihood.zero_limits[leaping_keys] *= ZERO_REFINEMENT
+            self.zero_limits[leaping_keys] *= ZERO_REFINEMENT
             self.lowest[leaping_keys] += math.log(ZERO_REFINEMENT)
             self.best[is_zero] = self.lowest[is_zero] - FIRST_STEP
             self.top = self.log_likelihood(self.best)
-        return self.likelihood.zero_limits is not limits_before
+            was_refined = True
+        return was_refined
 
     def _has_leap_at_zero(self, i: int) -> bool:
         """Whether the likelihood leaps at zero of a key, and is near the top there."""

@@ -1,8 +1,13 @@
 """Recorded plots of the plane: innovations against the twins, folded velocities."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from radarsim.api.load_experiments import load_all
+from radarsim.errors import ConfigError
+from radarsim.recordings import simulate_plots
+from radarsim.recordings.fit.fit import file_likelihoods
 from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
 from radarsim.studies.registry import study
 from tests.studies.plane import naive
@@ -49,3 +54,24 @@ def test_folded_velocities_are_said_and_taken_with_the_rate_that_folds_them():
     assert key == "radar.repetition_rate_hz"
     assert float(value) == pytest.approx(4000, rel=0.05)
     assert detect_case_velocity_fault(folded, [track]).folding is None
+
+
+@pytest.mark.parametrize("row", [0, 1, 20, 39])
+@pytest.mark.parametrize(("name", "error"), [("range_m", 6e4), ("range_m", 6e6), ("bearing_rad", 1.0)])
+def test_a_plot_where_the_target_cannot_be_is_refused_rather_than_fitted(tmp_path, name, error, row):
+    """The likelihood by steps knows no outliers: σ of the range would be 8 km, of one plot of 40 that is 60 km off."""
+    (experiment,) = load_all(["plane"], ("scans=40", "radar.detection_probability=1"))
+    columns = simulate_plots.simulate_realisation(experiment, 0)
+    columns[name] = columns[name] + error * (np.arange(40) == row)
+    file = tmp_path / "plots.csv"
+    pd.DataFrame(columns).to_csv(file, index=False)
+    with pytest.raises(ConfigError, match=rf"plots far off.* at {columns['t_s'][row]:g} s; .*knows no outliers"):
+        file_likelihoods(experiment, file)
+
+
+def test_sound_plots_of_a_target_that_turns_are_fitted(tmp_path):
+    (experiment,) = load_all(["plane"], ("scans=60",))
+    for i in range(10):
+        file = tmp_path / f"{i}.csv"
+        pd.DataFrame(simulate_plots.simulate_realisation(experiment, i)).to_csv(file, index=False)
+        assert file_likelihoods(experiment, file).complete.rows > 40
