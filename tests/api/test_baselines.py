@@ -92,7 +92,7 @@ def test_figures_answer_and_last_scan(both):
     assert {"gain_r", "gain_r_2", "gain_Vr_2"} <= set(both.figures)
     assert "over filter r," in both._figures_by_name["gain_r_2"].caption
     assert "over filter r+Vr," in both._figures_by_name["gain_r"].caption
-    (further,) = [line for line in both.answer if line.startswith("config, gain in r against r at 110 s: r+Vr ")]
+    (further,) = [line for line in both.answer if line.startswith("config, gain in r over r at 110 s: r+Vr ")]
     row = both.gains[(both.gains["baseline"] == "r") & (both.gains["filter"] == "slow") & (both.gains["k"] == 12)]
     assert f"“slow” {row[row.component == 'r'].iloc[0]['exact_percent']:.3g} %" in further
     assert len(both.last_scan) == 9
