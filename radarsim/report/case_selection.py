@@ -18,6 +18,7 @@ from radarsim.report.key_labels import (
     swept_description,
     swept_title,
     titled_value,
+    value_with_unit,
     without_markup,
 )
 
@@ -63,10 +64,22 @@ def swept_cases(results: Sequence[CaseResult]) -> list[str]:
     return [without_markup(swept_description(result)) for result in results if result.swept_values]
 
 
-def swept_keys(results: Sequence[CaseResult]) -> list[str]:
-    """How sentences and figures name the keys in which cases differ."""
-    keys = (key_symbol(result, key) for result in results for key, _ in result.swept_values)
-    return list(dict.fromkeys(map(without_markup, keys)))
+def swept_keys(results: Sequence[CaseResult]) -> dict[str, set[str]]:
+    """The keys in which cases differ, as sentences and figures name them, each with its values in all unswept cases."""
+    keys = list(dict.fromkeys(key for result in results for key, _ in result.swept_values))
+    unswept = [result for result in results if not result.swept_values]
+    texts: dict[str, set[str]] = {}
+    for key in keys:
+        twins = [_twin_values(result, key, results) for result in unswept]
+        name = next(key_symbol(result, key) for result in results if key in dict(result.swept_values))
+        texts.setdefault(without_markup(name), set()).update(set.intersection(*twins) if twins else set())
+    return texts
+
+
+def _twin_values(unswept: CaseResult, key: str, results: Sequence[CaseResult]) -> set[str]:
+    """The values of a key, in words, of swept cases that are in all else as an unswept one."""
+    values = [(result, dict(result.swept_values)) for result in results if result.spec == unswept.spec]
+    return {value_with_unit(result, key, swept[key]) for result, swept in values if key in swept}
 
 
 def group_by_config(results: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:

@@ -33,26 +33,29 @@ def with_headlines(
     sources_of_answer: Sequence[Collection[str]],
     sources_by_figure: Mapping[str, Collection[str]],
     single_cases: Collection[str] = (),
-    swept_keys: Collection[str] = (),
+    swept_keys: Mapping[str, Collection[str]] | None = None,
     components: Sequence[Component] = (),
 ) -> dict[str, Figure]:
     """The figures with a headline each.
 
     sources_of_answer: tables that each sentence of the answer rests on, or a table's column, "folds.right";
     sources_by_figure: those that are drawn; single_cases: how sentences on one of several cases begin, which none of
-    these figures is about; swept_keys: as figures name them, for no figure is about one that it lacks; components: of
-    the study, whose names end those of figures."""
+    these figures is about; swept_keys: as figures name them, with their values in unswept cases, which a figure that
+    lacks the key draws; components: of the study, whose names end those of figures."""
 
     def headline(name: str, figure: Figure) -> str:
         values = drawn_values(figure)
-        foreign_keys = [key for key in swept_keys if key not in _words_of(figure)]
+        words = _words_of(figure)
+        foreign_keys = {key: values for key, values in (swept_keys or {}).items() if key not in words}
         titles = {part for panel in figure.panels for part in plain_text(panel.title).split(", ")}
         kind, _, component = name.partition("_")
         is_of_component = kind in COMPONENT_KINDS and any(component == other.name for other in components)
         for sentence, sources in zip(answer, sources_of_answer, strict=True):
             text = first_statement(sentence)
             is_on_one_case = any(case in text.partition(":")[0] for case in single_cases)
-            is_elsewhere = is_on_one_case or any(_values_of_key(text, key) - titles for key in foreign_keys)
+            is_elsewhere = is_on_one_case or any(
+                _values_of_key(text, key) - titles - set(values) for key, values in foreign_keys.items()
+            )
             is_on_other_component = is_of_component and first_component(text, components) != component
             if is_elsewhere or is_on_other_component or len(without_marks(text)) > MAX_LETTERS:
                 continue
@@ -65,7 +68,7 @@ def with_headlines(
 
 def _values_of_key(sentence: str, key: str) -> set[str]:
     """The values of a swept key that a sentence gives; titles of panels may have them without the key."""
-    return set(re.findall(rf"{re.escape(key)} = ([^,;:()]+)", without_marks(sentence)))
+    return set(re.findall(rf"{re.escape(key)} = ([^,;:()]+?)(?=[,;:()]|\.?$)", without_marks(sentence)))
 
 
 def emphasised(figure: Figure, headline: str) -> Figure:

@@ -85,13 +85,15 @@ def test_a_headline_is_of_the_tables_and_of_all_cases_of_its_figure():
     for column, is_drawn in (("folds.right", True), ("folds.lost", False), ("folds", True)):
         named = headlines.with_headlines({"f": SIGMA}, [sentence], [(column,)], drawn)
         assert (named["f"].headline == without_marks(sentence)) == is_drawn
-    other_key = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, swept_keys=["a"])
+    other_key = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, swept_keys={"a": ()})
     assert other_key["f"].headline == "The title"
     panel = replace(SIGMA.panels[0], title="1 m/s², late")
     titled = headlines.with_headlines(
-        {"f": replace(SIGMA, panels=(panel,))}, [sentence], [()], {"f": ()}, swept_keys="a"
+        {"f": replace(SIGMA, panels=(panel,))}, [sentence], [()], {"f": ()}, swept_keys={"a": ()}
     )
     assert titled["f"].headline == without_marks(sentence)
+    unswept = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, swept_keys={"a": {"1 m/s²"}})
+    assert unswept["f"].headline == without_marks(sentence)
     one_of_two = headlines.with_headlines({"f": SIGMA}, [sentence], [()], {"f": ()}, ["a = 1 m/s²"])
     assert one_of_two["f"].headline == "The title"
 
