@@ -190,9 +190,12 @@ class _Reader:
         for i, j in np.argwhere(impossible_values(array, self.names, self.any_origin)):
             name = self.names[j]
             must = "must be in radians, from -2 pi to 2 pi" if name.endswith("_rad") else "must be > 0"
-            degrees = f"if these are degrees, name it bearing_deg and {import_command(self.path)}"
-            cure = degrees if name == "bearing_rad" else ""
-            self.faults.add(lines[i], self._column_label(j), must, f"{array[i, j]:g}", cure)
+            cures = {
+                "bearing_rad": f"if these are degrees, name it bearing_deg and {import_command(self.path)}",
+                "range_m": f"plots without a range are left out by {import_command(self.path)}",
+            }
+            label, cure = self._column_label(j), cures.get(name, "")
+            self.faults.add(lines[i], label, must, f"{array[i, j]:g}", cure, always=name == "range_m")
 
     def _check_times(self, t: np.ndarray, lines: list[int], tracks: list[str]) -> None:
         """Collect times that do not rise from row to row of a track as faults; rows of no track may have any time."""
@@ -233,8 +236,10 @@ class _Reader:
             value = math.nan
         if not abs(value) <= LARGEST_NUMBER or "_" in text:
             hint = " with a decimal point, not a comma" if DECIMAL_COMMA.fullmatch(text) else ""
-            cure = "" if j else f"for times of day and dates, {import_command(self.path)}"
-            self.faults.add(line, self._column_label(j), f"must be a finite number{hint}", repr(text[:60]), cure)
+            what = "cells that stand for none" if j else "times of day and dates"
+            cure = f"for {what}, {import_command(self.path)}" if not j or "range_m" in self.names else ""
+            must = f"must be a finite number{hint}"
+            self.faults.add(line, self._column_label(j), must, repr(text[:60]), cure, always=bool(cure and j))
             return math.nan
         return value
 

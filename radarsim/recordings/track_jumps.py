@@ -31,6 +31,7 @@ MAX_SHIFT_CHANGE = 0.5  # of the shift, by which a change of the velocity may mo
 MAX_SHIFTS = 3  # of a track: cells of a coarse measurement change oftener
 MIN_ALTERNATING_ROWS, MIN_ALTERNATING_SHARE = 20, 0.9  # of a track
 MAX_ALTERNATING_RATIO = 0.5  # of the distances from the last row but one and from the last
+MIN_ALTERNATING_SIGMAS = 8.0  # of the distance of two courses, if each row lies on the other than the one before
 
 
 class Jump(NamedTuple):
@@ -169,15 +170,26 @@ def jumps_fault(jumps: Sequence[Jump], rows: int) -> CourseFault | None:
     return CourseFault(tuple(jumps)) if 0 < len(jumps) <= MAX_JUMP_SHARE * rows else None
 
 
-def find_alternation(name: str, positions: np.ndarray) -> Alternation | None:
-    """Whether the rows of a track, positions (n, d) in the order of time, alternate between two places: almost each is
-    nearer to the last but one than to the one before it. Errors do not make it so, nor motion."""
-    if len(positions) < MIN_ALTERNATING_ROWS:
+def find_alternation(name: str, track: TrackPositions) -> Alternation | None:
+    """Whether the rows of a track, whose times rise, alternate between two places or two courses: almost each is nearer
+    to the last but one than to the one before it, or lies on the same side of the line between those beside it as
+    every other. Errors do not make it so, nor motion."""
+    t, positions = track
+    if len(t) < MIN_ALTERNATING_ROWS:
         return None
     single, double = (np.linalg.norm(positions[2:] - positions[2 - lag : -lag], axis=1) for lag in (1, 2))
-    if (double < MAX_ALTERNATING_RATIO * single).mean() < MIN_ALTERNATING_SHARE:
+    if (double < MAX_ALTERNATING_RATIO * single).mean() >= MIN_ALTERNATING_SHARE:
+        return Alternation(name, float(np.median(single)))
+    share = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    aside = positions[1:-1] - (1 - share) * positions[:-2] - share * positions[2:]
+    sides = aside * np.where(np.arange(len(aside)) % 2, -1.0, 1.0)[:, None]
+    distance = np.median(sides, axis=0)
+    sigma = np.median(np.abs(sides - distance), axis=0) / 0.6745
+    is_far = np.abs(distance) > MIN_ALTERNATING_SIGMAS * sigma / np.sqrt(len(sides) / 6)  # neighbours share rows
+    is_same_side = (sides * np.sign(distance) > 0).mean(axis=0) >= MIN_ALTERNATING_SHARE
+    if not (is_far & is_same_side).any():
         return None
-    return Alternation(name, float(np.median(single)))
+    return Alternation(name, float(np.linalg.norm(distance)))
 
 
 def recording_jumps(names: Sequence[str], t_s: np.ndarray, positions: np.ndarray) -> list[Jump]:
@@ -210,7 +222,7 @@ def column_fault(tracks: Mapping[str, Sequence[Mapping[str, np.ndarray]]]) -> Co
         for columns in stretches:
             if (track := column_positions(columns)) is None:
                 return None
-            if (alternation := find_alternation(name, track.positions)) and (np.diff(track.t_s) > 0).all():
+            if (np.diff(track.t_s) > 0).all() and (alternation := find_alternation(name, track)):
                 return CourseFault(alternation=alternation)
             jumps += find_jumps(name, track)
             rows += len(track.t_s)

@@ -64,7 +64,11 @@ def test_the_second_choice_of_columns(tmp_path):
             "t_s,range_m,bearing_rad\n0,100,45\n",
             "plots.csv:2:3: bearing_rad: must be in radians, from -2 pi to 2 pi, got 45",
         ),
-        ("t_s,range_m,bearing_rad\n0,-100,1\n", "plots.csv:2:2: range_m: must be > 0, got -100"),
+        (
+            "t_s,range_m,bearing_rad\n0,-100,1\n",
+            "plots.csv:2:2: range_m: must be > 0, got -100; plots without a range are left out by radarsim import "
+            "plots.csv -o imported.csv",
+        ),
         (
             b"t_s,x_m,y_m\n0,\xff,1\n",
             "plots.csv: is not UTF-8 text; other recordings: radarsim import plots.csv -o imported.csv",
@@ -90,8 +94,9 @@ def test_equal_faults_are_one_line_with_their_cure(tmp_path, chunk):
         f"and dates, {IMPORT}",
         f"plots.csv:2:3: bearing_rad: must be in radians, from -2 pi to 2 pi, got 45 (and 3 more, in lines 4, 7, 8); "
         f"if these are degrees, name it bearing_deg and {IMPORT}",
-        "plots.csv:3:2: range_m: must be a finite number, got 'b' (and 1 more, in line 9)",
-        "plots.csv:4:2: range_m: must be > 0, got -1",
+        f"plots.csv:3:2: range_m: must be a finite number, got 'b' (and 1 more, in line 9); for cells that stand for "
+        f"none, {IMPORT}",
+        f"plots.csv:4:2: range_m: must be > 0, got -1; plots without a range are left out by {IMPORT}",
         "plots.csv:5: must have 3 cells as the header, got 2",
     ]
 

@@ -100,3 +100,16 @@ def test_what_a_target_does_is_no_change_of_zero(kind):
         r = 300 * np.round(r / 300) if kind == "cells" else r
         columns = {"t_s": t, "range_m": r} | ({"bearing_rad": np.arctan2(y, x)} if seed % 2 else {})
         assert column_fault({"": [columns]}) is None, seed
+
+
+@pytest.mark.parametrize("shift_m", [400, 1500, 6000])
+def test_two_sensors_of_another_zero_are_named_though_the_target_moves_farther(shift_m):
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        t, r, _ = course(speed_mps=(-250, 200)[seed % 2], first_m=120e3, seed=seed)
+        t = t + (3 * (np.arange(N) % 2) if seed % 3 else rng.uniform(0, 2, N))
+        r = r + (t - 4.0 * np.arange(N)) * (-250, 200)[seed % 2]
+        columns = {"t_s": t, "range_m": r + shift_m * (np.arange(N) % 2)}
+        assert abs(column_fault({"": [columns]}).alternation.distance_m - shift_m) < 0.25 * shift_m
+        noise = {"t_s": t, "range_m": 30e3 + rng.standard_t(2, N) * shift_m}
+        assert column_fault({"": [noise]}) is None

@@ -316,7 +316,8 @@ class _Import:
     def _note_alternation(self, batch: Batch, positions: np.ndarray) -> None:
         """Note the first track of a batch that alternates between two places."""
         for name, rows in rows_by_name(batch.track).items():
-            if name and (alternation := track_jumps.find_alternation(name, positions[rows])):
+            track = TrackPositions(batch.columns["t_s"][rows], positions[rows])
+            if name and (alternation := track_jumps.find_alternation(name, track)):
                 self.result.notes.append(CourseFault(alternation=alternation).message())
                 return
 
