@@ -212,8 +212,8 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
     if not pairs:
         return None
     caption = tr(
-        "Mean (bias) and standard deviation of the error in the {quantity}, from {realisations}; their squares "
-        "add to that of the RMS error. Only cases whose bias sometimes exceeds the standard deviation.",
+        "Bias and standard deviation of the {quantity} error, from {realisations}. Cases whose bias is never the "
+        "larger are left out.",
         quantity=component.words,
         realisations=realisations_text(results),
     )
@@ -221,7 +221,7 @@ def dynamic_figure(name: str, results: Sequence[CaseResult], curves: Mapping, co
     pairs = pick_evenly(pairs, MAX_PANELS // 2)
     caption += left_out_remark(titles, [panel.title for panel, _ in pairs])
     if any(bias.y.limits != (None, None) for bias, _ in pairs):
-        caption += " " + tr("The bias at the first plot is off the plot.")
+        caption += " " + tr("The first bias is off the axis.")
     title = tr("Dynamic and fluctuation error of the {quantity}", quantity=component.words)
     return Figure(name, title, caption, tuple(panel for pair in pairs for panel in pair), 2, PAGE_MM, 56.0)
 
