@@ -47,7 +47,7 @@ class PlotLikelihood:
         self.far_kinds: tuple[str, ...] = ()
         self.is_smooth = True
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
-        self.span = float(data_span(tracks, self.columns[:1] if "range_m" in self.columns else self.columns).max())
+        self.span = data_span(tracks, self.columns)
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, layout.START) for columns in tracks]
         self.measured = np.concatenate(
             [np.stack([columns[name] for name in self.columns], axis=1) for columns in self.cleaned_tracks]
@@ -73,12 +73,12 @@ class PlotLikelihood:
         """For each track the log-densities (n,) of its later plots, and their probabilities to be no outliers, for
         given values of the keys and a merging rule."""
         design, numbers = self._bank(float(values[3]), merge)
-        plots, far_widths = self._plots(*values[:3].tolist())
+        plots, far_covariances = self._plots(*values[:3].tolist())
         result = []
         outliers = law.outlier_rows(1)[0]
-        near_width = np.full((len(plots), 1), OutlierLaw(*outliers.tolist()).near_width ** 2)
-        unused = np.ones((len(plots), WIDTH - 2 - FAR_COUNT))
-        widths = np.hstack([np.ones_like(near_width), near_width, far_widths, unused])
+        covariances = np.repeat(plots[:, layout.COVARIANCE : layout.COVARIANCE + 6, None], WIDTH, axis=2)
+        covariances[:, :, 1] *= OutlierLaw(*outliers.tolist()).near_width ** 2
+        covariances[:, :, 2 : 2 + FAR_COUNT] = far_covariances
         for problem in self.problems:
             work, state = work_arrays()
             start = plots[problem.start_rows]
@@ -89,8 +89,8 @@ class PlotLikelihood:
                 np.empty((2, len(problem.intervals))),
             )
             arguments = design, problem.transitions, problem.intervals, problem.times, numbers, self.frame
-            later_widths = widths[problem.later_plots]
-            likelihood.log_likelihood(work, state, later_plots, later_widths, *arguments, outliers, score, soundness)
+            of_laws = covariances[problem.later_plots]
+            likelihood.log_likelihood(work, state, later_plots, of_laws, *arguments, outliers, score, soundness)
             result.append((problem, score, soundness))
         return result
 
@@ -104,24 +104,20 @@ class PlotLikelihood:
         return filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
 
     def _calculate_plots(self, *sensor_sigmas: float) -> tuple[np.ndarray, np.ndarray]:
-        """The plots as the kernel takes them, and the factors (n, FAR_COUNT) on their covariances in the wide laws of
-        outliers, for given σ of the sensor."""
-        names = [key.partition(".")[2] for key in self.keys[:3]]
-        sensor = self.spec.sensor.model_copy(update=dict(zip(names, sensor_sigmas, strict=True)))
-        z, R, is_valid = local_plots(sensor, self.measured)
-        return np.concatenate([z, R, is_valid[:, None]], axis=1), self._far_widths(R)
+        """The plots as the kernel takes them, and their packed covariances (n, 6, FAR_COUNT) in the wide laws of
+        outliers, for given σ of the sensor. The widest law spans the data in each number, whatever its σ: else σ of one
+        would grow with the outliers of another."""
+        z, R, is_valid = self._local_plots(np.array(sensor_sigmas))
+        least = FAR_WIDTH * np.array(sensor_sigmas)
+        ratios = np.maximum(self.span / np.where(least > 0, least, np.inf), 1.0)
+        far = [self._local_plots(least * ratios**power)[1] for power in np.linspace(0, 1, FAR_COUNT)]
+        return np.concatenate([z, R, is_valid[:, None]], axis=1), np.stack(far, axis=2)
 
-    def _far_widths(self, R: np.ndarray) -> np.ndarray:
-        """The factors (n, FAR_COUNT) on the packed covariances R (n, 6) of plots in the wide laws; the widest spans the
-        data in the direction of the smallest error."""
-        xx, xy, xz, yy, yz, zz = R.T
-        matrices = np.moveaxis(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), 2, 0)
-        smallest = np.full(len(R), np.nan)
-        finite = np.isfinite(R).all(axis=1)
-        smallest[finite] = np.linalg.eigvalsh(matrices[finite])[:, 0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.where(smallest > 0, np.maximum(self.span**2 / (FAR_WIDTH**2 * smallest), 1.0), 1.0)
-        return FAR_WIDTH**2 * ratio[:, None] ** np.linspace(0, 1, FAR_COUNT)
+    def _local_plots(self, sigmas: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The recorded plots in the local frame with these σ of the sensor."""
+        names = [key.partition(".")[2] for key in self.keys[:3]]
+        sensor = self.spec.sensor.model_copy(update=dict(zip(names, sigmas.tolist(), strict=True)))
+        return local_plots(sensor, self.measured)
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The log likelihood; of the explanations only outliers are part of the model."""

@@ -16,20 +16,20 @@ from radarsim.studies.multimodel.kernels.filter_strip import Scans, make_rules, 
 
 @kernel
 def log_likelihood(
-    work, numbers, plots, widths, models, transitions, intervals, times, rules, frame, outliers, score, soundness
+    work, numbers, plots, covariances, models, transitions, intervals, times, rules, frame, outliers, score, soundness
 ):
     """Fill score (n,) with the logarithm of each plot's density given the earlier plots, and soundness (n,) with its
     probability to be no outlier; zero and one where there is no plot.
 
     work, numbers: a filter's memory, started; plots (n · PLOT rows), the same in all lanes, of which lane l gets
-    widths[k, l] times the variance (n, WIDTH); models, transitions, intervals (n,), times, rules, frame as in
-    `filter_strip`; outliers (4,): their law, of which the shares count here."""
+    the packed covariance covariances[k, :, l] (n, 6, WIDTH); models, transitions, intervals (n,), times, rules, frame
+    as in `filter_strip`; outliers (4,): their law, of which the shares count here."""
     n, filter_rules = score.size, make_rules(rules, models.size // layout.MODEL_NUMBERS)
     out, reported = np.empty(n * layout.OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
     for k in range(n):
         for i in range(6):
             for lane in range(WIDTH):
-                plots[(k * layout.PLOT + layout.COVARIANCE + i) * WIDTH + lane] *= widths[k, lane]
+                plots[(k * layout.PLOT + layout.COVARIANCE + i) * WIDTH + lane] = covariances[k, i, lane]
     listed = np.zeros(layout.MAX_MODELS, dtype=np.int64)
     memory = address(work), address(numbers), address(listed)
     design = filter_rules, address(models), address(transitions)
