@@ -156,6 +156,7 @@ class PlotLikelihood:
         self.spec, self.filter, self.model = spec, track.name, RowModel(study, spec, track)
         self.outlier_kinds = tuple(self.model.columns)
         self.far_kinds: tuple[str, ...] = ()
+        self.has_offsets = True
         self.is_smooth = True
         self.tracks, self.rows = len(tracks), sum(len(track["t_s"]) for track in tracks)
         self.keys = study.fitted

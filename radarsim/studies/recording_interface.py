@@ -91,7 +91,8 @@ class Likelihood(Protocol):
     filter: its name; tracks and rows: numbers of them; keys: dotted names; stated (n,): their values in the config;
     zero_limits (n,): values of them that count as zero; explains: other explanations of plots that it can include, of
     EXPLANATIONS; usual_s: the usual interval between plots; outlier_kinds: the columns with outlier laws of their own,
-    or ALL_KINDS: a plot as a whole is an outlier or none; far_kinds: those of which outliers have any size alone;
+    or ALL_KINDS: all have one law; far_kinds: those of which outliers have any size alone; has_offsets: whether near
+    outliers are off to either side, else they are spread alone;
     is_smooth: false where it leaps with the keys, as hypotheses are dropped."""
 
     filter: str
@@ -104,6 +105,7 @@ class Likelihood(Protocol):
     usual_s: float
     outlier_kinds: tuple[str, ...]
     far_kinds: tuple[str, ...]
+    has_offsets: bool
     is_smooth: bool
 
     def __call__(self, values: "np.ndarray", law: ErrorLaw = STATED_ERRORS) -> float:

@@ -24,6 +24,7 @@ class StepLikelihood:
     explains: tuple[str, ...] = ()
     outlier_kinds = ALL_KINDS
     far_kinds: tuple[str, ...] = ()
+    has_offsets = False
     is_smooth = True
 
     def __init__(self, study: "StepStudy", spec: Any, keys: Any, tracks: Sequence[Mapping[str, np.ndarray]]):

@@ -316,6 +316,9 @@ def test_a_course_without_manoeuvres_does_not_tell_their_variance():
 # ---- multimodel ------------------------------------------------------------------------------------------------------
 
 
+SIZES = 4.0, 1.5  # offset and spread of near outliers
+
+
 def models_over(options, dt):
     """F and Q (9, 9) of each model over an interval."""
     found = []
@@ -327,12 +330,12 @@ def models_over(options, dt):
     return found
 
 
-def local_plots(spec, columns, factors=1.0):
-    """Plots in the local axes, and their covariances; factors: on the σ of their numbers."""
+def local_plots(spec, columns):
+    """Plots in the local axes, and their covariances."""
     seen = np.stack([columns[name] for name in ("range_m", "elevation_rad", "azimuth_rad")], axis=1)
     turn = frames.rotation(spec.sensor.antenna_azimuth_rad, spec.sensor.antenna_elevation_rad)
     z = frames.to_local(frames.from_biconical(seen), turn, spec.sensor.antenna_height_m)
-    return z, frames.plot_covariance(seen, factors * np.array(spec.sensor.sigma), turn)
+    return z, frames.plot_covariance(seen, np.array(spec.sensor.sigma), turn)
 
 
 def density_rounding(case, columns):
@@ -347,34 +350,56 @@ def interacting(case, options, columns, T, shares=(0.0, 0.0)):
     a, b, g = start_weights(t[:3], spec.start_acceleration_mps2).reshape(3, 3)
     x = np.concatenate([[a @ z[:3, i], b @ z[:3, i], 0.0] for i in range(3)])
     lifts = [np.kron(np.eye(3), np.array([[a[k]], [b[k]], [0.0]])) for k in range(3)]
-    wider = 1 + 8 * shares[0] + 99 * shares[1]  # the mean square of an error in a plot that starts the track
+    chance = 2 / (1 + 3 * sum(shares))  # of the whole plot, or of a number alone
+    # the mean square of an error in a number that starts the track
+    wider = 1 + chance * (sum(size**2 for size in SIZES) * shares[0] + 99 * shares[1])
     P = wider * sum(lift @ R[k] @ lift.T for k, lift in enumerate(lifts)) + np.kron(np.eye(3), np.outer(g, g))
     M, H = len(options.models), np.kron(np.eye(3), np.array([[1.0, 0, 0]]))
     bank, p, total = [(x, P)] * M, np.full(M, 1 / M), 0.0
-    spans = [np.ptp(columns[name]) for name in ("range_m", "elevation_rad", "azimuth_rad")]
-    laws = [
-        error_laws(outlier_law(*shares), *number) for number in zip(spans, np.square(spec.sensor.sigma), strict=True)
-    ]
-    noises = [local_plots(spec, columns, factors)[1] for factors in np.transpose([widths for _, _, widths in laws])]
     for k in range(3, len(t)):
         c = T @ p
-        possible = [(chance, noise[k]) for chance, noise in zip(laws[0][0], noises, strict=True) if chance > 0]
+        possible = errors_of_plot(spec, columns, k, shares)
         scores, parts = np.zeros((M, len(possible))), []
         for i, (F, Q) in enumerate(models_over(options, t[k] - t[k - 1])):
             mean, P = merged(T[i] * p / c[i], bank)
             mean, P = F @ mean, F @ P @ F.T + Q
             parts.append([])
-            for law, (chance, noise) in enumerate(possible):
+            for law, (chance, shift, noise) in enumerate(possible):
                 S = H @ P @ H.T + noise
-                scores[i, law] = normal.logpdf(z[k], H @ mean, S) + np.log(chance)
+                scores[i, law] = normal.logpdf(z[k], H @ mean + shift, S) + np.log(chance)
                 K = P @ H.T @ np.linalg.inv(S)
-                parts[-1].append((mean + K @ (z[k] - H @ mean), P - K @ S @ K.T))
+                parts[-1].append((mean + K @ (z[k] - shift - H @ mean), P - K @ S @ K.T))
         scores += np.log(c)[:, None]
         density = logsumexp(scores)
         total += density
         p = np.exp(logsumexp(scores, axis=1) - density)
         bank = [merged(np.exp(scores[i] - logsumexp(scores[i])), parts[i]) for i in range(M)]
     return total
+
+
+def errors_of_plot(spec, columns, k, shares):
+    """The probability, mean and covariance of a plot under each law: sound, or an outlier as a whole or in a number."""
+    R, none = local_plots(spec, columns)[1][k], np.zeros(3)
+    numbers = zip(("range_m", "elevation_rad", "azimuth_rad"), np.square(spec.sensor.sigma), strict=True)
+    laws = [error_laws(outlier_law(*shares, *SIZES), np.ptp(columns[name]), variance) for name, variance in numbers]
+    shifts = [number_shift(spec, columns, k, i) for i in range(3)]
+    parts = [np.outer(shift, shift) for shift in shifts]
+    chances = laws[0][0]
+    result = [(chances[0], none, R), (chances[1] + chances[2], none, R * (1 + sum(size**2 for size in SIZES)))]
+    for i in range(3, len(chances)):
+        spread = [widths[i] ** 2 * part for (*_, widths), part in zip(laws, parts, strict=True)]
+        result.append((chances[i], none, sum(spread)))
+    for (_, offsets, widths), shift, part in zip(laws, shifts, parts, strict=True):
+        result += [(chances[i], offsets[i] * shift, R + (widths[i] ** 2 - 1) * part) for i in range(1, len(chances))]
+    total = sum(chance for chance, *_ in result)
+    return [(chance / total, mean, covariance) for chance, mean, covariance in result if chance > 0]
+
+
+def number_shift(spec, columns, k, i):
+    """How far an error of one σ in number i moves plot k in the local axes."""
+    seen = np.array([columns[name][k] for name in ("range_m", "elevation_rad", "azimuth_rad")])
+    turn = frames.rotation(spec.sensor.antenna_azimuth_rad, spec.sensor.antenna_elevation_rad)
+    return turn @ frames.jacobian(seen)[:, i] * spec.sensor.sigma[i]
 
 
 def merged(weights, hypotheses):
@@ -413,8 +438,18 @@ def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(shares):
         one = likelihood(case, name, columns)
         (options,) = (each for each in case.spec.filters if each.name == name)
         expected = interacting(case, options, columns, T, shares)
-        law = ErrorLaw(outlier_laws=(outlier_law(*shares),))
+        law = ErrorLaw(outlier_laws=(outlier_law(*shares, *SIZES),))
         assert one(one.stated, law) == pytest.approx(expected, rel=density_rounding(case, columns))
+
+
+def test_a_number_of_a_multimodel_plot_is_an_outlier_alone():
+    """An error of 400 m in a range, σ 2.5 m: taken for the whole plot's, it would double every angle's σ."""
+    columns = recording("multimodel_1hz", "scans=40")
+    columns["range_m"][20] += 400.0
+    one = likelihood(loaded("multimodel_1hz"), "MMA2-122", columns)
+    (sound,) = one.soundness(one.stated, ErrorLaw(outlier_laws=(outlier_law(0.03, 0.03),)))
+    assert sound["range_m"][20] < 0.001
+    assert min(sound["elevation_rad"][20], sound["azimuth_rad"][20]) > 0.9
 
 
 def test_the_multimodel_likelihood_does_not_leap():

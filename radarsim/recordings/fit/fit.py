@@ -149,6 +149,7 @@ class CorrelatedLikelihood:
         self.rows = likelihood.rows
         self.usual_s = likelihood.usual_s
         self.outlier_kinds, self.far_kinds = likelihood.outlier_kinds, likelihood.far_kinds
+        self.has_offsets = likelihood.has_offsets
         self.is_smooth = likelihood.is_smooth
         self.keys, self.stated = (*likelihood.keys, CORRELATION_TIME_KEY), np.append(likelihood.stated, 0.0)
         self.zero_limits = np.append(likelihood.zero_limits, ZERO_CORRELATION_TIME * likelihood.usual_s)

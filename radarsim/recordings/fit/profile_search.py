@@ -22,7 +22,7 @@ from radarsim.recordings.fit.newton_steps import (
     polish_maximum,
 )
 from radarsim.studies.error_law import ErrorLaw, OutlierLaw
-from radarsim.studies.recording_interface import ALL_KINDS, Likelihood
+from radarsim.studies.recording_interface import Likelihood
 
 # likelihood evaluations of a key to the maximum and to an end; of an explanation
 MAXIMUM_EVALUATIONS = 70
@@ -127,7 +127,7 @@ class LikelihoodSearch:
         coordinate i, one coordinate held or none, and its log-likelihood. Starts below min_value are not climbed."""
         starts = []
         for share, *sizes in NEAR_STARTS:
-            if sizes[0] and self.likelihood.outlier_kinds == ALL_KINDS:
+            if sizes[0] and not self.likelihood.has_offsets:
                 continue
             start = point.copy()
             start[i] = _logit(share)

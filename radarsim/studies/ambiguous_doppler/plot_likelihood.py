@@ -50,6 +50,7 @@ class PlotLikelihood:
         self.is_folded = self.member.doppler == "folded"
         # Off by some σ of a folded velocity is off by another fold, or by nearly half a span: as a far one.
         self.far_kinds = self.columns[1:] if self.is_folded else ()
+        self.has_offsets = True
         self.is_smooth = not self.is_folded or list_limits(options)[0]
         self.span = np.append(data_span(tracks, self.columns), 0.0)[:2]
         self.given_tracks = list(tracks)

@@ -1,25 +1,27 @@
 """The likelihood of recorded plots under a bank of models."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.kernels.lanes import WIDTH
-from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH, start_factor
+from radarsim.kernels.lanes import WIDTH, rows
+from radarsim.kernels.likelihood import FAR, FAR_COUNT, FAR_WIDTH, NEAR, start_factor
 from radarsim.studies.error_law import OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.multimodel import model_bank
-from radarsim.studies.multimodel.config import Filter, Keys
+from radarsim.studies.multimodel.config import Filter, Keys, Sensor
 from radarsim.studies.multimodel.kernels import filter_strip, layout, likelihood
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
+from radarsim.studies.multimodel.kernels.likelihood import STRIPS
 from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.study import banks
 from radarsim.studies.multimodel.tracking import lane_rows, sigmas
 from radarsim.studies.recording_interface import ALL_KINDS, usual_interval_s
 
+UPPER = np.triu_indices(3)  # elements of a packed covariance
 MIN_VALUE_RATIO = 1e-4  # to a key's configured value: smaller values count as zero
 
 
@@ -45,9 +47,10 @@ class PlotLikelihood:
         self.zero_limits = np.append(MIN_VALUE_RATIO * self.stated[:3], MIN_VALUE_RATIO * (self.stated[3] or 1.0))
         self.outlier_kinds = ALL_KINDS
         self.far_kinds: tuple[str, ...] = ()
+        self.has_offsets = True
         self.is_smooth = True
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
-        self.span = data_span(tracks, self.columns)
+        self.spans = data_span(tracks, self.columns)
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, layout.START) for columns in tracks]
         self.measured = np.concatenate(
             [np.stack([columns[name] for name in self.columns], axis=1) for columns in self.cleaned_tracks]
@@ -70,27 +73,32 @@ class PlotLikelihood:
     def _track_scores(
         self, values: np.ndarray, merge: str, law: ErrorLaw
     ) -> list[tuple["_Problem", np.ndarray, np.ndarray]]:
-        """For each track the log-densities (n,) of its later plots, and their probabilities to be no outliers, for
-        given values of the keys and a merging rule."""
-        design, numbers = self._bank(float(values[3]), merge)
-        plots, far_covariances = self._plots(*values[:3].tolist())
-        result = []
-        outliers = law.outlier_rows(1)[0]
-        covariances = np.repeat(plots[:, layout.COVARIANCE : layout.COVARIANCE + 6, None], WIDTH, axis=2)
-        covariances[:, :, 1] *= OutlierLaw(*outliers.tolist()).near_width ** 2
-        covariances[:, :, 2 : 2 + FAR_COUNT] = far_covariances
+        """For each track the log-densities (n,) of its later plots, and the probabilities (n, 3) of their numbers to be
+        no outliers, for given values of the keys and a merging rule."""
+        design, rules = self._bank(float(values[3]), merge)
+        plots, shifts = self._plots(*values[:3].tolist())
+        outliers, result = law.outlier_rows(1)[0], []
+        strips = STRIPS if outliers[NEAR] + outliers[FAR] > 0 else 1
+        # A number is an outlier in two of the strips: with its whole plot, or alone.
+        chance = 2 / (1 + (STRIPS - 1) * (outliers[NEAR] + outliers[FAR]))
+        growth_at_start = start_factor(outliers * [chance, chance, 1.0, 1.0])
         for problem in self.problems:
-            work, state = work_arrays()
-            start = plots[problem.start_rows]
-            start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= start_factor(outliers)
-            filter_strip.start_strip(work, state, lane_rows(start), problem.weights, self.probabilities)
-            later_plots, (score, soundness) = (
-                lane_rows(plots[problem.later_plots]),
-                np.empty((2, len(problem.intervals))),
+            start, later = plots[problem.start_rows], plots[problem.later_plots]
+            start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= growth_at_start
+            works, numbers = rows(strips * layout.WORK).reshape(strips, -1), np.tile(work_arrays()[1], (strips, 1))
+            for work, state in zip(works, numbers, strict=True):
+                filter_strip.start_strip(work, state, lane_rows(start), problem.weights, self.probabilities)
+            law_plots = rows(strips * later.size)
+            by_law = law_plots.reshape(strips, *later.shape, WIDTH)
+            by_law[:] = later[:, :, None]
+            if strips > 1:
+                later_shifts = shifts[:, problem.later_plots]
+                self._spread_outliers(by_law, later_shifts, values[:3], OutlierLaw(*outliers.tolist()))
+            score, soundness = np.empty(len(later)), np.empty((len(later), 3))
+            arguments = design, problem.transitions, problem.intervals, problem.times, rules, self.frame
+            likelihood.log_likelihood(
+                works, numbers, law_plots.reshape(strips, -1), *arguments, outliers, score, soundness
             )
-            arguments = design, problem.transitions, problem.intervals, problem.times, numbers, self.frame
-            of_laws = covariances[problem.later_plots]
-            likelihood.log_likelihood(work, state, later_plots, of_laws, *arguments, outliers, score, soundness)
             result.append((problem, score, soundness))
         return result
 
@@ -104,20 +112,36 @@ class PlotLikelihood:
         return filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
 
     def _calculate_plots(self, *sensor_sigmas: float) -> tuple[np.ndarray, np.ndarray]:
-        """The plots as the kernel takes them, and their packed covariances (n, 6, FAR_COUNT) in the wide laws of
-        outliers, for given σ of the sensor. The widest law spans the data in each number, whatever its σ: else σ of one
-        would grow with the outliers of another."""
-        z, R, is_valid = self._local_plots(np.array(sensor_sigmas))
-        least = FAR_WIDTH * np.array(sensor_sigmas)
-        ratios = np.maximum(self.span / np.where(least > 0, least, np.inf), 1.0)
-        far = [self._local_plots(least * ratios**power)[1] for power in np.linspace(0, 1, FAR_COUNT)]
-        return np.concatenate([z, R, is_valid[:, None]], axis=1), np.stack(far, axis=2)
+        """The plots (n, PLOT) as the kernel takes them, and the shifts (3, n, 3) of a plot by one σ of each number, for
+        given σ of the sensor."""
+        z, R, is_valid = local_plots(self._sensor(sensor_sigmas), self.measured)
+        parts = [local_plots(self._sensor(sigmas), self.measured)[1] for sigmas in np.diag(sensor_sigmas)]
+        return np.concatenate([z, R, is_valid[:, None]], axis=1), np.stack([_root(part) for part in parts])
 
-    def _local_plots(self, sigmas: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The recorded plots in the local frame with these σ of the sensor."""
+    def _sensor(self, sigmas: Iterable[float]) -> Sensor:
+        """The sensor with other σ."""
         names = [key.partition(".")[2] for key in self.keys[:3]]
-        sensor = self.spec.sensor.model_copy(update=dict(zip(names, sigmas.tolist(), strict=True)))
-        return local_plots(sensor, self.measured)
+        return self.spec.sensor.model_copy(update=dict(zip(names, map(float, sigmas), strict=True)))
+
+    def _spread_outliers(self, plots: np.ndarray, shifts: np.ndarray, sigmas: np.ndarray, law: OutlierLaw) -> None:
+        """Give plots (STRIPS, n, PLOT, WIDTH) the means and covariances of each law of their errors, of the shifts that
+        `_calculate_plots` gives for σ of the sensor.
+
+        The widest law of a number spans the data in it, whatever the σ of the others: else one σ would grow with the
+        outliers of another number."""
+        means, covariances = np.split(plots[:, :, : layout.DETECTED], [layout.COVARIANCE], axis=2)
+        far = slice(2, 2 + FAR_COUNT)
+        covariances[0, :, :, 1] *= law.near_width**2
+        covariances[0, :, :, far] = 0.0
+        for strip, (shift, span, sigma) in enumerate(zip(shifts, self.spans, sigmas, strict=True), 1):
+            part = (shift[:, UPPER[0]] * shift[:, UPPER[1]])[:, :, None]
+            ratio = max(span / (FAR_WIDTH * sigma), 1.0) if sigma > 0 else 1.0
+            far_variances = (FAR_WIDTH * ratio ** np.linspace(0, 1, FAR_COUNT)) ** 2
+            covariances[0, :, :, far] += far_variances * part
+            means[strip, :, :, 0] += law.offset * shift
+            means[strip, :, :, 1] -= law.offset * shift
+            covariances[strip, :, :, :2] += law.spread**2 * part
+            covariances[strip, :, :, far] += (far_variances - 1) * part
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The log likelihood; of the explanations only outliers are part of the model."""
@@ -128,17 +152,24 @@ class PlotLikelihood:
         return sum(float(score.sum()) for _, score, _ in self._track_scores(values, merge, law))
 
     def soundness(self, values: np.ndarray, law: ErrorLaw) -> list[dict[str, np.ndarray]]:
-        """The probability of each plot that it is no outlier, for all its numbers the same."""
+        """The probability of each number that it is no outlier."""
         scores = self._track_scores(values, "moment", law)
-        judged = [
-            (problem.track, problem.later_rows, np.repeat(soundness[:, None], 3, axis=1))
-            for problem, _, soundness in scores
-        ]
+        judged = [(problem.track, problem.later_rows, soundness) for problem, _, soundness in scores]
         return soundness_by_column(self.columns, self.given_tracks, self.cleaned_tracks, judged)
 
     def by_number(self, values: np.ndarray) -> dict[str, float]:
         """The log likelihood of the plots, with the filter's own merging rule."""
         return {"plot": self._total(values, self.options.merge, STATED_ERRORS)}
+
+
+def _root(packed: np.ndarray) -> np.ndarray:
+    """The vectors (n, 3), up to their signs, whose outer products with themselves are covariances packed (n, 6)."""
+    matrices = np.empty((len(packed), 3, 3))
+    matrices[:, UPPER[0], UPPER[1]] = matrices[:, UPPER[1], UPPER[0]] = packed
+    largest = packed[:, [0, 3, 5]].argmax(axis=1)
+    rows_of_largest = matrices[np.arange(len(packed)), largest]
+    length = np.sqrt(rows_of_largest[np.arange(len(packed)), largest])[:, None]
+    return np.divide(rows_of_largest, length, out=np.zeros_like(rows_of_largest), where=length > 0)
 
 
 class _Problem(NamedTuple):

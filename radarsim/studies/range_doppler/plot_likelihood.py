@@ -51,6 +51,7 @@ class PlotLikelihood:
         self.noise = noise_by_time(options.process_noise, 1.0, radar.scan_period_s)
         self.columns = self.outlier_kinds = tuple(name for name, _ in MEASURED[: self.observes])
         self.far_kinds: tuple[str, ...] = ()
+        self.has_offsets = True
         self.is_smooth = True
         self.span = data_span(tracks, self.columns)
         self.given_tracks = list(tracks)

@@ -56,6 +56,7 @@ class PlotLikelihood:
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
         self.outlier_kinds = self.columns if self.spec.frame == "polar" else ALL_KINDS
         self.far_kinds: tuple[str, ...] = ()
+        self.has_offsets = self.outlier_kinds != ALL_KINDS
         self.is_smooth = True
         self.span = data_span(tracks, self.columns)
         if self.spec.frame != "polar":

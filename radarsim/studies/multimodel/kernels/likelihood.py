@@ -1,9 +1,11 @@
 """The log likelihood of recorded plots under a filter: the density that its bank gives each plot.
 
 The filter is that of the simulation, run scan by scan. There its eight lanes are eight realisations; here each takes
-the plots with another law of the errors, those of `radarsim.kernels.likelihood`: lane 0 with the configured σ, lane 1
-as near outliers, the others as far ones of one width each. If there may be outliers, the lanes of each model are merged
-by moments after every plot."""
+the plots with another law of the errors, those of `radarsim.kernels.likelihood`, in four strips of lanes. An outlier is
+the whole plot, in the first strip, or one of its numbers alone, all equally likely, and never two of these at once. In
+the first strip lane 0 has the configured σ and lane 1 near outliers, in the others these two near outliers to either
+side; the rest of all are far ones of one width each. If there may be outliers, the lanes of each model are merged by
+moments after every plot."""
 
 import numpy as np
 
@@ -13,50 +15,59 @@ from radarsim.kernels.likelihood import FAR, FAR_COUNT, NEAR
 from radarsim.studies.multimodel.kernels import layout
 from radarsim.studies.multimodel.kernels.filter_strip import Scans, make_rules, run_strip
 
+STRIPS = 4  # of laws: those of outliers that are the whole plot, and those of each of its three numbers
+
 
 @kernel
 def log_likelihood(
-    work, numbers, plots, covariances, models, transitions, intervals, times, rules, frame, outliers, score, soundness
+    works, numbers, plots, models, transitions, intervals, times, rules, frame, outliers, score, soundness
 ):
-    """Fill score (n,) with the logarithm of each plot's density given the earlier plots, and soundness (n,) with its
-    probability to be no outlier; zero and one where there is no plot.
+    """Fill score (n,) with the logarithm of each plot's density given the earlier plots, and soundness (n, 3) with the
+    probability of each of its numbers to be no outlier; zero and one where there is no plot.
 
-    work, numbers: a filter's memory, started; plots (n · PLOT rows), the same in all lanes, of which lane l gets
-    the packed covariance covariances[k, :, l] (n, 6, WIDTH); models, transitions, intervals (n,), times, rules, frame
-    as in `filter_strip`; outliers (4,): their law, of which the shares count here."""
-    n, filter_rules = score.size, make_rules(rules, models.size // layout.MODEL_NUMBERS)
+    works (S, …), numbers (S, …): a filter's memory, started, for each strip of laws, one if no plot is an outlier;
+    plots (S, n · PLOT rows), with the means and covariances that each law has; models, transitions, intervals (n,),
+    times, rules, frame as in `filter_strip`; outliers (4,): their law, of which the shares count here."""
+    strips, n, filter_rules = len(works), score.size, make_rules(rules, models.size // layout.MODEL_NUMBERS)
     out, reported = np.empty(n * layout.OUTPUT * WIDTH), np.zeros(n, dtype=np.int64)
-    for k in range(n):
-        for i in range(6):
-            for lane in range(WIDTH):
-                plots[(k * layout.PLOT + layout.COVARIANCE + i) * WIDTH + lane] = covariances[k, i, lane]
     listed = np.zeros(layout.MAX_MODELS, dtype=np.int64)
-    memory = address(work), address(numbers), address(listed)
     design = filter_rules, address(models), address(transitions)
-    near, far, chances, densities = outliers[NEAR], outliers[FAR], np.empty(WIDTH), np.empty(WIDTH)
-    may_be_outlier = near + far > 0.0
-    chances[0], chances[1], chances[2:] = 1.0 - near - far, near, far / FAR_COUNT
+    chances, densities = law_chances(strips, outliers), np.empty((strips, WIDTH))
     for k in range(n):
         scans = Scans(k, k + 1, address(intervals), address(times), address(reported))
-        run_strip(*memory, *design, scans, address(plots), address(frame), address(out))
+        for s in range(strips):
+            memory = address(works[s]), address(numbers[s]), address(listed)
+            run_strip(*memory, *design, scans, address(plots[s]), address(frame), address(out))
         score[k], soundness[k] = 0.0, 1.0
-        if plots[(k * layout.PLOT + layout.DETECTED) * WIDTH] > 0.5:
-            new = numbers[layout.CURRENT] * layout.BANK
-            score[k] = density(work, layout.BANK - new, new, filter_rules, 0)
-            if may_be_outlier:
-                for lane in range(WIDTH):
-                    densities[lane] = -np.inf
-                    if chances[lane] > 0.0:
-                        d = density(work, layout.BANK - new, new, filter_rules, lane)
-                        densities[lane] = np.log(chances[lane]) + d
-                greatest, total = densities.max(), 0.0
-                for lane in range(WIDTH):
-                    total += np.exp(densities[lane] - greatest)
-                score[k] = greatest + np.log(total)
-                for lane in range(WIDTH):
-                    densities[lane] = np.exp(densities[lane] - score[k])
-                soundness[k] = densities[0]
-                merge_lanes(work, new, filter_rules, densities)
+        if plots[0, (k * layout.PLOT + layout.DETECTED) * WIDTH] > 0.5:
+            new = numbers[0, layout.CURRENT] * layout.BANK
+            old = layout.BANK - new
+            if strips == 1:
+                score[k] = density(works[0], old, new, filter_rules, 0)
+            else:
+                for s in range(strips):
+                    for lane in range(WIDTH):
+                        densities[s, lane] = -np.inf
+                        if chances[s, lane] > 0.0:
+                            d = density(works[s], old, new, filter_rules, lane)
+                            densities[s, lane] = np.log(chances[s, lane]) + d
+                greatest = densities.max()
+                probabilities = np.exp(densities - greatest)
+                score[k] = greatest + np.log(probabilities.sum())
+                probabilities /= probabilities.sum()
+                for j in range(3):
+                    soundness[k, j] = 1.0 - probabilities[0, 1:].sum() - probabilities[1 + j].sum()
+                merge_laws(works, new, filter_rules, probabilities)
+
+
+@kernel
+def law_chances(strips, outliers):
+    """The probability of each law (S, WIDTH) before its plot: the shares are odds of each kind of outlier alone."""
+    chances = np.zeros((strips, WIDTH))
+    chances[0, 0], chances[0, 1] = 1.0 - outliers[NEAR] - outliers[FAR], outliers[NEAR]
+    chances[1:, :2], chances[:, 2 : 2 + FAR_COUNT] = outliers[NEAR] / 2.0, outliers[FAR] / FAR_COUNT
+    chances /= chances.sum()
+    return chances
 
 
 @inline
@@ -104,57 +115,66 @@ def probability(work, bank, lane, i):
 
 
 @kernel
-def merge_lanes(work, bank, rules, chances):
-    """Merge each model's hypotheses of all lanes, of these probabilities (WIDTH,), into every lane."""
-    weights = np.empty(WIDTH)
+def merge_laws(works, bank, rules, chances):
+    """Merge each model's hypotheses of all laws, of these probabilities (S, WIDTH), into the lanes of all."""
+    weights = np.empty(chances.shape)
     for i in range(rules.size):
         first, total = (bank + i * layout.HYPOTHESIS) * WIDTH, 0.0
-        for lane in range(WIDTH):
-            # GPB1 has one hypothesis, the first, whatever the models' probabilities are.
-            p = chances[lane] * probability(work, bank, lane, i) if chances[lane] > 0.0 else 0.0
-            weights[lane] = chances[lane] if rules.family == layout.GPB1 else p
-            total += p
+        for s in range(len(works)):
+            for lane in range(WIDTH):
+                # GPB1 has one hypothesis, the first, whatever the models' probabilities are.
+                p = chances[s, lane] * probability(works[s], bank, lane, i) if chances[s, lane] > 0.0 else 0.0
+                weights[s, lane] = chances[s, lane] if rules.family == layout.GPB1 else p
+                total += p
         weight_sum = weights.sum()
         if weight_sum > 0.0:
-            for lane in range(WIDTH):
-                weights[lane] /= weight_sum
-            merge_states(work, first, weights)
+            merge_states(works, first, weights / weight_sum)
+        put(works, first + layout.PROBABILITY * WIDTH, total)
+
+
+@inline
+def put(works, element, value):
+    """Write an element of a hypothesis into the lanes of all laws."""
+    for s in range(len(works)):
         for lane in range(WIDTH):
-            work[first + layout.PROBABILITY * WIDTH + lane] = total
+            works[s, element + lane] = value
 
 
 @kernel
-def merge_states(work, first, weights):
-    """Merge mean and covariance of all lanes of a hypothesis, with weights (WIDTH,), into every lane."""
-    d = np.empty((layout.STATES, WIDTH))
-    for s in range(layout.STATES):
-        element, mean = first + s * WIDTH, 0.0
-        for lane in range(WIDTH):
-            if weights[lane] > 0.0:
-                mean += weights[lane] * work[element + lane]
-        for lane in range(WIDTH):
-            d[s, lane] = work[element + lane] - mean
-            work[element + lane] = mean
+def merge_states(works, first, weights):
+    """Merge mean and covariance of a hypothesis over all laws, with weights (S, WIDTH), into the lanes of all."""
+    d = np.empty((layout.STATES, len(works), WIDTH))
+    for i in range(layout.STATES):
+        element, mean = first + i * WIDTH, 0.0
+        for s in range(len(works)):
+            for lane in range(WIDTH):
+                if weights[s, lane] > 0.0:
+                    mean += weights[s, lane] * works[s, element + lane]
+        for s in range(len(works)):
+            for lane in range(WIDTH):
+                d[i, s, lane] = works[s, element + lane] - mean
+        put(works, element, mean)
     for axis in range(3):
         element = layout.OWN + 6 * axis
         for i in range(3):
             for j in range(i, 3):
-                put_merged_element(work, first + element * WIDTH, weights, d[3 * axis + i], d[3 * axis + j])
+                put_merged_element(works, first + element * WIDTH, weights, d[3 * axis + i], d[3 * axis + j])
                 element += 1
     for pair in range(3):
         row_axis, column_axis = (0, 1 + pair) if pair < 2 else (1, 2)
         for i in range(3):
             for j in range(3):
                 element = layout.CROSS + 9 * pair + 3 * i + j
-                put_merged_element(work, first + element * WIDTH, weights, d[3 * row_axis + i], d[3 * column_axis + j])
+                put_merged_element(works, first + element * WIDTH, weights, d[3 * row_axis + i], d[3 * column_axis + j])
 
 
 @kernel
-def put_merged_element(work, element, weights, row_offsets, column_offsets):
-    """Write an element of the merged covariance into every lane; offsets (WIDTH,) of the lanes' means from theirs."""
+def put_merged_element(works, element, weights, row_offsets, column_offsets):
+    """Write an element of the merged covariance into the lanes of all laws; offsets (S, WIDTH) of the means in the
+    lanes from the merged ones."""
     merged = 0.0
-    for lane in range(WIDTH):
-        if weights[lane] > 0.0:
-            merged += weights[lane] * (work[element + lane] + row_offsets[lane] * column_offsets[lane])
-    for lane in range(WIDTH):
-        work[element + lane] = merged
+    for s in range(len(works)):
+        for lane in range(WIDTH):
+            if weights[s, lane] > 0.0:
+                merged += weights[s, lane] * (works[s, element + lane] + row_offsets[s, lane] * column_offsets[s, lane])
+    put(works, element, merged)
