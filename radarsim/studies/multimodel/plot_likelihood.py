@@ -67,6 +67,8 @@ class PlotLikelihood:
         self.problems = [problem for problem in problems if problem is not None]
         self.frame = sensor_frame(self.spec.sensor)
         self.probabilities = model_bank.stationary(model_bank.transition_matrix(self.options.transition))
+        # How far (3, n, 3) an error of 1 m or 1 rad in each number moves a plot.
+        self.unit_shifts = np.stack([_root(local_plots(self._sensor(one), self.measured)[1]) for one in np.eye(3)])
         # A search moves one key at a time.
         self._bank, self._plots = lru_cache(2)(self._calculate_bank), lru_cache(2)(self._calculate_plots)
 
@@ -76,7 +78,7 @@ class PlotLikelihood:
         """For each track the log-densities (n,) of its later plots, and the probabilities (n, 3) of their numbers to be
         no outliers, for given values of the keys and a merging rule."""
         design, rules = self._bank(float(values[3]), merge)
-        plots, shifts = self._plots(*values[:3].tolist())
+        plots, shifts = self._plots(*values[:3].tolist()), values[:3, None, None] * self.unit_shifts
         outliers, result = law.outlier_rows(1)[0], []
         strips = STRIPS if outliers[NEAR] + outliers[FAR] > 0 else 1
         # A number is an outlier in two of the strips: with its whole plot, or alone.
@@ -111,12 +113,10 @@ class PlotLikelihood:
         filter_bank = banks(self.spec.model_copy(update={"filters": (options,)}), np.ones(1))
         return filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
 
-    def _calculate_plots(self, *sensor_sigmas: float) -> tuple[np.ndarray, np.ndarray]:
-        """The plots (n, PLOT) as the kernel takes them, and the shifts (3, n, 3) of a plot by one σ of each number, for
-        given σ of the sensor."""
+    def _calculate_plots(self, *sensor_sigmas: float) -> np.ndarray:
+        """The plots (n, PLOT) as the kernel takes them, for given σ of the sensor."""
         z, R, is_valid = local_plots(self._sensor(sensor_sigmas), self.measured)
-        parts = [local_plots(self._sensor(sigmas), self.measured)[1] for sigmas in np.diag(sensor_sigmas)]
-        return np.concatenate([z, R, is_valid[:, None]], axis=1), np.stack([_root(part) for part in parts])
+        return np.concatenate([z, R, is_valid[:, None]], axis=1)
 
     def _sensor(self, sigmas: Iterable[float]) -> Sensor:
         """The sensor with other σ."""
@@ -124,8 +124,8 @@ class PlotLikelihood:
         return self.spec.sensor.model_copy(update=dict(zip(names, map(float, sigmas), strict=True)))
 
     def _spread_outliers(self, plots: np.ndarray, shifts: np.ndarray, sigmas: np.ndarray, law: OutlierLaw) -> None:
-        """Give plots (STRIPS, n, PLOT, WIDTH) the means and covariances of each law of their errors, of the shifts that
-        `_calculate_plots` gives for σ of the sensor.
+        """Give plots (STRIPS, n, PLOT, WIDTH) the means and covariances of each law of their errors. shifts (3, n, 3):
+        by one σ of each number; sigmas (3,): these.
 
         The widest law of a number spans the data in it, whatever the σ of the others: else one σ would grow with the
         outliers of another number."""
