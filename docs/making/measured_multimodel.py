@@ -118,8 +118,8 @@ MEASURED = {
     "multimodel_modified_cost_1hz": claim_value(
         "multimodel_rules", "P2.10", "operations of modified / combined, 1 Hz", ""
     ),
-    "multimodel_often": largest("multimodel_transition", "P2.12", "gain of changes ten times as frequent"),
-    "multimodel_rare": largest("multimodel_transition", "P2.12", "gain of changes ten times rarer"),
+    "multimodel_often": largest("multimodel_transition", "P2.12", "gain of ten times as frequent changes"),
+    "multimodel_rare": largest("multimodel_transition", "P2.12", "gain of ten times rarer changes"),
     "multimodel_ahead_y": conversion(PLAIN | AHEAD, PLAIN),
     "multimodel_ahead_vy": conversion(PLAIN | AHEAD, PLAIN, "vy"),
     "multimodel_unbiased": conversion(PLAIN | UNBIASED, PLAIN),

@@ -168,9 +168,8 @@ def threshold(more: int, few: int) -> Callable[[Results], str]:
 
 def switched(case: str, degree: int) -> Callable[[Results], str]:
     """σ of a held degree over that of the degree switched by five plots (P3.10)."""
-    part_name = (
-        f"σ of the range over the run in the {case} manoeuvre, degree {degree} fixed over degree switched by five plots"
-    )
+    manoeuvre = f"RMS range error over the run in the {case} manoeuvre"
+    part_name = f"{manoeuvre}, degree {degree} fixed over degree switched by five plots"
     return claim_value(STEM, "P3.10", part_name, "")
 
 
