@@ -208,9 +208,9 @@ def test_the_bias_of_an_estimate_from_one_plot_hides_no_other(expected_radar):
 
     hidden, seen = dynamic(rows["bias"]), dynamic([-3.0, 1, 2, -2, 1, 0])
     assert -3 < hidden.panels[0].y.limits[0] < -2
-    assert "off the plot" in hidden.caption
+    assert "off the axis" in hidden.caption
     assert seen.panels[0].y.limits == (None, None)
-    assert "off the plot" not in seen.caption
+    assert "off the axis" not in seen.caption
 
 
 def test_a_legend_has_the_order_of_the_lines_at_their_ends():
@@ -701,9 +701,9 @@ def test_losses_far_below_are_cut_and_the_caption_says_so():
         for least in (-150.0, -30000.0)
     }
     assert drawn[-30000.0].panels[0].y.limits == (-100.0, 100.0)
-    assert "off the plot" in drawn[-30000.0].caption
+    assert "off the axis" in drawn[-30000.0].caption
     assert drawn[-150.0].panels[0].y.limits == (None, None)
-    assert "off the plot" not in drawn[-150.0].caption
+    assert "off the axis" not in drawn[-150.0].caption
 
 
 def test_scattered_points_are_all_drawn():
