@@ -157,7 +157,7 @@ def _with_remark_on_losses(figure: Figure) -> Figure:
     if not any(panel.y.limits[0] == -CUT_LOSS_PERCENT for panel in figure.panels):
         return figure
     names = caption_remarks.lines_below(figure, -CUT_LOSS_PERCENT)
-    remark = tr("Losses above {loss:g} % are off the plot: {names}.", loss=CUT_LOSS_PERCENT, names=names)
+    remark = tr("Losses above {loss:g} % are off the axis: {names}.", loss=CUT_LOSS_PERCENT, names=names)
     return replace(figure, caption=f"{figure.caption} {remark}")
 
 
