@@ -16,7 +16,7 @@ def every_mark():
 def shape(kind, text):
     """Heads and first column of a table; a value without digits, interval and what is in brackets: results decide."""
     if kind == "value":
-        return re.sub(r"−?[\d.]+", "0", re.sub(r" (± [\d.]+|\[[^]]*\]|\([^)]*\))", "", text))
+        return re.sub(r"−?\d[\d.,]*", "0", re.sub(r" (± [\d.]+|\[[^]]*\]|\([^)]*\))", "", text))
     lines = [line.strip("| ").split(" | ") for line in text.strip().split("\n")]
     return [lines[0], *(line[0] for line in lines[2:])]
 

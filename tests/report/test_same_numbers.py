@@ -17,7 +17,8 @@ from radarsim.report.wording import number
 
 CONFIGS = sorted(path.stem for path in (SHIPPED / "configs").glob("*.yaml"))
 POWER = "10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)"
-NUMBER = re.compile(rf"(−?)(?:(\d+(?:\.\d+)?)(?:·{POWER})?|{POWER})")
+WHOLE_PART = r"(?:\d{1,4}|\d{2,3}(?:,\d{3})+|\d(?:,\d{3}){2,})"  # in groups from five digits on
+NUMBER = re.compile(rf"(−?)(?:({WHOLE_PART}(?:\.\d+)?)(?:·{POWER})?|{POWER})")
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 DIGITS, CELL_DIGITS = 4, 3  # of numbers on pages, and in the cells of maps
 TABLES_OF_KINDS = {"sigma": "curves", "gain": "gains"}
@@ -34,7 +35,7 @@ def is_written_as(text, value, digits=DIGITS):
         return False
     sign, mantissa, *powers = match.groups()
     power = (powers[0] or powers[1] or "0").translate(SUPERSCRIPTS)
-    read = float(f"{'-' if sign else ''}{mantissa or 1}e{power}")
+    read = float(f"{'-' if sign else ''}{(mantissa or '1').replace(',', '')}e{power}")
     step = 10.0 ** (math.floor(math.log10(abs(value))) - digits + 1) if value else 0.0
     return abs(read - value) <= 0.5000001 * step and not (read == 1 and value < 1 - ROUNDING)
 
@@ -71,7 +72,7 @@ def faults_of_picture(figure):
         drawn = np.concatenate([np.asarray(line.y, float) for line in lines] or [np.zeros(0)])
         label = f"{plain_text(panel.y.label)}: "
         for mark in shown.get(title, ()) if lines else ():
-            text = mark.text.rpartition("\n")[2].removeprefix(label).split(" [")[0].split(",")[0]
+            text = mark.text.rpartition("\n")[2].removeprefix(label).split(" [")[0].split(", ")[0]
             if NUMBER.fullmatch(text) and not any(is_written_as(text, value) for value in drawn[np.isfinite(drawn)]):
                 faults.append(f"{figure.name}, {title}: {text}")
         for heat in (mark for mark in panel.marks if isinstance(mark, Heat) and mark.half_widths is None):
@@ -124,6 +125,8 @@ def test_a_number_is_told_from_its_neighbours():
     assert is_written_as("−1.235·10⁻⁷", -1.2346e-7)
     assert not is_written_as("−1.235·10⁻⁶", -1.2346e-7)
     assert is_written_as("10⁷", 1e7)
+    assert is_written_as("10,210", 10206.7)
+    assert not is_written_as("10210", 10206.7)
     assert is_written_as("", math.nan)
     assert not is_written_as("12.3", 12.36)
 
