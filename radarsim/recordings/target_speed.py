@@ -81,19 +81,6 @@ def unreachable_rows(track: TrackPositions) -> np.ndarray:
     return np.flatnonzero((distances > MAX_JUMP_MPS * span) & (distances > usual))
 
 
-def unreachable_column_rows(columns: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The same of a track with columns (n,) of plots: t_s, and x_m, y_m, z_m, or range_m with bearing_rad or alone;
-    none without these."""
-    names = next((names for names in POSITION_COLUMNS if set(names) <= set(columns)), ())
-    positions = [columns[name] for name in names]
-    if names == ("range_m",) and "bearing_rad" in columns:
-        positions = [columns["range_m"] * f(columns["bearing_rad"]) for f in (np.cos, np.sin)]
-    known = np.flatnonzero(np.isfinite(positions).all(axis=0)) if positions else np.empty(0, dtype=int)
-    if not known.size:
-        return known
-    return known[unreachable_rows(TrackPositions(columns["t_s"][known], np.transpose(positions)[known]))]
-
-
 def median_speed(tracks: Sequence[TrackPositions]) -> float:
     """The median speed over half of each track, m/s: errors of plots hardly enter; NaN of too few rows."""
     speeds = []

@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from radarsim.report.drawing.model import PAGE_MM, Axis, Figure, Line, Mark, Panel, Style
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ROW_SPREAD = 0.56  # of a row, over which its points are spread
 ROW_MM, POINT_MM, AXIS_MM = 3.6, 1.5, 14.0  # height of a row, of each point on it at least, and of axis and title
@@ -21,6 +24,12 @@ class RowSeries(NamedTuple):
     lo: np.ndarray
     hi: np.ndarray
     exact: np.ndarray | None = None
+
+
+def filter_series(name: str, table: "pd.DataFrame", column: str, filters: Sequence[str]) -> RowSeries:
+    """A column of a table, which has a row for each filter, with its interval in the columns `_lo` and `_hi`."""
+    by_filter = table.set_index("filter").reindex(list(filters))
+    return RowSeries(name, *(by_filter[f"{column}{end}"].to_numpy(float) for end in ("", "_lo", "_hi")))
 
 
 def row_panel(x: Axis, names: Sequence[str], series: Sequence[RowSeries], title: str, others: Sequence[Mark]) -> Panel:

@@ -43,8 +43,8 @@ from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
 from radarsim.recordings.rounding_guard import LOSS_GAP_PERIODS, gap_message
 from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
-from radarsim.recordings.target_speed import impossible_column_speed, speed_message, unreachable_column_rows
-from radarsim.recordings.track_jumps import column_fault
+from radarsim.recordings.target_speed import impossible_column_speed, speed_message, unreachable_rows
+from radarsim.recordings.track_jumps import column_fault, column_positions
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
 from radarsim.studies.missed_scans import without_empty_rows
 from radarsim.studies.recording_interface import Likelihood
@@ -249,9 +249,10 @@ def _refuse_gross_errors(
     if OUTLIERS in likelihood.explains:
         return
     places = [
-        f"{columns['t_s'][row]:g} s{name and f' ({name})'}"
+        f"{t_s:g} s{name and f' ({name})'}"
         for name, columns in named.items()
-        for row in unreachable_column_rows(columns)
+        if (track := column_positions(columns)) is not None
+        for t_s in track.t_s[unreachable_rows(track)]
     ]
     if places:
         more = f" and {len(places) - MAX_NAMED_ROWS} more" if len(places) > MAX_NAMED_ROWS else ""

@@ -414,7 +414,10 @@ def _joined_rules(
     groups: list[list[str]] = []
     for rule, places in points.items():
         group = next((group for group in groups if _are_near(points[group[0]], places)), None)
-        groups.append([rule]) if group is None else group.append(rule)
+        if group is None:
+            groups.append([rule])
+        else:
+            group.append(rule)
     names = {group[0]: " = ".join(rule.replace("_", " ") for rule in group) for group in groups}
     return {rule: names.get(rule, "") for rule in points}
 
@@ -461,11 +464,10 @@ def consistency(results: Sequence[CaseResult], table: "pd.DataFrame") -> Figure 
     x = Axis(tr("mean per degree of freedom"), "log")
     consistency_panels = []
     for key, title in (("nees", tr("NEES of the position")), ("nis", tr("NIS of the plot"))):
-        series = []
-        for stage, stage_rows in rows.groupby("stage", sort=False):
-            by_filter = stage_rows.set_index("filter").reindex(filters)
-            columns = (by_filter[column].to_numpy(float) for column in (key, f"{key}_lo", f"{key}_hi"))
-            series.append(row_panels.RowSeries(tr(str(stage)), *columns))
+        series = [
+            row_panels.filter_series(tr(str(stage)), stage_rows, key, filters)
+            for stage, stage_rows in rows.groupby("stage", sort=False)
+        ]
         consistency_panels.append(row_panels.row_panel(x, names, series, title, [Reference(1.0, "x")]))
     caption = tr(
         "Normalised squared errors per degree of freedom, by stage: 1 if the filter's own covariance is correct, more "

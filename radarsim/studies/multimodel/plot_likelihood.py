@@ -84,10 +84,11 @@ class PlotLikelihood:
         # A number is an outlier in two of the strips: with its whole plot, or alone.
         chance = 2 / (1 + (STRIPS - 1) * (outliers[NEAR] + outliers[FAR]))
         growth_at_start = start_factor(outliers * [chance, chance, 1.0, 1.0])
+        new_numbers = np.tile(work_arrays()[1], (strips, 1))
         for problem in self.problems:
             start, later = plots[problem.start_rows], plots[problem.later_plots]
             start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= growth_at_start
-            works, numbers = rows(strips * layout.WORK).reshape(strips, -1), np.tile(work_arrays()[1], (strips, 1))
+            works, numbers = rows(strips * layout.WORK).reshape(strips, -1), new_numbers.copy()
             for work, state in zip(works, numbers, strict=True):
                 filter_strip.start_strip(work, state, lane_rows(start), problem.weights, self.probabilities)
             law_plots = rows(strips * later.size)

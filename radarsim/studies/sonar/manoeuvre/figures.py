@@ -235,7 +235,7 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
         if not len(of_quantity := rows[rows["component"] == name]):
             continue
         series = [
-            _use_series(at_time.set_index("filter").reindex(filters), tr("t = {t_s:g} s", t_s=t_s))
+            row_panels.filter_series(tr("t = {t_s:g} s", t_s=t_s), at_time, "ratio", filters)
             for t_s, at_time in of_quantity.groupby("t_s", sort=True)
         ]
         names = list(map(key_labels.escape_dollars, filters))
@@ -252,12 +252,6 @@ def uses_figure(results: Results, uses: "pd.DataFrame") -> Figure | None:
         )
     ) + case_selection.cases_left_out_remark(results, results[:1])
     return row_panels.row_figure("uses", tr("Quantities derived from a track"), caption, figure_panels)
-
-
-def _use_series(rows: "pd.DataFrame", name: str) -> row_panels.RowSeries:
-    """The ratios of a quantity at a time, one for each filter."""
-    columns = (rows[column].to_numpy(float) for column in ("ratio", "ratio_lo", "ratio_hi"))
-    return row_panels.RowSeries(name, *columns)
 
 
 def _swept_values(result: CaseResult[ManoeuvreAxes]) -> str:
