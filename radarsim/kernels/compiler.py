@@ -1,4 +1,5 @@
-"""How kernels are compiled: `kernel`, `summing_kernel` for Python, `inline`, `kernel_part` for other kernels.
+"""How kernels are compiled: `kernel`, `careful_kernel`, `summing_kernel` for Python, `inline`, `kernel_part` for other
+kernels.
 
 Kernels are compiled by `numba_internals` where Numba's private half is the one that is known, otherwise by
 `numba_options`; then `troubles` has a line for the user. Python calls an `inline` function as the plain function that
@@ -33,6 +34,11 @@ def kernel_part(function: Callable):
 def kernel(function: Callable):
     """A decorator of what Python calls."""
     return COMPILER.compile_kernel(function, FAST_MATH_FLAGS)
+
+
+def careful_kernel(function: Callable):
+    """As `kernel`, of numbers that need not be finite."""
+    return COMPILER.compile_kernel(function, FAST_MATH_FLAGS - {"nnan", "ninf"})
 
 
 def summing_kernel(function: Callable):

@@ -1,6 +1,7 @@
 """A study by the steps of one realisation: against what is known exactly; what an author gets wrong, a line each."""
 
 import inspect
+import math
 import random
 from collections import namedtuple
 from types import SimpleNamespace
@@ -8,12 +9,14 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from radarsim.config.key_types import Positive, Probability, key
 from radarsim.config.model import Model
 from radarsim.config.study_keys import Member
 from radarsim.engine.results import CaseResult
 from radarsim.errors import ConfigError
+from radarsim.kernels.formula_functions import log
 from radarsim.kernels.small_matrices import eliminate, update
 from radarsim.kernels.tracing import sqrt, where
 from radarsim.papers import one_file_measures
@@ -496,3 +499,43 @@ def test_what_a_class_lacks_is_said_at_once():
     assert any("kinds: kalman: predict must be given" in line for line in Bare().missing())
     with pytest.raises(ConfigError, match="kinds: kalman: update must be given"):
         Bare().keys()
+
+
+class Likely(Kalman):
+    """The filter with the density of a plot; of a σ under 1 m it has no state."""
+
+    def update(s, z, u, c):
+        x, P = Kalman.update(s, z, u, c)
+        return x + 0.0 * sqrt(c.sigma - 1.0), P
+
+    def log_densities(s, z, u, c):
+        S = s[1] + c.sigma**2
+        return [-0.5 * (log(math.tau * S) + (z[0] - s[0]) ** 2 / S)]
+
+
+class Fitted(Walk):
+    known_columns = ()
+    kinds = {"kalman": Likely, "halves": Halves}  # noqa: RUF012
+
+    def known_quantities(self, spec, t_s):
+        return ()
+
+    def plot(self, x, u, c, w):
+        return (x[0] + c.sigma * w[0],)
+
+    def fitted(self, filter_keys):
+        return ("sensor.sigma_x_m",)
+
+
+def test_the_likelihood_is_exact_and_impossible_where_a_filter_has_no_state():
+    study = Fitted()
+    case = case_of(study, ("kalman",), sigma_x_m=2.0)
+    columns = study.recording_interface().drawing(case)(0, 1).rows(0)
+    likelihood = study.likelihood(case, None, [columns])
+    x, P, total = columns["x_m"][0], 9.0, 0.0
+    for z in columns["x_m"][1:]:
+        S = P + STEP**2 + 9.0
+        total += norm.logpdf(z, x, np.sqrt(S))
+        x, P = x + (1 - 9.0 / S) * (z - x), 9.0 * (1 - 9.0 / S)
+    assert likelihood(np.array([3.0])) == pytest.approx(total, rel=1e-12)
+    assert likelihood(np.array([0.5])) == -math.inf
