@@ -465,11 +465,29 @@ def test_the_multimodel_likelihood_does_not_leap():
     assert leaping > 1
 
 
-def test_pairs_of_equal_models_are_one():
-    """GPB2, whose density is found in another way, of two models alike: the Kalman filter."""
-    case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
+@pytest.mark.parametrize("shares", [(0.0, 0.0), (0.03, 0.07)])
+@pytest.mark.parametrize("family", ["imm", "gpb1", "gpb2"])
+def test_equal_models_are_one(family, shares):
+    """Whatever is merged of two models alike: the Kalman filter. The density of pairs is found in another way."""
+    equal = PAIR.replace("gpb2", family)
+    case, columns = loaded("multimodel_1hz", "scans=30", equal), recording("multimodel_1hz", "scans=30")
     one, pairs = (likelihood(case, name, columns) for name in ("one", "pairs"))
-    assert pairs(pairs.stated) == pytest.approx(one(one.stated), rel=density_rounding(case, columns))
+    law = ErrorLaw(outlier_laws=(outlier_law(*shares, *SIZES),))
+    assert pairs(pairs.stated, law) == pytest.approx(one(one.stated, law), rel=density_rounding(case, columns))
+
+
+@pytest.mark.parametrize("family", ["imm", "gpb1", "gpb2"])
+def test_outliers_that_hardly_occur_change_no_multimodel_likelihood(family):
+    """Of different models, with plots missing: the plots that may be outliers have a kernel of their own."""
+    case, columns = (
+        loaded("multimodel_1hz", "scans=40", PAIR.replace("imm", family)),
+        recording("multimodel_1hz", "scans=40"),
+    )
+    allowed = density_rounding(case, columns)
+    columns["range_m"][[10, 20, 21, 39]] = np.nan
+    one = likelihood(case, "two", columns)
+    rare = ErrorLaw(outlier_laws=(outlier_law(1e-16, 1e-16, *SIZES),))
+    assert one(one.stated, rare) == pytest.approx(one(one.stated), rel=allowed)
 
 
 def test_the_multimodel_likelihood_is_best_of_the_filter_that_fits_and_at_the_true_error():

@@ -1,23 +1,22 @@
 """The likelihood of recorded plots under a bank of models."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.config.experiment import Case
-from radarsim.kernels.lanes import WIDTH, rows
-from radarsim.kernels.likelihood import FAR, FAR_COUNT, FAR_WIDTH, NEAR, start_factor
-from radarsim.studies.error_law import OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
+from radarsim.kernels.likelihood import FAR, FAR_WIDTH, NEAR, start_factor
+from radarsim.studies.error_law import OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.multimodel import model_bank
 from radarsim.studies.multimodel.config import Filter, Keys, Sensor
-from radarsim.studies.multimodel.kernels import filter_strip, layout, likelihood
+from radarsim.studies.multimodel.kernels import filter_strip, layout
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
-from radarsim.studies.multimodel.kernels.likelihood import STRIPS
+from radarsim.studies.multimodel.kernels.likelihood import log_likelihood
+from radarsim.studies.multimodel.kernels.robust_likelihood import STRIPS, robust_log_likelihood
 from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_frame
-from radarsim.studies.multimodel.study import banks
+from radarsim.studies.multimodel.study import banks, filter_numbers
 from radarsim.studies.multimodel.tracking import lane_rows, sigmas
 from radarsim.studies.recording_interface import ALL_KINDS, usual_interval_s
 
@@ -66,83 +65,63 @@ class PlotLikelihood:
         )
         self.problems = [problem for problem in problems if problem is not None]
         self.frame = sensor_frame(self.spec.sensor)
+        self.models = model_bank.model_rows([model.motion for model in self.options.models], spreads).ravel()
+        self.rules = {merge: filter_numbers(self.options, merge) for merge in ("moment", self.options.merge)}
         self.probabilities = model_bank.stationary(model_bank.transition_matrix(self.options.transition))
-        # How far (3, n, 3) an error of 1 m or 1 rad in each number moves a plot.
-        self.unit_shifts = np.stack([_root(local_plots(self._sensor(one), self.measured)[1]) for one in np.eye(3)])
-        # A search moves one key at a time.
-        self._bank, self._plots = lru_cache(2)(self._calculate_bank), lru_cache(2)(self._calculate_plots)
+        # Positions and covariances of plots are linear in the variances of the sensor.
+        self.exact_plots = self._plots(np.zeros(3))
+        self.plot_parts = np.stack([self._plots(one) - self.exact_plots for one in np.eye(3)])
+        # How far (n, 9) an error of 1 m or 1 rad in each number moves a plot.
+        covariances = self.plot_parts[:, :, layout.COVARIANCE : layout.DETECTED]
+        self.unit_shifts = np.concatenate([_root(part) for part in covariances], axis=1)
 
     def _track_scores(
         self, values: np.ndarray, merge: str, law: ErrorLaw
     ) -> list[tuple["_Problem", np.ndarray, np.ndarray]]:
         """For each track the log-densities (n,) of its later plots, and the probabilities (n, 3) of their numbers to be
         no outliers, for given values of the keys and a merging rule."""
-        design, rules = self._bank(float(values[3]), merge)
-        plots, shifts = self._plots(*values[:3].tolist()), values[:3, None, None] * self.unit_shifts
+        models, rules = self.models.copy(), self.rules[merge]
+        models[layout.MODEL_NUMBERS * (self.hardest + 1) - 1] = values[3]
+        plots = self.exact_plots + np.tensordot(np.square(values[:3]), self.plot_parts, 1)
         outliers, result = law.outlier_rows(1)[0], []
-        strips = STRIPS if outliers[NEAR] + outliers[FAR] > 0 else 1
+        is_robust = outliers[NEAR] + outliers[FAR] > 0
         # A number is an outlier in two of the strips: with its whole plot, or alone.
         chance = 2 / (1 + (STRIPS - 1) * (outliers[NEAR] + outliers[FAR]))
         growth_at_start = start_factor(outliers * [chance, chance, 1.0, 1.0])
-        new_numbers = np.tile(work_arrays()[1], (strips, 1))
         for problem in self.problems:
             start, later = plots[problem.start_rows], plots[problem.later_plots]
-            start[:, layout.COVARIANCE : layout.COVARIANCE + 6] *= growth_at_start
-            works, numbers = rows(strips * layout.WORK).reshape(strips, -1), new_numbers.copy()
-            for work, state in zip(works, numbers, strict=True):
-                filter_strip.start_strip(work, state, lane_rows(start), problem.weights, self.probabilities)
-            law_plots = rows(strips * later.size)
-            by_law = law_plots.reshape(strips, *later.shape, WIDTH)
-            by_law[:] = later[:, :, None]
-            if strips > 1:
-                later_shifts = shifts[:, problem.later_plots]
-                self._spread_outliers(by_law, later_shifts, values[:3], OutlierLaw(*outliers.tolist()))
-            score, soundness = np.empty(len(later)), np.empty((len(later), 3))
-            arguments = design, problem.transitions, problem.intervals, problem.times, rules, self.frame
-            likelihood.log_likelihood(
-                works, numbers, law_plots.reshape(strips, -1), *arguments, outliers, score, soundness
-            )
+            start[:, layout.COVARIANCE : layout.DETECTED] *= growth_at_start
+            work, numbers = work_arrays()
+            filter_strip.start_strip(work, numbers, lane_rows(start), problem.weights, self.probabilities)
+            score, soundness = np.empty(len(later)), np.ones((len(later), 3))
+            arguments = models, problem.transitions, problem.intervals, problem.times, rules
+            if is_robust:
+                shifts = values[:3].repeat(3) * self.unit_shifts[problem.later_plots]
+                robust_log_likelihood(
+                    work, numbers, later, shifts, *arguments, outliers, self._far_ratios(values[:3]), score, soundness
+                )
+            else:
+                log_likelihood(work, numbers, lane_rows(later), *arguments, self.frame, score)
             result.append((problem, score, soundness))
         return result
 
-    def _calculate_bank(self, sigma_acceleration_mps2: float, merge: str) -> tuple[np.ndarray, np.ndarray]:
-        """The numbers of the models, and those of the filter, for the largest acceleration and a merging rule."""
-        models = list(self.options.models)
-        update = {"sigma_acceleration_mps2": sigma_acceleration_mps2}
-        models[self.hardest] = models[self.hardest].model_copy(update=update)
-        options = self.options.model_copy(update={"models": tuple(models), "merge": merge})
-        filter_bank = banks(self.spec.model_copy(update={"filters": (options,)}), np.ones(1))
-        return filter_bank.models[0, : layout.MODEL_NUMBERS * len(models)], filter_bank.numbers[0]
+    def _far_ratios(self, sigmas: np.ndarray) -> np.ndarray:
+        """The ratio (3,) of the widest law of far outliers to the least wide, for each number.
 
-    def _calculate_plots(self, *sensor_sigmas: float) -> np.ndarray:
-        """The plots (n, PLOT) as the kernel takes them, for given σ of the sensor."""
-        z, R, is_valid = local_plots(self._sensor(sensor_sigmas), self.measured)
-        return np.concatenate([z, R, is_valid[:, None]], axis=1)
+        The widest spans the data in the number, whatever the σ of the others: else one σ would grow with the outliers
+        of another number."""
+        least = FAR_WIDTH * sigmas
+        return np.maximum(np.divide(self.spans, least, out=np.ones(3), where=sigmas > 0), 1.0)
 
     def _sensor(self, sigmas: Iterable[float]) -> Sensor:
         """The sensor with other σ."""
         names = [key.partition(".")[2] for key in self.keys[:3]]
         return self.spec.sensor.model_copy(update=dict(zip(names, map(float, sigmas), strict=True)))
 
-    def _spread_outliers(self, plots: np.ndarray, shifts: np.ndarray, sigmas: np.ndarray, law: OutlierLaw) -> None:
-        """Give plots (STRIPS, n, PLOT, WIDTH) the means and covariances of each law of their errors. shifts (3, n, 3):
-        by one σ of each number; sigmas (3,): these.
-
-        The widest law of a number spans the data in it, whatever the σ of the others: else one σ would grow with the
-        outliers of another number."""
-        means, covariances = np.split(plots[:, :, : layout.DETECTED], [layout.COVARIANCE], axis=2)
-        far = slice(2, 2 + FAR_COUNT)
-        covariances[0, :, :, 1] *= law.near_width**2
-        covariances[0, :, :, far] = 0.0
-        for strip, (shift, span, sigma) in enumerate(zip(shifts, self.spans, sigmas, strict=True), 1):
-            part = (shift[:, UPPER[0]] * shift[:, UPPER[1]])[:, :, None]
-            ratio = max(span / (FAR_WIDTH * sigma), 1.0) if sigma > 0 else 1.0
-            far_variances = (FAR_WIDTH * ratio ** np.linspace(0, 1, FAR_COUNT)) ** 2
-            covariances[0, :, :, far] += far_variances * part
-            means[strip, :, :, 0] += law.offset * shift
-            means[strip, :, :, 1] -= law.offset * shift
-            covariances[strip, :, :, :2] += law.spread**2 * part
-            covariances[strip, :, :, far] += (far_variances - 1) * part
+    def _plots(self, sigmas: Iterable[float]) -> np.ndarray:
+        """The plots (n, PLOT) as the kernels take them, for given σ of the sensor."""
+        z, R, is_valid = local_plots(self._sensor(sigmas), self.measured)
+        return np.concatenate([z, R, is_valid[:, None]], axis=1)
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         """The log likelihood; of the explanations only outliers are part of the model."""

@@ -9,7 +9,7 @@ from radarsim.engine.results import Axes
 from radarsim.engine.sums import Layout
 from radarsim.kernels.lanes import WIDTH, rows
 from radarsim.studies.multimodel import model_bank
-from radarsim.studies.multimodel.config import Keys
+from radarsim.studies.multimodel.config import Filter, Keys
 from radarsim.studies.multimodel.kernels import layout as kernels_layout
 from radarsim.studies.multimodel.kernels import plots
 from radarsim.studies.multimodel.kernels import sums as kernels_sums
@@ -64,13 +64,7 @@ def banks(spec: Keys, times: np.ndarray) -> kernels_layout.Banks:
     probabilities = np.zeros((count, 8))
     for f, options in enumerate(spec.filters):
         size, T = len(options.models), model_bank.transition_matrix(options.transition)
-        numbers[f, kernels_layout.FAMILY] = FAMILIES[options.family]
-        numbers[f, kernels_layout.MERGE], numbers[f, kernels_layout.OUTPUT_RULE] = (
-            RULES[options.merge],
-            RULES[options.output],
-        )
-        numbers[f, kernels_layout.AT_PREDICTION] = options.covariance_at == "prediction"
-        numbers[f, kernels_layout.SIZE] = size
+        numbers[f] = filter_numbers(options, options.merge)
         bank = model_bank.model_rows(
             [m.motion for m in options.models], [m.sigma_acceleration_mps2 for m in options.models]
         )
@@ -79,6 +73,16 @@ def banks(spec: Keys, times: np.ndarray) -> kernels_layout.Banks:
         transitions[f, : powers.size] = powers.ravel()
         probabilities[f, :size] = model_bank.stationary(T)
     return kernels_layout.Banks(numbers, models, transitions, probabilities)
+
+
+def filter_numbers(options: Filter, merge: str) -> np.ndarray:
+    """The numbers (8,) of a filter with a merging rule."""
+    numbers = np.zeros(8, dtype=np.int64)
+    numbers[kernels_layout.FAMILY] = FAMILIES[options.family]
+    numbers[kernels_layout.MERGE], numbers[kernels_layout.OUTPUT_RULE] = RULES[merge], RULES[options.output]
+    numbers[kernels_layout.AT_PREDICTION] = options.covariance_at == "prediction"
+    numbers[kernels_layout.SIZE] = len(options.models)
+    return numbers
 
 
 def stages(spec: Keys, t: np.ndarray, reported: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

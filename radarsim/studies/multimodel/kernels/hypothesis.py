@@ -167,16 +167,10 @@ def advance(work, listed, count, target, model, result, plot, noise):
 @inline
 def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
     """Predict a mixture (means, own blocks, blocks between axes), update it with a plot, write it; see `advance`."""
-    means, own_blocks, cross = mixture
-    x, y, z = predict_state(means[0], F), predict_state(means[1], F), predict_state(means[2], F)
-    xx = predict_covariance(own_blocks[0], F, Q)
-    yy = predict_covariance(own_blocks[1], F, Q)
-    zz = predict_covariance(own_blocks[2], F, Q)
-    xy, xz, yz = predict_cross(cross[0], F), predict_cross(cross[1], F), predict_cross(cross[2], F)
-
-    R = get6(noise, 0)
-    S = xx[0] + R[0], xy[0] + R[1], xz[0] + R[2], yy[0] + R[3], yz[0] + R[4], zz[0] + R[5]
-    L, i, determinant = kalman_algebra.factorise(S)  # i: the diagonal of D⁻¹
+    predicted = predict(mixture, F, Q)
+    x, y, z = predicted[0]
+    # i: the diagonal of D⁻¹
+    L, i, determinant = kalman_algebra.factorise(innovation_covariance(predicted, get6(noise, 0)))
     detected = get(plot, layout.DETECTED)
     i = i[0] * detected, i[1] * detected, i[2] * detected
     v = whiten(
@@ -190,20 +184,55 @@ def predict_and_update(work, mixture, F, Q, target, result, plot, noise):
     put(work, result, dot(scale_row(v, i), v))
     put(work, result + 1, where_greater(detected, full(0.5), determinant, full(1.0)))
 
-    # Rows of P H', the columns of P that belong to the three coordinates, whitened: P H' S⁻¹ H P is G W'.
-    wx = whiten((xx[0], xy[0], xz[0]), L), whiten((xx[1], xy[3], xz[3]), L), whiten((xx[2], xy[6], xz[6]), L)
-    wy = whiten((xy[0], yy[0], yz[0]), L), whiten((xy[1], yy[1], yz[3]), L), whiten((xy[2], yy[2], yz[6]), L)
-    wz = whiten((xz[0], yz[0], zz[0]), L), whiten((xz[1], yz[1], zz[1]), L), whiten((xz[2], yz[2], zz[2]), L)
+    wx, wy, wz = whitened_columns(predicted, L)
     gx = scale_row(wx[0], i), scale_row(wx[1], i), scale_row(wx[2], i)
     gy = scale_row(wy[0], i), scale_row(wy[1], i), scale_row(wy[2], i)
     gz = scale_row(wz[0], i), scale_row(wz[1], i), scale_row(wz[2], i)
+    means = (
+        (x[0] + dot(gx[0], v), x[1] + dot(gx[1], v), x[2] + dot(gx[2], v)),
+        (y[0] + dot(gy[0], v), y[1] + dot(gy[1], v), y[2] + dot(gy[2], v)),
+        (z[0] + dot(gz[0], v), z[1] + dot(gz[1], v), z[2] + dot(gz[2], v)),
+    )
+    put_updated(target, predicted, means, (gx, gy, gz), (wx, wy, wz))
+
+
+@inline
+def predict(mixture, F, Q):
+    """Predict a mixture (means, own blocks, blocks between axes) with a model."""
+    (x, y, z), (xx, yy, zz), (xy, xz, yz) = mixture
+    return (
+        (predict_state(x, F), predict_state(y, F), predict_state(z, F)),
+        (predict_covariance(xx, F, Q), predict_covariance(yy, F, Q), predict_covariance(zz, F, Q)),
+        (predict_cross(xy, F), predict_cross(xz, F), predict_cross(yz, F)),
+    )
+
+
+@inline
+def innovation_covariance(predicted, R):
+    """S = H P H' + R of a predicted hypothesis, packed."""
+    _, (xx, yy, zz), (xy, xz, yz) = predicted
+    return xx[0] + R[0], xy[0] + R[1], xz[0] + R[2], yy[0] + R[3], yz[0] + R[4], zz[0] + R[5]
+
+
+@inline
+def whitened_columns(predicted, L):
+    """The rows of P H', which are the columns of P that belong to the three coordinates, whitened: wx, wy, wz."""
+    _, (xx, yy, zz), (xy, xz, yz) = predicted
+    return (
+        (whiten((xx[0], xy[0], xz[0]), L), whiten((xx[1], xy[3], xz[3]), L), whiten((xx[2], xy[6], xz[6]), L)),
+        (whiten((xy[0], yy[0], yz[0]), L), whiten((xy[1], yy[1], yz[3]), L), whiten((xy[2], yy[2], yz[6]), L)),
+        (whiten((xz[0], yz[0], zz[0]), L), whiten((xz[1], yz[1], zz[1]), L), whiten((xz[2], yz[2], zz[2]), L)),
+    )
+
+
+@inline
+def put_updated(target, predicted, means, g, w):
+    """Write a predicted hypothesis with its updated means, and its covariance less G W'."""
+    _, (xx, yy, zz), (xy, xz, yz) = predicted
+    (gx, gy, gz), (wx, wy, wz) = g, w
     put_hypothesis(
         target,
-        (
-            (x[0] + dot(gx[0], v), x[1] + dot(gx[1], v), x[2] + dot(gx[2], v)),
-            (y[0] + dot(gy[0], v), y[1] + dot(gy[1], v), y[2] + dot(gy[2], v)),
-            (z[0] + dot(gz[0], v), z[1] + dot(gz[1], v), z[2] + dot(gz[2], v)),
-        ),
+        means,
         (shrink_block(xx, gx, wx), shrink_block(yy, gy, wy), shrink_block(zz, gz, wz)),
         (
             kalman_algebra.shrink_cross(xy, gx, wy),
