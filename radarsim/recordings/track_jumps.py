@@ -24,8 +24,11 @@ MIN_LASTING_SHARE = 0.5  # of a jump, by which the rows after it differ from tho
 MAX_TURN_SHARE = 0.2  # of the way on both sides, by which a turn may bend it
 UNIT_FACTORS = np.log([1000.0, 1852.0, 1.852, 1 / 0.3048, 1000 / 0.3048, 1852 / 0.3048, 1000 / 0.9144])
 UNIT_TOLERANCE = 0.02  # of the ratio of the ranges before and after a jump
-MAX_SHIFT_MPS2 = 40.0  # of a target that turns aside and back between two plots: 4 g
+MAX_SHIFT_MPS2 = MAX_JUMP_MPS2  # of a target that turns aside and back
 MIN_SHIFT_M, MIN_SHIFT_SCATTER = 500.0, 8.0  # of a shift; in median distances from straight courses beside it: over 5 σ
+MAX_COURSE_SCATTER, MAX_COURSE_SHARE = 5.0, 0.05  # of rows that lie on such a course, in the same; of the shift
+MANOEUVRE_ROWS, MIN_MANOEUVRE_ROWS = 6, 2  # beside a shift that may belong to a manoeuvre; of these that show one
+SPEED_SIGMAS = 3.0  # by which the speed of a target may be underestimated
 MIN_OFFSET_SCATTER = 3.0  # of the step at a shift from those beside it, in its median over the track
 MAX_SHIFT_CHANGE = 0.5  # of the shift, by which a change of the velocity may move the rows beside it
 MAX_SHIFTS = 3  # of a track: cells of a coarse measurement change oftener
@@ -109,22 +112,46 @@ def _shifts(track: TrackPositions) -> list[int]:
     velocities = ways / steps[:, None]
     expected = 0.5 * steps[1:-1, None] * (velocities[:-2] + velocities[2:])
     offsets = np.pad(np.linalg.norm(ways[1:-1] - expected, axis=1), 1)
-    least = np.maximum(MIN_SHIFT_M, 0.25 * MAX_SHIFT_MPS2 * steps**2)
+    least = _manoeuvre_m(steps, float(np.median(np.linalg.norm(velocities, axis=1))))
     is_far = (offsets > MIN_OFFSET_SCATTER * np.median(offsets)) & (offsets > least)
     is_far[1:-1] &= (offsets[1:-1] >= offsets[:-2]) & (offsets[1:-1] >= offsets[2:])
     rows = np.flatnonzero(is_far & (steps < MAX_JUMP_STEPS * np.median(steps))).tolist()
-    shifts = [i for i in rows if _is_shift(track, i, float(least[i]))]
+    shifts = [i for i in rows if _is_shift(track, i)]
     return shifts if len(shifts) <= MAX_SHIFTS else []
 
 
-def _is_shift(track: TrackPositions, i: int, least_m: float) -> bool:
-    """Whether the rows after i follow a straight course beside that of the rows up to i, farther than least_m."""
+def _manoeuvre_m(duration_s: np.ndarray | float, speed_mps: float) -> np.ndarray:
+    """How far a target of a speed gets from its course, m, that turns aside and back within such times (n,);
+    MIN_SHIFT_M if less."""
+    times = np.asarray(duration_s)
+    return np.maximum(MIN_SHIFT_M, np.minimum(0.25 * MAX_SHIFT_MPS2 * times**2, 2 * speed_mps * times))
+
+
+def _largest_speed(t: np.ndarray, positions: np.ndarray) -> float:
+    """How fast a target may be that flies straight along positions (n, d), m/s: of ranges alone, their second
+    derivative shows its speed across the line of sight."""
+    powers = (t - t.mean())[:, None] ** np.arange(3)
+    coefficients = np.linalg.lstsq(powers, positions, rcond=None)[0]
+    residuals = positions - powers @ coefficients
+    variances = np.diag(np.linalg.inv(powers.T @ powers)) * float(np.square(residuals).sum()) / residuals.size
+    sigmas = SPEED_SIGMAS * np.sqrt(variances * len(t) / (len(t) - 3))
+    speed = float(np.linalg.norm(coefficients[1]) + sigmas[1])
+    if positions.shape[1] > 1:
+        return speed
+    acceleration = max(0.0, 2 * float(coefficients[2, 0] + sigmas[2]))
+    return float(np.sqrt(speed**2 + abs(coefficients[0, 0]) * acceleration))
+
+
+def _is_shift(track: TrackPositions, i: int) -> bool:
+    """Whether the rows after i follow a straight course beside that of the rows up to i, farther than a target gets
+    from the last row on the one course to the first on the other."""
     middle_s = float(track.t_s[i : i + 2].mean())
-    places, velocities, distances = [], [], []
+    places, velocities, distances, speed = [], [], [], 0.0
     for first, last in ((max(0, i + 1 - SIDE_ROWS), i + 1), (i + 1, i + 1 + SIDE_ROWS)):
         t, positions = (values[first:last] for values in track)
         if len(t) < MIN_SIDE_ROWS:
             return False
+        speed = max(speed, _largest_speed(t, positions))
         before, after = np.triu_indices(len(t), k=1)
         slopes = (positions[after] - positions[before]) / (t[after] - t[before])[:, None]
         velocities.append(np.median(slopes, axis=0))
@@ -136,7 +163,19 @@ def _is_shift(track: TrackPositions, i: int, least_m: float) -> bool:
     change = float(np.linalg.norm(velocities[1] - velocities[0])) * beside_s
     scatter = float(np.median(np.concatenate(distances)))
     is_straight = all((side < MAX_SIDE_WIDTH * shift).mean() >= MIN_SIDE_SHARE for side in distances)
-    return shift > max(least_m, MIN_SHIFT_SCATTER * scatter) and change < MAX_SHIFT_CHANGE * shift and is_straight
+    if not is_straight or shift < MIN_SHIFT_SCATTER * scatter or change > MAX_SHIFT_CHANGE * shift:
+        return False
+    largest = max(MAX_COURSE_SCATTER * scatter, MAX_COURSE_SHARE * shift)
+    last, first = (_first_on_course(side <= largest) for side in (distances[0][::-1], distances[1]))
+    return shift > float(_manoeuvre_m(float(track.t_s[i + 1 + first] - track.t_s[i - last]), speed))
+
+
+def _first_on_course(is_on_course: np.ndarray) -> int:
+    """The index (of n) of the row that ends a manoeuvre, from a shift on: the second on the course after rows beside
+    it; a single one of these makes none, unless it is the first."""
+    aside = np.flatnonzero(~is_on_course[:MANOEUVRE_ROWS])
+    is_manoeuvre = aside.size >= MIN_MANOEUVRE_ROWS or not is_on_course[0]
+    return min(int(aside[-1]) + 2, is_on_course.size - 1) if is_manoeuvre else 0
 
 
 def _lasts(track: TrackPositions, i: int, leg: float, speed_mps: float) -> bool:

@@ -113,3 +113,33 @@ def test_two_sensors_of_another_zero_are_named_though_the_target_moves_farther(s
         assert abs(column_fault({"": [columns]}).alternation.distance_m - shift_m) < 0.25 * shift_m
         noise = {"t_s": t, "range_m": 30e3 + rng.standard_t(2, N) * shift_m}
         assert column_fault({"": [noise]}) is None
+
+
+def manoeuvre(kind, scan_s, speed_mps, rng):
+    """Ranges of a target that turns at 9 g after half of the recording: a loop, or aside and back within a scan."""
+    step_s = 0.02
+    t = np.arange(round(N * scan_s / step_s)) * step_s
+    rate, begin_s = 9 * 9.81 / speed_mps, scan_s * (N // 2 + (rng.uniform() if kind == "loop" else 0.0))
+    duration_s = 2 * np.pi / rate if kind == "loop" else rng.uniform(0.4, 0.5) * scan_s
+    is_turn, is_back = (np.abs(t - begin_s - (k + 0.5) * duration_s) < duration_s / 2 for k in range(2))
+    heading = rng.uniform(0, 2 * np.pi) + rate * step_s * np.cumsum(is_turn - 1.0 * is_back * (kind == "aside"))
+    x, y = (np.cumsum(f(heading)) * speed_mps * step_s for f in (np.cos, np.sin))
+    rows = np.arange(N) * round(scan_s / step_s)
+    return t[rows], np.hypot(80e3 + x[rows], y[rows]) + rng.normal(0, 30, N)
+
+
+@pytest.mark.parametrize(("kind", "scan_s", "speed_mps"), [("aside", 10, 300), ("aside", 12, 600), ("loop", 10, 150)])
+def test_a_turn_of_9_g_by_ranges_alone_is_no_change_of_zero(kind, scan_s, speed_mps):
+    for seed in range(40):
+        t, r = manoeuvre(kind, scan_s, speed_mps, np.random.default_rng(seed))
+        assert column_fault({"": [{"t_s": t, "range_m": r}]}) is None, seed
+
+
+def test_a_slow_target_does_not_change_its_range_by_kilometres_within_a_scan():
+    """Half a minute is long enough for a fast one."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        t = 30.0 * np.arange(N)
+        r = 20e3 + rng.uniform(-10, 10) * t + rng.normal(0, 20, N) + 2000 * (t >= t[N // 2])
+        fault = column_fault({"": [{"t_s": t, "range_m": r}]})
+        assert [jump.t_s for jump in fault.jumps] == [t[N // 2]], seed
