@@ -25,6 +25,7 @@ from radarsim.recordings.formats.asterix import Asterix
 from radarsim.recordings.formats.clock_steps import may_be_small_step
 from radarsim.recordings.formats.course_check import CourseCheck
 from radarsim.recordings.formats.doppler_check import DopplerCheck
+from radarsim.recordings.formats.forward_steps import GapWatch
 from radarsim.recordings.formats.import_options import Format, Options
 from radarsim.recordings.formats.open_recording import open_recording
 from radarsim.recordings.formats.records import BATCH_ROWS, BIASES, DAY_S, PLOTS, POSITIONS, Batch, Reader, skip_counts
@@ -149,7 +150,7 @@ class _Import:
         )
         self.skipped = reader.skipped
         self.later_rows = LaterRows(self.skipped, all_at_once)
-        self.legs = FastestLegs()
+        self.legs, self.gaps = FastestLegs(), GapWatch()
         self.has_bearings: bool | None = None  # all of the first batch
         self.site_distance = None if options.only_site is None else SiteDistance(options.only_site)
         self.impossible_speed: float | None = None  # of most targets, m/s
@@ -288,8 +289,12 @@ class _Import:
             self.zero = self._time_zero(float(t[0]))
         columns = {"t_s": t - self.zero} | self._add_places(batch)
         if not self.all_at_once:
-            has_jump = self.legs.has_jump(batch.track, t, self._positions(batch, columns))
-            if has_jump or may_be_small_step(*self.legs.steps):
+            positions = self._positions(batch, columns)
+            if (
+                self.legs.has_jump(batch.track, t, positions)
+                or may_be_small_step(*self.legs.steps)
+                or self.gaps.has_step(batch, positions)
+            ):
                 raise NeedsAllRows
         if not self.result.rows:  # the first batch of rows shows it
             self._note_alternation(batch, self._positions(batch, columns))

@@ -1,4 +1,4 @@
-"""Put the rows of a recording into the order of time, and recognise clocks that were set back.
+"""Put the rows of a recording into the order of time, and recognise clocks that were set back or forward.
 
 A recording is read batch by batch while the times of each track rise. The first row that is earlier than one before, or
 that no target reaches, raises `NeedsAllRows`; the recording is then read again as a whole, and sorted here."""
@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from radarsim.language.translate import term, tr
-from radarsim.recordings.formats.clock_steps import MAX_SET_BACKS, MIN_STEPS, SetBack, find_set_back, find_small_step
+from radarsim.language.translate import plural, term, tr
+from radarsim.recordings.formats.clock_steps import MAX_SET_BACKS, SetBack, find_set_back, find_small_step
+from radarsim.recordings.formats.forward_steps import find_set_forward, join_names, names_over_gaps
 from radarsim.recordings.formats.records import DAY_S, Batch
 from radarsim.recordings.grouping import rows_by_name
 from radarsim.recordings.time_spans import HOUR_S, MIN_DATED_S, ROLLOVER_S, WEEK_S
@@ -58,7 +59,13 @@ COUNTER_NOTE = term(
 SET_BACK_NOTE = term(
     "the clock was set back by {size:.6g} s{when}: the {count} rows before are taken as that much earlier"
 )
-SET_ON_NOTE = term("the clock was set on by {size:.6g} s{when}: the {count} rows before are taken as that much later")
+SET_FORWARD_NOTE = term(
+    "the clock was set forward by {size}{when}: the {count} rows before are taken as that much later"
+)
+SUMMER_TIME_NOTE = term(
+    "the clock was set forward by an hour{when}, as local times are at the beginning of summer time: the {count} rows "
+    "before are taken as an hour later"
+)
 ZONE_NOTE = term(
     "the clock was set back by {hours:g} hours{when}, as to another time zone: the {count} rows before are taken as "
     "that much earlier"
@@ -164,13 +171,24 @@ def sort_rows(batch: Batch, find_positions: Callable[[Batch], np.ndarray]) -> tu
 
 
 def _undo_clock_steps(batch: Batch, find_positions: Callable[[Batch], np.ndarray]) -> list[str]:
-    """Continue times that are set back by one of FALL_NOTES, or step by 1024 weeks, once in a recording, or that are
-    set back by any time, or those of a counter; in place, with notes."""
+    """Continue times that are those of a counter, or of a clock that was set; in place, with notes."""
     t = batch.columns["t_s"]
     tracks = [rows for name, rows in rows_by_name(batch.track).items() if name]
     if (span_s := _counter_span(t, tracks)) is not None:
         t += span_s * np.cumsum(np.diff(t, prepend=t[0]) < 0)
         return [tr(COUNTER_NOTE, size=span_s)]
+    if not tracks:
+        return []
+    positions = find_positions(batch)
+    does_rise = all((np.diff(t[rows]) > 0).all() for rows in tracks)
+    find_step = find_small_step if does_rise else find_set_back
+    notes = _undo_usual_steps(t, tracks) or _undo_steps(t, positions, tracks, find_step)
+    tracks = [rows for name, rows in rows_by_name(names_over_gaps(batch)).items() if name]
+    return notes + _undo_steps(t, positions, tracks, find_set_forward, lambda last_s: join_names(batch, last_s))
+
+
+def _undo_usual_steps(t: np.ndarray, tracks: list[np.ndarray]) -> list[str]:
+    """Continue times (n,) that are set back by one of FALL_NOTES, or step by 1024 weeks, once in a recording."""
     for size_s, note in FALL_NOTES.items():
         if shifted := _rows_after_fall(t, tracks, size_s):
             t[shifted] += size_s
@@ -180,17 +198,22 @@ def _undo_clock_steps(batch: Batch, find_positions: Callable[[Batch], np.ndarray
         before = np.concatenate(rollover_rows)
         t[before] += ROLLOVER_S
         return [tr(ROLLOVER_NOTE, count=len(before))]
+    return []
+
+
+def _undo_steps(
+    t: np.ndarray,
+    positions: np.ndarray,
+    tracks: list[np.ndarray],
+    find_step: Callable[[np.ndarray, np.ndarray, list[np.ndarray]], SetBack | None],
+    rename: Callable[[float], object] = lambda last_s: None,
+) -> list[str]:
+    """Continue times (n,) at the steps of the clock that are found, in place; rename: called with the time before."""
     notes: list[str] = []
-    if any((np.diff(t[rows]) <= 0).any() for rows in tracks):
-        positions = find_positions(batch)
-        while len(notes) < MAX_SET_BACKS and (set_back := find_set_back(t, positions, tracks)) is not None:
-            notes.append(_set_back_note(set_back))
-            t[set_back.before] -= set_back.size_s
-    elif any(len(rows) > MIN_STEPS for rows in tracks):
-        positions = find_positions(batch)
-        while len(notes) < MAX_SET_BACKS and (set_back := find_small_step(t, positions, tracks)) is not None:
-            notes.append(_set_back_note(set_back))
-            t[set_back.before] -= set_back.size_s
+    while len(notes) < MAX_SET_BACKS and (set_back := find_step(t, positions, tracks)) is not None:
+        notes.append(_set_back_note(set_back))
+        rename(set_back.until_s)
+        t[set_back.before] -= set_back.size_s
     return notes
 
 
@@ -220,11 +243,24 @@ def _set_back_note(set_back: SetBack) -> str:
             return tr(LEAP_SECOND_NOTE, count=count, when=midnight - datetime.timedelta(days=1))
     when = tr(" at {time:%H:%M:%S}", time=datetime.datetime.fromtimestamp(end_s, datetime.UTC)) if is_dated else ""
     if set_back.size_s < 0:
-        return tr(SET_ON_NOTE, size=-set_back.size_s, count=count, when=when)
+        return _set_forward_note(-set_back.size_s, count, when)
     hours = set_back.size_s / HOUR_S
     if hours > ZONE_STEP_HOURS and abs(hours / ZONE_STEP_HOURS - round(hours / ZONE_STEP_HOURS)) < ZONE_TOLERANCE:
         return tr(ZONE_NOTE, hours=ZONE_STEP_HOURS * round(hours / ZONE_STEP_HOURS), count=count, when=when)
     return tr(SET_BACK_NOTE, size=set_back.size_s, count=count, when=when)
+
+
+def _set_forward_note(size_s: float, count: int, when: str) -> str:
+    """The note on a clock that was set forward by a size, s."""
+    if size_s == HOUR_S:
+        return tr(SUMMER_TIME_NOTE, count=count, when=when)
+    days, hours = size_s / DAY_S, size_s / HOUR_S
+    size = tr("{size:.6g} s", size=size_s)
+    if days == round(days):
+        size = plural("{count:g} day", "{count:g} days", round(days))
+    elif hours > 1 and hours / ZONE_STEP_HOURS == round(hours / ZONE_STEP_HOURS):
+        size = tr("{hours:g} hours", hours=hours)
+    return tr(SET_FORWARD_NOTE, size=size, count=count, when=when)
 
 
 def rollover_notes(path: str, last_s: float) -> list[str]:

@@ -1,8 +1,9 @@
-"""Clocks that were set back within a recording, in each format, and rows that only look so."""
+"""Clocks that were set back or forward within a recording, in each format, and rows that only look so."""
 
 import numpy as np
 import pytest
 
+from radarsim.recordings.formats.forward_steps import find_set_forward
 from radarsim.recordings.formats.import_options import Options
 from tests.recordings.formats.example_files import SITE, block, imported, plot_048
 from tests.recordings.formats.test_logs import sentence
@@ -85,7 +86,7 @@ def test_a_clock_that_is_set_by_less_than_a_scan_is_named_and_undone(tmp_path, s
     np.testing.assert_allclose(columns["t_s"], times, rtol=0, atol=1e-6)
     (note,) = done.notes
     assert note.startswith(
-        f"the clock was set {'back' if size_s > 0 else 'on'} by {abs(size_s):g} s at 22:14:55: the 20"
+        f"the clock was set {'back' if size_s > 0 else 'forward'} by {abs(size_s):g} s at 22:14:55: the 20"
     )
     assert done.skipped == []
 
@@ -146,6 +147,78 @@ def test_two_recordings_of_a_target_that_overlap_are_sorted(tmp_path):
     assert done.notes[0].endswith("they are sorted by time")
 
 
+FORWARD = {  # sizes, s, and how they are said
+    5: "by 5 s", 18: "by 18 s", 400: "by 400 s", 3600: "by an hour", 3 * 3600: "by 3 hours", 86_400: "by 1 day",
+    7 * 86_400: "by 7 days",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("size_s", FORWARD)
+@pytest.mark.parametrize("noise_m", [0, 30])
+def test_a_clock_that_is_set_forward_is_named_and_undone(tmp_path, size_s, noise_m):
+    times = 5.0 * np.arange(N)
+    done, columns, _ = imported(tmp_path, table(set_back(FIRST_S + times, -size_s), noise_m))
+    np.testing.assert_array_equal(columns["t_s"], times)
+    (note,) = done.notes
+    assert note.startswith(f"the clock was set forward {FORWARD[size_s]} at 22:14:55")
+    assert "the 20 rows before are taken as" in note
+    assert done.skipped == []
+
+
+def test_a_clock_that_is_set_forward_twice_and_back_once_runs_on(tmp_path):
+    times = 5.0 * np.arange(2 * N)
+    recorded = FIRST_S + times + 3600.0 * (times >= 100) - 3600.0 * (times >= 200) + 60.0 * (times >= 300)
+    done, columns, _ = imported(tmp_path, table(recorded))
+    np.testing.assert_array_equal(columns["t_s"], times)
+    assert len(done.notes) == 3
+
+
+def true_course(kind, rng):
+    """Where a target is, m north and east, at times (n,): one that moves on during a gap, or stands."""
+    speed, heading, rate = rng.choice([15.0, 90.0, 250.0]), rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(0.5, 3))
+    north, east = rng.uniform(-60e3, 60e3, 2)
+    if kind == "stands":
+        return lambda t: (north + 0 * t, east + 0 * t)
+    if kind == "turns":
+        radius = speed / rate
+        return lambda t: (north + radius * np.sin(rate * t), east + radius * np.cos(rate * t))
+    return lambda t: (north + speed * np.cos(heading) * t, east + speed * np.sin(heading) * t)
+
+
+@pytest.mark.parametrize("has_bearings", [False, True])
+@pytest.mark.parametrize("kind", ["flies on", "turns", "stands"])
+def test_a_true_gap_remains_a_gap(kind, has_bearings):
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        scan_s, noise_m, size_s = rng.choice([1.0, 4.0, 10.0]), rng.choice([0.0, 30.0]), rng.uniform(2, 3600)
+        t = scan_s * np.arange(2 * N)
+        t[N:] += scan_s * round(size_s / scan_s)
+        places = np.stack(true_course(kind, rng)(t), axis=1)
+        places = places if has_bearings else np.linalg.norm(places, axis=1)[:, None]
+        places = places + rng.normal(0, noise_m, places.shape)
+        assert find_set_forward(t, places, [np.arange(2 * N)]) is None, seed
+
+
+def test_a_gap_of_one_of_several_targets_is_no_clock(tmp_path):
+    """Though it goes on from where it was, while others are seen."""
+    rows = [(FIRST_S + 5 * k + 400 * (number == 0 and k >= 20), number, 30_000 + 950 * k) for k in range(120)
+            for number in range(2)]  # fmt: skip
+    text = "time,track,range_m\n" + "".join(f"{t},{number},{r}\n" for t, number, r in rows)
+    done, _, _ = imported(tmp_path, text.encode())
+    assert not any("the clock" in note for note in done.notes)
+
+
+@pytest.mark.parametrize("gap_row", [19_990, 20_000, 20_010])
+def test_a_step_is_found_where_batches_of_rows_meet(tmp_path, gap_row):
+    times = 1.0 * np.arange(20_100)
+    ranges = 30_000 + 5 * times
+    recorded = FIRST_S + times + 3600.0 * (np.arange(times.size) >= gap_row)
+    text = "time,track,range_m\n" + "".join(f"{t:.0f},7,{r:.2f}\n" for t, r in zip(recorded, ranges, strict=True))
+    done, columns, _ = imported(tmp_path, text.encode())
+    np.testing.assert_array_equal(columns["t_s"], times)
+    assert done.notes[0].startswith("the clock was set forward by an hour")
+
+
 def clock_text(t):
     return f"{t // 3600 % 24:02}{t // 60 % 60:02}{t % 60:02}"
 
@@ -175,10 +248,14 @@ def asterix(times):
 
 
 @pytest.mark.parametrize("write", [nmea, gpx, basestation, asterix])
-@pytest.mark.parametrize("size_s", [5, 18, 3600])
+@pytest.mark.parametrize("size_s", [5, 18, 3600, -18, -3600])
 def test_every_format_has_clocks(tmp_path, write, size_s):
     times = set_back([50_000 + 5 * k for k in range(N)], size_s)
     done, columns, _ = imported(tmp_path, write(times), AT)
     np.testing.assert_array_equal(columns["t_s"], 5.0 * np.arange(N))
-    expected = "times fall by an hour" if size_s == 3600 else f"the clock was set back by {size_s} s"
+    expected = {
+        3600: "times fall by an hour",
+        -3600: "the clock was set forward by an hour",
+        -18: "the clock was set forward by 18 s",
+    }.get(size_s, f"the clock was set back by {size_s} s")
     assert sum(note.startswith(expected) for note in done.notes) == 1
