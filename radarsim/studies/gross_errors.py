@@ -49,16 +49,25 @@ def gross_errors(t: np.ndarray, z: np.ndarray, limit: float) -> np.ndarray:
     scale = 1.4826 * (1 + 5 / (count - 3)) * float(majority[best])
     if scale == 0:
         return np.zeros(count, dtype=bool)
-    gross = residuals[best] > limit * scale
-    for i in np.flatnonzero(gross).tolist():
-        gross[i] = _neighbour_residual(times, z, i) > LEAST_JUMP * residuals[best][i]
-    return np.asarray(gross)
+    far, gross = residuals[best] > limit * scale, np.zeros(count, dtype=bool)
+    # Two errors of one size may be on a parabola with their neighbours: where one is known, the other shows.
+    while True:
+        more = [
+            i
+            for i in np.flatnonzero(far & ~gross).tolist()
+            if _neighbour_residual(times, z, i, gross) > LEAST_JUMP * residuals[best][i]
+        ]
+        if not more:
+            return gross
+        gross[more] = True
 
 
-def _neighbour_residual(t: np.ndarray, z: np.ndarray, i: int) -> float:
-    """The distance of number i from the parabola through the three numbers after it, of the last ones before it: small
-    where a target manoeuvres, which moves on smoothly."""
-    neighbours = np.arange(i + 1, i + 4) if i + 3 < len(z) else np.arange(i - 3, i)
+def _neighbour_residual(t: np.ndarray, z: np.ndarray, i: int, gross: np.ndarray) -> float:
+    """The distance of number i from the parabola through the three numbers after it that are no gross errors, of the
+    last ones before it: small where a target manoeuvres, which moves on smoothly."""
+    others = np.flatnonzero(~gross)
+    before, after = others[others < i], others[others > i]
+    neighbours = after[:3] if len(after) >= 3 else before[-3:]
     weights = [np.prod([(t[i] - t[k]) / (t[j] - t[k]) for k in neighbours if k != j]) for j in neighbours]
     return float(abs(z[i] - np.array(weights) @ z[neighbours]))
 

@@ -368,6 +368,48 @@ def test_one_plot_that_is_wrong_by_any_size_leaves_the_robust_fit_as_it_was(robu
     assert len(found.outlier_rows) <= 4
 
 
+@pytest.mark.parametrize("rows", [[0, 3], [1, 4, 7]])
+def test_errors_of_one_size_at_a_start_do_not_hide_each_other(rows):
+    """They are on a parabola with the numbers between them, as those of a manoeuvre are."""
+    columns = recording(np.random.default_rng(5))
+    columns["range_m"][rows] += 1e5 * STATED["radar.sigma_range_m"]
+    found = fit.fit_keys(likelihood(columns), (OUTLIERS,))
+    assert found.keys[0].lo < STATED["radar.sigma_range_m"] < found.keys[0].hi
+    assert [(0, T * row, "range_m") for row in rows] == [row for row in found.outlier_rows if row.column == "range_m"]
+
+
+def folded_likelihood(realisation, change=lambda columns: columns):
+    """Of 120 plots of a target whose velocities are folded, drawn by the config."""
+    (config,) = load_all(["ambiguous_rls2"], ("scans=120",))
+    columns = simulate_plots.simulate_realisation(config, realisation)
+    plots = change({name: columns[name] for name in ("t_s", "range_m", "velocity_mps")})
+    return study("ambiguous_doppler").recording_interface().likelihood(config.cases[0], None, [plots])
+
+
+@pytest.mark.parametrize("realisation", [8, pytest.param(55, marks=pytest.mark.slow)])
+def test_a_law_of_many_outliers_that_gains_nothing_is_not_taken(realisation):
+    """Folded velocities of sound plots are as likely with 40 % of outliers: a fit was refused."""
+    found = fit.fit_keys(folded_likelihood(realisation), (OUTLIERS,))
+    assert not any(profile_search.follows_another_law(law) for law in found.outliers.values())
+    assert all(key.lo <= key.stated <= key.hi for key in found.keys[:2])
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("is_folded", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_plots_that_follow_another_law_are_refused(is_folded, seed):
+    """Of the ranges 45 % have even errors of up to 200 σ."""
+    rng = np.random.default_rng(seed)
+
+    def change(columns):
+        count = len(columns["t_s"])
+        is_off = rng.random(count) < 0.45
+        return columns | {"range_m": columns["range_m"] + is_off * rng.uniform(-200, 200, count) * 250.0}
+
+    plots = folded_likelihood(seed, change) if is_folded else likelihood(change(recording(rng)))
+    with pytest.raises(ConfigError, match="would have to be outliers"):
+        fit.fit_keys(plots, (OUTLIERS,))
+
+
 def test_outliers_that_a_first_search_over_fewer_rows_has_not_seen_are_found(robust_sigma):
     """It ends with none: from there a share of zero had no slope, and σ rose to a thousand times its value."""
     tracks = [recording(np.random.default_rng(seed)) for seed in range(4)]
@@ -657,7 +699,8 @@ def test_outliers_are_allowed_for_where_there_are_some_alone():
     for share, tracks, count, least, most in ((0, 1, 200, 0, 2), (0.04, 1, 100, 90, 100), (0.04, 3, 50, 48, 50)):
         drawn = ([recording(rng, share=share) for _ in range(tracks)] for _ in range(count))
         found = [fit.fit_keys(likelihood(*one, config=config)).further_explanation for one in drawn]
-        switched = sum(one is not None and one.name == OUTLIERS and one.gain > fit.CLEAR_RISE for one in found)
+        clear = [one for one in found if one is not None and one.gain > profile_search.CLEAR_RISE]
+        switched = sum(one.name == OUTLIERS for one in clear)
         assert least <= switched <= most, switched
 
 

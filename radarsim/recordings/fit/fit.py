@@ -33,10 +33,10 @@ from radarsim.recordings.fit.likelihood_slice import (
 )
 from radarsim.recordings.fit.profile_intervals import FittedKey, ProfileIntervals
 from radarsim.recordings.fit.profile_search import (
+    CLEAR_RISE,
     EXPLANATION_EVALUATIONS,
-    MAX_NEAR_SHARE,
-    MAX_NEAR_WIDTH,
     LikelihoodSearch,
+    follows_another_law,
 )
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
 from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
@@ -72,14 +72,12 @@ class FitStages:
         return self.report
 
 
-MAX_PLAUSIBLE_OUTLIERS = 0.3  # of numbers that may be far outliers; with more, the errors follow another law
 SOUND_SIGMAS = 3.0  # by which a sound number may differ
 MAX_OVERLAP = 0.002  # of the numbers that are near outliers and look sound: with more, a fit says so
 OUTLIER_PROBABILITY = 0.5  # from which a number is named as an outlier
 MAX_NAMED_ROWS = 5  # of plots far off, in a refusal
 CORRELATION_TIME_KEY = "correlation_time_s"
 ZERO_CORRELATION_TIME = 1e-4  # of the usual interval: a correlation time that counts as zero
-CLEAR_RISE = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
 
 
 @dataclass(frozen=True)
@@ -382,7 +380,7 @@ def fit_keys(
     if search.top <= IMPOSSIBLE_LOG_LIKELIHOOD:
         raise ConfigError(f"filter {likelihood.filter} cannot take the plots: `radarsim track` says at which row")
     law = search.law(search.best)
-    shares = [outliers.share for outliers in law.outlier_laws if _follows_another_law(outliers)]
+    shares = [outliers.share for outliers in law.outlier_laws if follows_another_law(outliers)]
     if shares:
         raise ConfigError(
             f"robust: {100 * max(shares):.0f} % of the plots would have to be outliers: their errors follow another "
@@ -402,12 +400,6 @@ def fit_keys(
         outlier_rows=_outlier_rows(search, likelihood),
         knows_outliers=OUTLIERS in likelihood.explains,
     )
-
-
-def _follows_another_law(outliers: OutlierLaw) -> bool:
-    """Whether outliers are so many and so far that the sound numbers would be too few or too alike."""
-    is_limit = outliers.near >= MAX_NEAR_SHARE and outliers.near_width >= MAX_NEAR_WIDTH
-    return outliers.far > MAX_PLAUSIBLE_OUTLIERS or is_limit
 
 
 def _outlier_rows(search: "LikelihoodSearch", likelihood: Likelihood) -> tuple[OutlierRow, ...]:

@@ -46,6 +46,9 @@ MAX_NEAR_SHARE, MAX_FAR_SHARE = 0.2, 0.4
 # told by a fifth of outliers of 3 σ and half the σ; with 0.05, intervals hold σ too rarely where a tenth are of 3 σ.
 EXPECTED_NEAR_SHARE = 0.1
 FIRST_OUTLIER_SHARE = 0.03  # where the search of either begins
+MAX_PLAUSIBLE_OUTLIERS = 0.3  # of numbers that may be far outliers; with more, the errors follow another law
+PLAIN_PROBABILITY, MAX_PLAIN_PART = 0.9, 0.5  # of a plain outlier; of a law's outliers that are plain, else it is real
+CLEAR_RISE = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
 MIN_NEAR_WIDTH, MAX_NEAR_WIDTH = 3.0, 100.0  # of near outliers, in σ
 MIN_NEAR_SIGMAS = 0.5  # of their offset or spread: less is none
 # share, offset and spread from which near outliers are searched
@@ -103,11 +106,46 @@ class LikelihoodSearch:
                 candidate, value = self.climb(candidate, None, ROUGH_TOLERANCE)
             if value > self.top + 1e-6:
                 self.best, self.top = candidate, value
+        self._prefer_plausible_laws()
         if robust and start_point is None:
             self._try_near_outliers()
         self.top = -math.inf
         self._polish(self.best)
         self.raise_zero_keys()
+
+    def _prefer_plausible_laws(self) -> None:
+        """Where outliers at the best point are implausibly many, but few of them plain, take the likeliest point with
+        few or none, unless it is clearly less likely; the other one is a rival then.
+
+        Folded velocities with a σ of a fifth of the span are about as likely with 40 % of outliers as with none."""
+        implausible, candidates = self._doubtful_laws(), []
+        none = _logit(MIN_OUTLIER_SHARE) - FIRST_STEP
+        for far in (none, _logit(FIRST_OUTLIER_SHARE)) if implausible else ():
+            start = self.best.copy()
+            for i in implausible:
+                start[i : i + 2] = none, far
+            point, value = self._polished(start)
+            if not any(map(follows_another_law, self.law(point).outlier_laws)):
+                candidates.append((point, value))
+        point, value = max(candidates, key=lambda candidate: candidate[1], default=(self.best, -math.inf))
+        if value > self.top - CLEAR_RISE:
+            if self.top > max(value, self.rival_top):
+                self.rival, self.rival_top = self.best, self.top
+            self.best, self.top = point, value
+
+    def _doubtful_laws(self) -> list[int]:
+        """The first coordinates of laws that have implausibly many outliers at the best point, few of them plain."""
+        law = self.law(self.best)
+        kinds = zip(self.law_starts, self.likelihood.outlier_kinds, law.outlier_laws, strict=False)
+        implausible = [(i, kind, outliers.share) for i, kind, outliers in kinds if follows_another_law(outliers)]
+        tracks = self.likelihood.soundness(self.to_values(self.best), law) if implausible else []
+        result = []
+        for i, kind, share in implausible:
+            columns = (kind,) if kind else tracks[0].keys() - {"t_s"}
+            numbers = np.concatenate([track[name] for track in tracks for name in columns])
+            if np.mean(numbers[np.isfinite(numbers)] < 1 - PLAIN_PROBABILITY) < MAX_PLAIN_PART * share:
+                result.append(i)
+        return result
 
     def _try_near_outliers(self) -> None:
         """Take near outliers into the best point if they clearly raise the likelihood; else, as sound errors may have
@@ -174,18 +212,23 @@ class LikelihoodSearch:
 
     def _polish(self, start: np.ndarray) -> bool:
         """Take the maximum near a point as the best if it is higher, and return whether it is."""
-        point, _ = self.climb(start, None, self.steps.tolerance)
-        moving = self._moving(point, np.arange(point.size))
-        point = polish_maximum(self.log_likelihood, point, self.steps, moving)
-        value = self.log_likelihood(point)
+        point, value = self._polished(start)
         if is_higher := value > self.top:
             self.best, self.top = point, value
         return is_higher
+
+    def _polished(self, start: np.ndarray) -> tuple[np.ndarray, float]:
+        """The maximum near a point, and its log-likelihood."""
+        point, _ = self.climb(start, None, self.steps.tolerance)
+        moving = self._moving(point, np.arange(point.size))
+        point = polish_maximum(self.log_likelihood, point, self.steps, moving)
+        return point, self.log_likelihood(point)
 
     def raise_zero_keys(self) -> None:
         """Raise keys from zero where that makes the plots likelier, then compute the curvature at the maximum."""
         while (start := self._raised_point()) is not None and self._polish(start):
             pass
+        self._prefer_plausible_laws()
         self.curvature_model = Curvature(self.log_likelihood, self.steps)
         moving = self._moving(self.best, np.arange(self.best.size))
         self.curvature_model.step(self.best, self.top, moving)
@@ -389,6 +432,12 @@ class LikelihoodSearch:
         found = 1.2 * np.sqrt(2 * HALF_CHI2_95 * np.where(is_known, spreads, 0.0))
         distances[moving] = np.where(is_known, np.minimum(found, MAX_FIRST_DISTANCE), UNKNOWN_END_DISTANCE)
         return distances
+
+
+def follows_another_law(outliers: OutlierLaw) -> bool:
+    """Whether outliers are so many and so far that the sound numbers would be too few or too alike."""
+    is_limit = outliers.near >= MAX_NEAR_SHARE and outliers.near_width >= MAX_NEAR_WIDTH
+    return outliers.far > MAX_PLAUSIBLE_OUTLIERS or is_limit
 
 
 def _logit(share: float) -> float:
