@@ -88,6 +88,7 @@ class PlotLikelihood:
         # A number is an outlier in two of the strips: with its whole plot, or alone.
         chance = 2 / (1 + (STRIPS - 1) * (outliers[NEAR] + outliers[FAR]))
         growth_at_start = start_factor(outliers * [chance, chance, 1.0, 1.0])
+        far_ratios, shifts = self._far_ratios(values[:3]), values[:3].repeat(3) * self.unit_shifts
         for problem in self.problems:
             start, later = plots[problem.start_rows], plots[problem.later_plots]
             start[:, layout.COVARIANCE : layout.DETECTED] *= growth_at_start
@@ -96,10 +97,8 @@ class PlotLikelihood:
             score, soundness = np.empty(len(later)), np.ones((len(later), 3))
             arguments = models, problem.transitions, problem.intervals, problem.times, rules
             if is_robust:
-                shifts = values[:3].repeat(3) * self.unit_shifts[problem.later_plots]
-                robust_log_likelihood(
-                    work, numbers, later, shifts, *arguments, outliers, self._far_ratios(values[:3]), score, soundness
-                )
+                errors = shifts[problem.later_plots], *arguments, outliers, far_ratios
+                robust_log_likelihood(work, numbers, later, *errors, score, soundness)
             else:
                 log_likelihood(work, numbers, lane_rows(later), *arguments, self.frame, score)
             result.append((problem, score, soundness))
