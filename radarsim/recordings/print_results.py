@@ -59,7 +59,7 @@ def print_line(stream: TextIO, line: str) -> None:
 
 def print_fit(fitted: "Fit") -> None:
     """Print a fit, and the options that put it into the config."""
-    from radarsim.recordings.fill_values import FILL_NOTE
+    from radarsim.recordings.fill_values import fill_notes
     from radarsim.recordings.fit import fit
     from radarsim.recordings.report import sentences
 
@@ -75,8 +75,7 @@ def print_fit(fitted: "Fit") -> None:
         words = plural("{count} plot", "{count} plots", fitted.doubles)
         words = tr("{plots} left out: the same scan has one nearer to the track", plots=words)
         lines.append(labelled_line("doubles", words))
-    if fitted.fills:
-        lines.append(labelled_line("", tr(FILL_NOTE, count=fitted.fills, all=fitted.rows)))
+    lines += [labelled_line("", note) for note in fill_notes(fitted.fills, fitted.rows)]
     plain = {} if fitted.plain is None else {fitted_key.key: fitted_key for fitted_key in fitted.plain.keys}
     for fitted_key in fitted.keys:
         line = f"{fitted_key.key}: {_value_with_interval(fitted_key)}"

@@ -9,7 +9,9 @@ import math
 import os
 import re
 import shlex
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -37,7 +39,7 @@ class Piece(NamedTuple):
 
     The measured columns (n,); the track of each row, None if the file has no tracks; the columns (n,) of the truth,
     `true_…`; the POSITION_COLUMNS that the file has; the requested texts that it has; the counts so far of track
-    numbers used again, of further plots of a scan that were left out, and of velocities that stand for none."""
+    numbers used again, of further plots of a scan that were left out, and of numbers that stand for none."""
 
     columns: dict[str, np.ndarray]
     tracks: list[str] | None
@@ -46,7 +48,7 @@ class Piece(NamedTuple):
     texts: dict[str, list[str]]
     reused_numbers: int = 0
     doubles: int = 0
-    fills: int = 0
+    fills: Mapping[str, int] = MappingProxyType({})  # by column
 
 
 def pieces(
@@ -119,7 +121,7 @@ class _Reader:
         self.text_indices = {name: header.index(name) for name in texts or () if name in header}
         self.last_times: dict[str, float] = {}
         self.track_numbers = TrackNumbers()
-        self.fills = 0
+        self.fills = Counter[str]()
 
     def chunks(self, size: int) -> Iterator[Piece]:
         """The columns, tracks, truth and positions of the rows, `size` rows at a time."""
@@ -147,10 +149,10 @@ class _Reader:
                         tables = [{name: column[retained] for name, column in numbers.items()} for numbers in tables]
                 columns, truth, places = tables
                 row_tracks = None if self.track_index is None else tracks
-                if not self.equal_times and not self.any_order and set(fill_values.COLUMNS) <= set(columns):
+                if not self.equal_times and not self.any_order:
                     names = ["1"] * len(columns["t_s"]) if row_tracks is None else row_tracks
-                    self.fills += fill_values.remove_fill_velocities(columns, names)
-                counts = self.track_numbers.reused, self.track_numbers.doubles, self.fills
+                    self.fills.update(fill_values.remove_fills(columns, names))
+                counts = self.track_numbers.reused, self.track_numbers.doubles, self.fills.copy()
                 yield Piece(columns, row_tracks, truth, places, texts, *counts)
         if self.faults:
             raise ConfigError(*self.faults.lines())

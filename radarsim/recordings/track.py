@@ -84,7 +84,8 @@ def track_plots(
     tracker = interface.tracker(case)
     size = tracker.most_rows or read_plots.CHUNK_ROWS
     followers: dict[str | None, TrackFollower] = {}
-    trackless_rows = row_count = reused_numbers = doubles = fills = 0
+    trackless_rows = row_count = reused_numbers = doubles = 0
+    fills: Mapping[str, int] = {}
     with mapping(os.cpu_count() or 1 if threads is None else threads) as mapped:
         choices, any_origin = interface.columns(case.spec), interface.from_any_origin
         for piece in read_plots.pieces(source, choices, size, tracker.several, any_origin):

@@ -88,7 +88,7 @@ class TrackingResult:
     trackless_rows: int = 0  # rows of no track
     reused_numbers: int = 0  # track numbers used again for another track
     doubles: int = 0  # further plots of a track in a scan, left out
-    fills: int = 0  # velocities that stand for none, left out
+    fills: Mapping[str, int] = field(default_factory=dict)  # numbers that stand for none, left out, by column
     errors: dict[tuple[str, str], ErrorSums] = field(default_factory=dict)  # by filter and component, with truth
     positions: PlotPositions = field(default_factory=PlotPositions)  # of the plots, for the plan view
 

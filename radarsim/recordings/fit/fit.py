@@ -7,7 +7,7 @@ correlated from plot to plot may explain the plots. Clear outliers and clear cor
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -98,7 +98,7 @@ class Fit:
     outlier_rows: tuple["OutlierRow", ...] = ()  # the numbers that are probably outliers
     knows_outliers: bool = True  # whether the likelihood can allow for them
     doubles: int = 0  # further plots of a track in a scan, left out
-    fills: int = 0  # velocities that stand for none, left out
+    fills: Mapping[str, int] = field(default_factory=dict)  # numbers that stand for none, left out, by column
 
     @property
     def has_overlap(self) -> bool:
@@ -177,7 +177,7 @@ class FileLikelihoods(NamedTuple):
     rough: Likelihood | None
     track_names: list[str | None]
     doubles: int
-    fills: int
+    fills: Mapping[str, int]
 
 
 def file_likelihoods(
@@ -284,10 +284,11 @@ def no_likelihood_message(case: Case, filter_name: str | None, fittable_filters:
 
 def _read_tracks(
     source: str | os.PathLike, choices: Sequence[Sequence[str]], any_origin: bool
-) -> tuple[dict[str | None, dict[str, np.ndarray]], int, int]:
+) -> tuple[dict[str | None, dict[str, np.ndarray]], int, Mapping[str, int]]:
     """The columns (n,) of each track of a file of plots, by its name, without empty rows; and how many further plots of
-    a scan are left out, and velocities that stand for none."""
-    pieces_by_track, doubles, fills = dict[str | None, list[dict[str, np.ndarray]]](), 0, 0
+    a scan are left out, and numbers that stand for none, by column."""
+    pieces_by_track, doubles = dict[str | None, list[dict[str, np.ndarray]]](), 0
+    fills: Mapping[str, int] = {}
     for piece in read_plots.pieces(source, choices, any_origin=any_origin):
         doubles, fills = piece.doubles, piece.fills
         for rows in split_by_track(piece):

@@ -18,7 +18,7 @@ from radarsim.language.current import use_language
 from radarsim.language.translate import term, tr
 from radarsim.recordings import target_speed, track_jumps
 from radarsim.recordings.csv_output import column_texts
-from radarsim.recordings.fill_values import FILL_NOTE, remove_fill_velocities
+from radarsim.recordings.fill_values import FILL_NOTES, remove_fills
 from radarsim.recordings.formats import asterix, asterix_decode, row_order
 from radarsim.recordings.formats.aircraft_truth import LOCAL_COLUMNS, MAX_LISTED, AircraftTruth
 from radarsim.recordings.formats.asterix import Asterix
@@ -46,6 +46,11 @@ NO_SITE_FAULT = (
 MAX_LOSS = 0.1  # of the rows that may be left out because of others
 MAX_STANDING_TRACKS = 20  # whose times stand still once, for which a recording is read again
 UNREACHABLE_REASON = term("rows that no target reaches from neighbouring rows")
+FILL_REASONS = {
+    "range_m": term("rows whose range stands for none, as 65535 again and again"),
+    "latitude_deg": term("rows whose latitude stands for none, as 0 again and again"),
+    "longitude_deg": term("rows whose longitude stands for none, as 0 again and again"),
+}
 UNKNOWN_RADAR_REASON = term("rows of radar #/#, whose place neither it nor --at says")
 OTHER_KIND_REASONS = {PLOTS: term("plots beside positions"), POSITIONS: term("positions beside plots")}
 SEA_LEVEL_NOTE = term("positions without altitude, placed at sea level: {count} of {all}")
@@ -249,7 +254,7 @@ class _Import:
         if batch.kind == POSITIONS:
             if biases:
                 raise ConfigError("bias: is subtracted from plots of a radar; the recording has positions")
-            return batch
+            return self._without_fills(batch)
         if biases:
             range_bias, range_scale, bearing_bias, time_bias = (biases.get(name, 0.0) for name in BIASES)
             columns["t_s"] -= time_bias
@@ -257,11 +262,25 @@ class _Import:
             columns["bearing_rad"] = (columns["bearing_rad"] - bearing_bias) % (2 * math.pi)
         columns["velocity_mps"] *= -1 if self.options.towards else 1
         columns["span_mps"][columns["span_mps"] <= 0] = np.nan
-        self.note_counts[FILL_NOTE] += remove_fill_velocities(columns, batch.track)
         if (is_invalid := columns["range_m"] <= 0).any():
             self.skipped[term("plots whose range is not above 0")] += int(is_invalid.sum())
-            return batch.rows(np.flatnonzero(~is_invalid).tolist())
-        return batch
+            batch = batch.rows(np.flatnonzero(~is_invalid).tolist())
+        return self._without_fills(batch)
+
+    def _without_fills(self, batch: Batch) -> Batch:
+        """A batch without numbers that stand for none, and without rows whose place they are."""
+        if not batch.track:
+            return batch
+        counts = remove_fills(batch.columns, batch.track)
+        for name in ("bearing_rad", "altitude_m", "velocity_mps"):
+            self.note_counts[FILL_NOTES[name]] += counts[name]
+        if not any(counts[name] for name in FILL_REASONS):
+            return batch
+        is_known = np.ones(len(batch.track), dtype=bool)
+        for name, reason in FILL_REASONS.items():
+            self.skipped[reason] += counts[name]
+            is_known &= np.isfinite(batch.columns.get(name, np.zeros(1)))
+        return batch.rows(np.flatnonzero(is_known).tolist())
 
     def _select_rows(self, batch: Batch) -> Batch:
         """The records of a batch that are requested."""

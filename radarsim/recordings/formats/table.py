@@ -14,6 +14,7 @@ import numpy as np
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import term, tr
+from radarsim.recordings.fill_values import FILL_NUMBERS, fill_notes
 from radarsim.recordings.formats import cell_times, columns, records, table_checks
 from radarsim.recordings.formats.cell_numbers import (
     LARGEST_NUMBER,
@@ -47,7 +48,8 @@ COMMENT_MARKS = ("#", "//")
 BLANKS = " \t\ufeff"  # about a name, with the mark at the beginning of a file that another was added to
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
 MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * KNOT_MPS, 360.0  # of AIS: what is not below them means missing
-UNKNOWN_POSITION, UNKNOWN_DEGREES = (91.0, 181.0), (999.0, 9999.0, 99999.0)  # of AIS, and of other exports
+UNKNOWN_POSITION = (91.0, 181.0)  # of AIS
+UNKNOWN_DEGREES = tuple(number for number in FILL_NUMBERS if number > LARGEST_DEGREES)
 MIDNIGHT_S = 3600.0  # a falling time of day has passed midnight if both are as near it; else a file is sorted by track
 STILL_MPS = 1.0  # below it a position may stay the same
 MAX_CELL_VALUES = 10_000  # different cells in a column that may name aircraft
@@ -88,6 +90,7 @@ class Table:
         self.has_clock_times = False  # times of day or dates were read
         self.is_checked = False  # whether the first batch has been looked at
         self.long_step: tuple[float, str] | None = None  # from row to row, if longer than a scan, and the likely unit
+        self.unknown_bearing_count = 0
         self.largest_bearing = 0.0  # of those beyond a turn, in the unit of its column
         self.flight_level_column = ""  # whose numbers were taken as hundreds of feet
         self.slashed_dates: dict[str, str] = {}  # the first date of 1/2/2024 by what it shows: the order, or nothing
@@ -116,6 +119,7 @@ class Table:
             option = f"--column t_mdy={self.columns['t_s'].name}"
             message = term("{date} is read as day and month; if the month stands first: {cure}")
             lines.append(tr(message, date=self.slashed_dates[""], cure=option))
+        lines += fill_notes({"bearing_rad": self.unknown_bearing_count}, self.records)
         if self.barometric_count:
             lines.append(
                 tr("barometric altitudes, where the geometric one is missing: {count}", count=self.barometric_count)
@@ -231,7 +235,7 @@ class Table:
         if self.is_leap_second:
             self.skipped[LEAP_SECOND_REASON] += 1
             return
-        if any(math.isnan(row[i]) for i in ((0, 1, 2) if self.kind == records.POSITIONS else (0, 1))):
+        if math.isnan(sum(row[: 3 if self.kind == records.POSITIONS else 2])):  # a time and a place
             self.skipped[records.NO_TIME_OR_POSITION] += 1
             return
         for index, values in self.cell_values.items():
@@ -317,6 +321,7 @@ class Table:
         if column is not None and abs(bearing) > 2 * math.pi:
             number = bearing / column.factor
             if round(abs(number), 6) in UNKNOWN_DEGREES and round(abs(number), 6) > turn_of(column.unit):
+                self.unknown_bearing_count += 1
                 return math.nan
             most = 4 * math.pi if not column.unit.startswith("acp") else 2 * math.pi  # counts have no noise
             if not -2 * math.pi <= bearing <= most:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from radarsim.language.numerals import power_of_ten
 from radarsim.language.translate import join_names, list_filters, plural, quote_name, term, tr
 from radarsim.recordings.doppler_scale import doppler_scale_message
-from radarsim.recordings.fill_values import FILL_NOTE
+from radarsim.recordings.fill_values import fill_notes
 from radarsim.recordings.fit import folded_doppler
 from radarsim.recordings.fit.advice import Advice, FilterComparison, Finding, UsedRows
 from radarsim.recordings.fit.fit import OutlierRow
@@ -113,8 +113,7 @@ def _missing_statements(followed: TrackingResult) -> list[Statement]:
     """The missing values of each column, and the filters whose columns the file has not."""
     counts = [tr("{count} of {name}", count=count, name=name) for name, count in followed.missing.items() if count]
     statements = [Statement("missing", ", ".join(counts))] if counts else []
-    if followed.fills:
-        statements.append(Statement("", tr(FILL_NOTE, count=followed.fills, all=followed.rows)))
+    statements += [Statement("", note) for note in fill_notes(followed.fills, followed.rows)]
     for name, columns in followed.filters_without_plots.items():
         fields = {"name": quote_name(name), "columns": join_names(columns)}
         text = tr("{name} used no plot, because it needs {columns}: predictions only", **fields)

@@ -35,6 +35,60 @@ def test_velocities_that_stand_for_none_are_left_out(tmp_path, header, fills):
     assert len(columns["range_m"]) == N
 
 
+COLUMNS = {"range_m": 1, "azimuth_deg": 2, "altitude_m": 3}
+FILLS = [
+    *(("range_m", number, 12) for number in ("65535", "99999", "32767", "9999.99", "4711.5")),
+    *(("azimuth_deg", number, 12) for number in ("0", "-1", "200", "999", "65535")),
+    *(("altitude_m", number, 12) for number in ("0", "32767", "-1000")),
+    *(("range_m", "99999", 2), ("range_m", "4711", 3)),
+]
+
+
+def plots(fills, column, number):
+    """Lines of plots, in some rows of which a number stands in a column, for no value."""
+    r = courses()[0] + 5000
+    rng = np.random.default_rng(5)
+    rows = [[f"{t}", f"{a:.1f}", f"{60 + 0.01 * t + rng.normal(0, 0.1):.3f}", f"{9000 + rng.normal(0, 5):.0f}"]
+            for t, a in zip(T, r, strict=True)]  # fmt: skip
+    for row in fills:
+        rows[row][COLUMNS[column]] = number
+    return "\n".join(["time,range_m,azimuth_deg,altitude_m", *map(",".join, rows), ""]).encode()
+
+
+@pytest.mark.parametrize(("column", "number", "count"), FILLS)
+def test_numbers_that_stand_for_none_are_left_out_of_each_column(tmp_path, column, number, count):
+    fills = range(3, 3 + 4 * count, 4)
+    done, columns, _ = imported(tmp_path, plots(fills, column, number))
+    if column == "range_m":
+        assert done.skipped == [f"rows whose range stands for none, as 65535 again and again ({count})"]
+        np.testing.assert_array_equal(columns["t_s"], np.delete(T, fills))
+    else:
+        name = {"azimuth_deg": "bearing_rad"}.get(column, column)
+        assert np.flatnonzero(np.isnan(columns[name])).tolist() == list(fills)
+        assert any(f"again and again: {count} of 60; they are left out" in note for note in done.notes)
+
+
+@pytest.mark.parametrize("kind", ["stands", "cells", "two places", "lands", "levels"])
+def test_numbers_that_repeat_near_others_are_values(tmp_path, kind):
+    """A target at rest, coarse cells, two targets under one name, and an aircraft that lands in a gap."""
+    r, height = courses()[0], np.full(N, 9000.0)
+    if kind == "stands":
+        r = np.full(N, 5000.0)
+    elif kind == "cells":
+        r = 600 * np.round(r / 600)
+    elif kind == "two places":
+        r = np.where(np.random.default_rng(3).random(N) < 0.3, 5000.0, 7000.0)
+    elif kind == "lands":
+        height = np.where(T < 200, 9000.0, 0.0)
+    else:
+        height = np.where((T > 100) & (T < 200), 6000.0, 9000.0)
+    rows = (f"{t},{a},{h}" for t, a, h in zip(T, r, height, strict=True))
+    done, columns, _ = imported(tmp_path, "\n".join(["time,range_m,altitude_m", *rows]).encode())
+    np.testing.assert_array_equal(columns["range_m"], r)
+    np.testing.assert_array_equal(columns["altitude_m"], height)
+    assert not any("stand for none" in note for note in done.notes)
+
+
 @pytest.mark.parametrize("kind", ["stops", "passes", "rounded"])
 def test_a_velocity_of_zero_is_one_where_the_ranges_say_so(tmp_path, kind):
     """A car that stops, a target that turns back, and one whose slow velocity is rounded."""
