@@ -33,6 +33,7 @@ CONFIGS = {  # config, overrides, filter
     "sonar": ("sonar_smoothing", (), None),
     "multimodel": ("multimodel_1hz", (), None),
     "ambiguous_doppler": ("ambiguous_rls2", (), None),
+    "plane": ("plane", (), None),
 }
 SHARES = 0.001, 0.01, 0.1
 SIZES = 3.0, 10.0, 100.0, 1e5

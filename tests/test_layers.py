@@ -107,10 +107,14 @@ ROOMS = {
         *("studies.step_checks", "studies.step_plan", "studies.step_programs", "studies.stepwise"),
     ),
     "studies.step_likelihood": (
-        *("kernels", "studies.error_law", "studies.missed_scans", "studies.recording_interface", "studies.step_checks"),
+        *("kernels", "studies.error_law", "studies.gross_errors", "studies.missed_scans"),
+        *("studies.recording_interface", "studies.step_checks", "studies.step_laws"),
         *("studies.step_likelihood_programs", "studies.step_programs", "studies.stepwise", "user_code.errors"),
     ),
-    "studies.step_likelihood_programs": ("kernels", "studies.step_checks", "studies.step_programs", "studies.stepwise"),
+    "studies.step_laws": ("kernels", "studies.error_law"),
+    "studies.step_likelihood_programs": (
+        *("kernels", "studies.step_checks", "studies.step_programs", "studies.stepwise", "user_code.errors"),
+    ),
     "studies.step_plan": (
         *("config.experiment", *SUMS, "kernels", "studies.noise", "studies.step_checks", "studies.step_programs"),
         *("studies.stepwise", "user_code.errors"),

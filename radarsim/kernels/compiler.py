@@ -1,5 +1,5 @@
-"""How kernels are compiled: `kernel`, `careful_kernel`, `summing_kernel` for Python, `inline`, `kernel_part` for other
-kernels.
+"""How kernels are compiled: `kernel`, `careful_kernel`, `summing_kernel` for Python, `inline`, `kernel_part`,
+`careful_part` for other kernels.
 
 Kernels are compiled by `numba_internals` where Numba's private half is the one that is known, otherwise by
 `numba_options`; then `troubles` has a line for the user. Python calls an `inline` function as the plain function that
@@ -22,6 +22,7 @@ from radarsim.kernels.kalman_algebra import Formula
 KNOWN_RELEASES = (0, 60), (0, 68)
 # No `reassoc` (part of fastmath=True): it folds rounding tricks such as (x + M) - M and changes the order of sums.
 FAST_MATH_FLAGS = frozenset({"contract", "arcp", "nsz", "nnan", "ninf"})
+FLAGS_OF_ANY_NUMBER = FAST_MATH_FLAGS - {"nnan", "ninf"}
 
 inline = Formula  # copied into each kernel that calls it
 
@@ -38,7 +39,12 @@ def kernel(function: Callable):
 
 def careful_kernel(function: Callable):
     """As `kernel`, of numbers that need not be finite."""
-    return COMPILER.compile_kernel(function, FAST_MATH_FLAGS - {"nnan", "ninf"})
+    return COMPILER.compile_kernel(function, FLAGS_OF_ANY_NUMBER)
+
+
+def careful_part(function: Callable):
+    """As `kernel_part`, of numbers that need not be finite."""
+    return COMPILER.compile_part(function, FLAGS_OF_ANY_NUMBER)
 
 
 def summing_kernel(function: Callable):

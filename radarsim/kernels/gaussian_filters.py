@@ -167,6 +167,14 @@ def mix(first: State, second: State, p: Any) -> State:
     return x, tuple(p * i + q * j + p * q * k for i, j, k in zip(P, Q, outer_square(d), strict=True))
 
 
+def mix_pairs(pair: tuple[State, State, Any], other: tuple[State, State, Any], p: Any) -> tuple[State, State, Any]:
+    """The states of two models and the probability of the first, of two such pairs with the probabilities p and 1 - p:
+    each model's by their moments."""
+    (first, second, q), (other_first, other_second, other_q) = pair, other
+    own = p * q + (1 - p) * other_q
+    return mix(first, other_first, p * q / own), mix(second, other_second, p * (1 - q) / (1 - own)), own
+
+
 def share_states(first: State, second: State, p: Any, stay: Any) -> tuple[State, State, Any]:
     """The states with which two models go on that change with the probability 1 - stay, and that of the first."""
     own = stay * p + (1 - stay) * (1 - p)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     import numpy as np
 
+CLEAR_RISE = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
 OUTLIERS, BIAS, CORRELATION, MANOEUVRES = EXPLANATIONS = ("outliers", "bias", "correlation", "manoeuvres")
 
 

@@ -7,7 +7,7 @@ from threading import RLock
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from radarsim.errors import ConfigError
-from radarsim.studies.error_law import STATED_ERRORS, ErrorLaw
+from radarsim.studies.error_law import CLEAR_RISE, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.plot_arrays import TRUTH_PREFIX, UNITS_IN_NAMES, DrawPlots, SimulatedPlots
 
 if TYPE_CHECKING:
@@ -118,6 +118,20 @@ class Likelihood(Protocol):
         """The same for the keys alone, summed for each number of a plot, by its column; NaN where it is unknown."""
 
 
+FEW_OUTLIERS = ErrorLaw(outliers=0.01)
+
+
+def likeliest(likelihoods: "Sequence[Likelihood]") -> Likelihood:
+    """The filter that predicts the plots best with its stated keys; where they plainly have outliers, apart from
+    these."""
+    best = max(likelihoods, key=lambda likelihood: sum(likelihood.by_number(likelihood.stated).values()))
+    if not all(OUTLIERS in likelihood.explains for likelihood in likelihoods):
+        return best
+    if best(best.stated, FEW_OUTLIERS) <= best(best.stated) + CLEAR_RISE:
+        return best
+    return max(likelihoods, key=lambda likelihood: likelihood(likelihood.stated, FEW_OUTLIERS))
+
+
 def track_batches(tracks: "Iterable[Item]", row_count: "Callable[[Item], int]") -> "Iterator[list[Item]]":
     """Tracks in batches of about BATCH_ROWS rows: one call of a kernel for each of many short tracks would take most of
     the time, and arrays of all rows too much memory."""
@@ -219,7 +233,7 @@ class RecordingInterface(ABC):
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
     ) -> "Likelihood | None":
-        """The likelihood of tracks, columns (n,) each, under a filter, by default that which uses most of a plot.
+        """The likelihood of tracks, columns (n,) each, under a filter, by default one that uses most of a plot.
 
         Default: not known; `radarsim fit` refuses its configs."""
         return None

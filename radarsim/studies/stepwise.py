@@ -21,6 +21,8 @@
         def covariance(s, u, c): …                  # their packed covariance, or None
         def log_densities(s, z, u, c): …            # of a plot's first number, of the first two, … by the state before
         def innovation(s, z, u, c): …               # of a plot, with its packed covariance, or None
+        sigma_field = "sigma"                       # of the numbers: σ of what is measured, a tuple; noise_field: those
+        def merge(s, other, p, c): …                # of the process noise; a state of two, with probabilities p, 1 - p
 
 These are plain functions of numbers, tuples and named records; what calculates with numbers of a realisation is in
 `radarsim.kernels.tracing` (`sqrt`, `where`, …) and `radarsim.kernels.formula_functions` (`sin`, `atan2`, …). A state, a
@@ -81,6 +83,9 @@ class Steps:
     innovation: Callable[[Any, Any, Any, Any], tuple[Any, Any]] | None = None
     counts: Callable[[Any, Any, Any], tuple[Any, ...]]
     gate: Callable[[Any, Any, Any], tuple[float, ...]]
+    sigma_field: str | None = None
+    noise_field: str | None = None
+    merge: Callable[[Any, Any, Any, Any], Any] | None = None
 
 
 class StepStudy(OneFile):
@@ -231,6 +236,7 @@ class StepStudy(OneFile):
     def likelihood(
         self, case: "Case", filter_name: str | None, tracks: "Sequence[Mapping[str, np.ndarray]]"
     ) -> "Likelihood | None":
+        from radarsim.studies.recording_interface import likeliest
         from radarsim.studies.step_likelihood import StepLikelihood
 
         usable = [
@@ -243,7 +249,10 @@ class StepStudy(OneFile):
         ]
         if not usable or self.known_columns or self.false_places(case.spec):
             return None
-        return StepLikelihood(self, case.spec, max(usable, key=lambda keys: len(self.columns(case.spec, keys))), tracks)
+        most = max(len(self.columns(case.spec, keys)) for keys in usable)
+        likelihoods = [StepLikelihood(self, case.spec, keys, tracks) for keys in usable]
+        likelihoods = [likelihood for likelihood in likelihoods if len(likelihood.columns) == most]
+        return likelihoods[0] if len(likelihoods) == 1 else likeliest(likelihoods)
 
     def tracker(self, case: "Case") -> "Tracker":
         from radarsim.studies.step_tracker import Tracker

@@ -24,6 +24,7 @@ from radarsim.recordings.report import tables
 from radarsim.recordings.tracking_result import START_ESTIMATES, TrackingResult
 from radarsim.report.quantities import Component
 from radarsim.studies import step_blocks
+from radarsim.studies.error_law import ErrorLaw
 from radarsim.studies.onefile import MeasuredColumn
 from radarsim.studies.stepwise import Steps, StepStudy
 from tests.tolerances import assert_rounded, column_sizes, mean_error, sigma_error
@@ -539,3 +540,21 @@ def test_the_likelihood_is_exact_and_impossible_where_a_filter_has_no_state():
         x, P = x + (1 - 9.0 / S) * (z - x), 9.0 * (1 - 9.0 / S)
     assert likelihood(np.array([3.0])) == pytest.approx(total, rel=1e-12)
     assert likelihood(np.array([0.5])) == -math.inf
+
+
+def test_a_filter_that_merges_states_says_which_of_its_numbers_are_sigma():
+    class Merging(Likely):
+        sigma_field = "sigma"
+
+        def merge(s, other, p, c):
+            return s
+
+    class Mixed(Fitted):
+        kinds = {"kalman": Merging, "halves": Halves}  # noqa: RUF012
+
+    study = Mixed()
+    case = case_of(study, ("kalman",), sigma_x_m=2.0)
+    likelihood = study.likelihood(case, None, [study.recording_interface().drawing(case)(0, 1).rows(0)])
+    assert likelihood.explains == ("outliers",)
+    with pytest.raises(ConfigError, match="must give sigma, a tuple of σ of the 1 measured"):
+        likelihood(likelihood.stated, ErrorLaw(outliers=0.01))

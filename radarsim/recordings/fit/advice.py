@@ -41,7 +41,7 @@ from radarsim.recordings.track_jumps import CourseFault, column_fault
 from radarsim.recordings.tracking_result import TrackingResult
 from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, ErrorLaw
 from radarsim.studies.missed_scans import without_empty_rows
-from radarsim.studies.recording_interface import Likelihood, TurnError
+from radarsim.studies.recording_interface import Likelihood, TurnError, likeliest
 
 FALSE_FINDING_LEVEL = 0.05  # of a false finding
 MAX_FINDINGS = 3
@@ -243,11 +243,11 @@ def compare_filters(likelihoods: Sequence[Likelihood]) -> FilterComparison:
     totals = {name: sum(sums[number] for number in common) for name, sums in sums.items()}
     best_name = max(totals, key=lambda name: totals[name])
     column_count = max(len(sums) for sums in sums.values())
-    full_sums = {name: sum(sums.values()) for name, sums in sums.items() if len(sums) == column_count}
+    full_likelihoods = [likelihood for likelihood in likelihoods if len(sums[likelihood.filter]) == column_count]
     return FilterComparison(
         best_name,
         {name: totals[best_name] - total for name, total in totals.items()},
-        max(full_sums, key=full_sums.__getitem__),
+        likeliest(full_likelihoods).filter,
     )
 
 

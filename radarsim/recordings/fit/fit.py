@@ -32,12 +32,7 @@ from radarsim.recordings.fit.likelihood_slice import (
     single_explanations,
 )
 from radarsim.recordings.fit.profile_intervals import FittedKey, ProfileIntervals
-from radarsim.recordings.fit.profile_search import (
-    CLEAR_RISE,
-    EXPLANATION_EVALUATIONS,
-    LikelihoodSearch,
-    follows_another_law,
-)
+from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, LikelihoodSearch, follows_another_law
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
 from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
 from radarsim.recordings.rounding_guard import LOSS_GAP_PERIODS, gap_message
@@ -45,7 +40,15 @@ from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
 from radarsim.recordings.target_speed import impossible_column_speed, speed_message, unreachable_rows
 from radarsim.recordings.track_jumps import column_fault, column_positions
-from radarsim.studies.error_law import CORRELATION, MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw, OutlierLaw
+from radarsim.studies.error_law import (
+    CLEAR_RISE,
+    CORRELATION,
+    MANOEUVRES,
+    OUTLIERS,
+    STATED_ERRORS,
+    ErrorLaw,
+    OutlierLaw,
+)
 from radarsim.studies.missed_scans import without_empty_rows
 from radarsim.studies.recording_interface import Likelihood
 
@@ -183,7 +186,7 @@ class FileLikelihoods(NamedTuple):
 def file_likelihoods(
     experiment: Experiment, source: str | os.PathLike, filter_name: str | None = None
 ) -> FileLikelihoods:
-    """The likelihoods of a filter of an experiment's one case over a file; without a name, of the filter that takes
+    """The likelihoods of a filter of an experiment's one case over a file; without a name, of one of those that take
     most columns of a plot. Raises ConfigError."""
     case = single_case(experiment, "fit", f"radarsim fit {{}} {os.fspath(source)}")
     refuse_inherited_part(case, "likelihood")
@@ -214,7 +217,8 @@ def file_likelihoods(
         )
     _refuse_gross_errors(source, likelihood, {name or "": tracks[name] for name in names})
     _refuse_lost_digits(source, case, likelihood, long_tracks)
-    rough = interface.likelihood(case, filter_name, sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked)))
+    sample = sample_rows(long_tracks, min(ROUGH_ROWS, interface.rows_asked))
+    rough = interface.likelihood(case, likelihood.filter, sample)
     return FileLikelihoods(likelihood, rough, names, doubles, fills)
 
 

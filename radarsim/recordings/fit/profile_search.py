@@ -21,7 +21,7 @@ from radarsim.recordings.fit.newton_steps import (
     Curvature,
     polish_maximum,
 )
-from radarsim.studies.error_law import ErrorLaw, OutlierLaw
+from radarsim.studies.error_law import CLEAR_RISE, ErrorLaw, OutlierLaw
 from radarsim.studies.recording_interface import Likelihood
 
 # likelihood evaluations of a key to the maximum and to an end; of an explanation
@@ -48,7 +48,6 @@ EXPECTED_NEAR_SHARE = 0.1
 FIRST_OUTLIER_SHARE = 0.03  # where the search of either begins
 MAX_PLAUSIBLE_OUTLIERS = 0.3  # of numbers that may be far outliers; with more, the errors follow another law
 PLAIN_PROBABILITY, MAX_PLAIN_PART = 0.9, 0.5  # of a plain outlier; of a law's outliers that are plain, else it is real
-CLEAR_RISE = 5.4138  # gain of the log-likelihood by chance in one recording of 1000: half that point of chi-square
 MIN_NEAR_WIDTH, MAX_NEAR_WIDTH = 3.0, 100.0  # of near outliers, in σ
 MIN_NEAR_SIGMAS = 0.5  # of their offset or spread: less is none
 # share, offset and spread from which near outliers are searched

@@ -150,6 +150,7 @@ class Tracking(Steps):
     the gate had a plot at the last scans, and the scan."""
 
     design = design
+    sigma_field, noise_field = "sigma", "noise"
 
     def start(z, u, c):
         velocity, sigma, rho = (z[2], c.sigma, c.rho) if c.first else (0.0, (*c.sigma[:2], c.start[0]), 0.0)
@@ -194,6 +195,10 @@ class Tracking(Steps):
         laws = [expected_plot(state, c) for state in states]
         by_model = [gaussian_filters.log_densities(plot_difference(z, mean, c.span), S) for mean, S, _ in laws]
         return [log(maximum(dot(weights, [exp(a) for a in logs]), 1e-300)) for logs in zip(*by_model, strict=True)]
+
+    def merge(s, other, p, c):
+        mix = gaussian_filters.mix_pairs if c.kind == "imm" else gaussian_filters.mix
+        return mix(s[0], other[0], p), s[1]
 
     def innovation(s, z, u, c):
         mean, S, _ = expected_plot(moments(s, c), c)

@@ -1,10 +1,12 @@
-"""The likelihood of recorded plots of the plane: against its steps in plain Python."""
+"""The likelihood of recorded plots of the plane: against its steps in plain Python, each law of errors by itself."""
 
 import math
 
 import numpy as np
 import pytest
 
+from radarsim.recordings.fit import advice, fit
+from radarsim.studies.error_law import MANOEUVRES, OUTLIERS, ErrorLaw, OutlierLaw
 from radarsim.studies.missed_scans import missed_scan_times
 from radarsim.studies.registry import study
 from radarsim.studies.step_checks import record
@@ -81,3 +83,168 @@ def test_the_compiled_likelihood_is_that_of_the_steps(filter_keys, rate_hz):
         assert likelihood(values) == pytest.approx(densities[-1], rel=1e-9)
         by_number = list(likelihood.by_number(values).values())
         np.testing.assert_allclose(np.cumsum(by_number), densities, rtol=1e-9)
+
+
+LAW = OutlierLaw(near=0.05, far=0.02, offset=4.0, spread=2.0)
+HARD, FAR = 0.1, (10.0, 6)  # share of hard manoeuvres, ten times as large; least width of far outliers, widths
+
+
+def laws_of(sigma, spans):
+    """All laws of the errors of a plot: probability, σ and shift of each number, which are outliers, factor on the
+    process noise."""
+    m = len(spans)
+    least, count = FAR
+    far = [
+        [least * s * max(r / (least * s), 1) ** (i / (count - 1)) for i in range(count)]
+        for s, r in zip(sigma, spans, strict=False)
+    ]
+    near, wide = math.hypot(LAW.offset, LAW.spread, 1), math.hypot(LAW.spread, 1)
+    none, rest, all_numbers = (0.0,) * 3, sigma[m:], set(range(m))
+    laws = [(1 - LAW.near - LAW.far, sigma, none, set()), (LAW.near, tuple(near * s for s in sigma), none, all_numbers)]
+    laws += [(LAW.far / count, (*widths, *rest), none, all_numbers) for widths in zip(*far, strict=True)]
+    for j in range(m):
+        unit = np.eye(3)[j]
+        widened = [(LAW.near / 2, wide * sigma[j], side * LAW.offset * sigma[j]) for side in (1, -1)]
+        widened += [(LAW.far / count, width, 0.0) for width in far[j]]
+        laws += [
+            (p, tuple(np.where(unit, width, sigma).tolist()), tuple((shift * unit).tolist()), {j})
+            for p, width, shift in widened
+        ]
+    total = sum(law[0] for law in laws)
+    return [((1 - HARD) * p / total, *law, 1.0) for p, *law in laws] + [(HARD, sigma, none, set(), 10.0)]
+
+
+def merged(states, weights):
+    """States (x, P), or of two models with the probability of the first, merged by moments."""
+    if len(states[0]) == 3:
+        shares = np.array([state[2] for state in states])
+        probability = float(weights @ shares)
+        first = merged([state[0] for state in states], weights * shares / probability)
+        second = merged([state[1] for state in states], weights * (1 - shares) / (1 - probability))
+        return first, second, probability
+    means = np.array([state[0] for state in states])
+    x, upper = weights @ means, np.triu_indices(means.shape[1])
+    spread = np.array([np.outer(mean - x, mean - x)[upper] for mean in means])
+    P = weights @ (np.array([state[1] for state in states]) + spread)
+    return tuple(x.tolist()), tuple(P.tolist())
+
+
+def enumerated(case, keys, track, spans, c):
+    """The log-density of all plots but the first of a track, and the soundness of each row, by all laws."""
+    steps, s, last, total = study("plane").kinds[keys.kind], None, math.nan, 0.0
+    m, laws, soundness = len(spans), laws_of(c.sigma, spans), []
+    chance = 2 / (1 + m * LAW.share)
+    sizes = LAW.near * (LAW.offset**2 + LAW.spread**2) + LAW.far * (FAR[0] ** 2 - 1)
+    start_factor = math.sqrt(1 + chance * sizes)
+    for t, *z in zip(*(track[name].tolist() for name in ("t_s", *NAMES)), strict=True):
+        soundness.append(np.where(np.isfinite(z[:m]), 1.0, np.nan))
+        if s is None:
+            if np.isfinite(z[:m]).all():
+                s, last = steps.start(z, (), c._replace(sigma=tuple(start_factor * a for a in c.sigma))), t
+            continue
+        missed = missed_scan_times(last, t, case.spec.radar.scan_period_s)
+        for time in missed:
+            s, last = steps.predict(s, time - last, (), c), time
+        dt, last = t - last, t
+        if not np.isfinite(z[:m]).all():
+            s = steps.predict(s, dt, (), c)
+            continue
+        logs, states = [], []
+        for p, sigma, shift, _, hard in laws:
+            before = steps.predict(s, dt, (), c._replace(noise=tuple(hard * a for a in c.noise)))
+            law, plot = c._replace(sigma=sigma), tuple(a - b for a, b in zip(z, shift, strict=True))
+            logs.append(math.log(p) + steps.log_densities(before, plot, (), law)[-1])
+            states.append(steps.update(before, plot, (), law))
+        log_density = np.logaddexp.reduce(logs)
+        weights = np.exp(np.array(logs) - log_density)
+        soundness[-1] = [1 - sum(w for w, law in zip(weights, laws, strict=True) if j in law[3]) for j in range(m)]
+        total, s = total + log_density, (merged([state[0] for state in states], weights), s[1])
+    return total, np.array(soundness)
+
+
+@pytest.mark.slow_cases_except("extended velocity Vr")
+@pytest.mark.parametrize("filter_keys", FILTERS, ids=lambda keys: keys["name"])
+def test_the_laws_of_errors_are_weighed_and_merged_as_one_by_one(filter_keys):
+    case = case_of([filter_keys], STRAIGHT, 15)
+    (keys,), tracks = case.spec.filters, tracks_of(case)
+    tracks[1]["range_m"][4] += 300.0
+    tracks[1]["bearing_rad"][8] += 1.0
+    likelihood = StepLikelihood(study("plane"), case.spec, keys, tracks)
+    law, columns = ErrorLaw(outlier_laws=(LAW,), manoeuvres=HARD), study("plane").columns(case.spec, keys)
+    spans = [
+        np.ptp(column[np.isfinite(column)])
+        for name in columns
+        for column in [np.concatenate([t[name] for t in tracks])]
+    ]
+    c = numbers_of(case, keys, np.ones(len(likelihood.keys)))
+    expected = [enumerated(case, keys, track, spans, c) for track in tracks]
+    assert likelihood(likelihood.stated, law) == pytest.approx(sum(total for total, _ in expected), rel=1e-9)
+    for (_, wanted), given in zip(expected, likelihood.soundness(likelihood.stated, law), strict=True):
+        np.testing.assert_allclose(np.transpose([given[name] for name in columns]), wanted, atol=1e-9)
+
+
+def with_outlier(error=6e4, row=30, scans=60, name="range_m"):
+    """The likelihood of a flight on one course, whose plot in a row is off, and that of the sound flight."""
+    case = case_of([member("extended")], STRAIGHT, scans, detection_probability=1.0)
+    sound = recording(case, 1)
+    spoiled = sound | {name: sound[name] + error * (np.arange(scans) == row)}
+    plots = study("plane").recording_interface()
+    return plots.likelihood(case, None, [spoiled]), plots.likelihood(case, None, [sound]), float(sound["t_s"][row])
+
+
+def test_an_outlier_is_named_and_leaves_sigma_alone():
+    """Of one range 60 km off in 60 rows."""
+    spoiled, sound, t_s = with_outlier()
+    found, wanted = fit.fit_likelihood(spoiled), fit.fit_likelihood(sound)
+    assert [(row.t_s, row.column) for row in found.outlier_rows] == [(t_s, "range_m")]
+    assert wanted.outlier_rows == ()
+    assert wanted.plain is None
+    for key, sound_key in zip(found.keys[:3], wanted.keys[:3], strict=True):
+        assert key.lo < key.stated < key.hi
+        assert key.value == pytest.approx(sound_key.value, rel=0.05)
+
+
+@pytest.mark.slow
+def test_one_outlier_of_a_thousand_is_named():
+    spoiled, _, t_s = with_outlier(row=500, scans=1000)
+    found = fit.fit_keys(spoiled, (OUTLIERS,))
+    assert [(row.t_s, row.column) for row in found.outlier_rows] == [(t_s, "range_m")]
+    assert all(key.lo < key.stated < key.hi for key in found.keys[:3])
+
+
+@pytest.mark.parametrize("row", [0, 1, 20, 39])
+@pytest.mark.parametrize(("name", "error"), [("range_m", 6e4), ("range_m", 6e6), ("bearing_rad", 1.0)])
+def test_an_outlier_is_found_in_any_row(name, error, row):
+    likelihood, _, t_s = with_outlier(error, row, 40, name)
+    rows = fit.find_outlier_rows(likelihood, likelihood.stated, ErrorLaw(outliers=0.01))
+    assert [(found.t_s, found.column) for found in rows] == [(t_s, name)]
+
+
+def test_a_turn_is_no_outlier():
+    """Where a filter of constant velocity meets a turn of 2 g, a hard manoeuvre explains the plots, not outliers."""
+    case = case_of([member("extended", doppler=False)], scans=60)
+    likelihood = study("plane").recording_interface().likelihood(case, None, [recording(case, 2)])
+    assert likelihood.explains == (OUTLIERS, MANOEUVRES)
+    found = fit.fit_likelihood(likelihood)
+    assert found.outlier_rows == ()
+
+
+def test_the_likeliest_of_the_filters_that_take_most_of_a_plot_is_fitted():
+    turning = member("imm", "turn")
+    case = case_of([member("extended", doppler=False), member("extended"), turning], scans=40)
+    columns = recording(case, 0)
+    columns["range_m"][30] += 1e5
+    plots = study("plane").recording_interface()
+    assert plots.likelihood(case, None, [columns]).filter == turning["name"]
+    extended = plots.likelihood(case, "extended velocity Vr", [columns])
+    assert extended.filter == "extended velocity Vr"
+    likelihoods = [extended, plots.likelihood(case, turning["name"], [columns])]
+    assert advice.compare_filters(likelihoods).most_columns == turning["name"]
+
+
+@pytest.mark.slow
+def test_advice_names_an_outlier_before_a_sigma():
+    likelihood, _, t_s = with_outlier()
+    findings = advice.find_errors(likelihood)
+    assert findings[0].name == OUTLIERS
+    assert [(row.t_s, row.column) for row in findings[0].rows] == [(t_s, "range_m")]
