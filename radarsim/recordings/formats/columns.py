@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from radarsim.errors import ConfigError
 from radarsim.language.translate import tr
+from radarsim.recordings.formats import wide_tables
 from radarsim.recordings.formats.cell_numbers import hemisphere_sign, split_hemisphere, unit_of_cells
 from radarsim.recordings.formats.column_suggestions import cell_number, name_by_cells, suggest_options
 from radarsim.recordings.formats.units import (
@@ -126,6 +127,11 @@ IDENTITIES = {  # what identifies an aircraft or a ship, by the names of columns
     "callsign": ("callsign", "flight"),
     "mode_3a": ("squawk", "mode_3a", "mode3a", "ssr"),
 }
+SENSOR_NAMES = (  # of a column that says which sensor has measured a plot
+    *("radar", "radar_id", "radar_name", "radar_no", "sensor", "sensor_id", "sensor_name", "sensor_no", "site"),
+    *("site_id", "station", "station_id", "source", "source_id", "receiver", "receiver_id", "sac/sic", "sac_sic"),
+    *("sic", "quelle", "standort", "рлс", "радар", "станция", "датчик", "сенсор", "источник", "номер_рлс"),
+)
 UNITLESS = ("t_s", "date", "track")  # what a bracket says of these is no unit: Time (UTC)
 EARTH_COLUMNS = ("latitude_deg", "longitude_deg")
 PLOT_COLUMNS = ("range_m", "bearing_rad")
@@ -179,6 +185,8 @@ class Header:
         self.overruled: list[tuple[str, str, str]] = []  # names of columns, the unit that the user states, their own
         self.unknown_units: dict[str, str] = {}  # of columns found, by quantity
         self._assign_columns(assigned)
+        if not any(ours in self.columns for ours in wide_tables.PLACES) and (fault := self._wide_table_fault()):
+            raise ConfigError(f"{path}:1: {fault}")
         has_positions = all(self._has(ours) or JOINT_POSITION in dict(self.stems) for ours in EARTH_COLUMNS)
         self.reads_positions = has_positions and not any(ours in self.columns for ours in PLOT_COLUMNS)
         self._find_columns(has_positions)
@@ -189,9 +197,14 @@ class Header:
         self.identities = {kind: indices[0] for kind, indices in identity_columns.items() if indices}
         self.o_sign = self._find_o_sign() if self.reads_positions and "longitude_deg" in self.columns else math.nan
         self.hemispheres = self._find_hemispheres()
+        self.sensor_index = next((places[name] for name in SENSOR_NAMES if name in places), None)
         if "track" in self.columns and not self.identities:
             self.identities["address"] = self.columns["track"].position  # one's own name of it
         self._check()
+
+    def _wide_table_fault(self) -> str:
+        """That columns are of several targets; '' where they are not."""
+        return wide_tables.wide_table_fault(self.names, self.sample, known_names, _name_with_unit, QUANTITIES)
 
     def _has(self, ours: str) -> bool:
         """Whether a quantity has been assigned, or has a known name."""
@@ -290,7 +303,9 @@ class Header:
         """A column in its unit; '' where neither its name nor the user states one."""
         name, quantity = self.names[index], QUANTITIES[ours]
         if self.names.count(name) > 1:
-            raise ConfigError(f"{self.path}:1: {name}: must be the name of one column; several have it")
+            raise ConfigError(
+                f"{self.path}:1: {name}: must be the name of one column; several have it: give each a name of its own"
+            )
         if not unit and ours not in UNITLESS:
             unit = unit_of_cells([row[index].strip() for row in self.sample if index < len(row)], quantity.units)
         is_known = unit in quantity.units or ours in UNITLESS

@@ -8,6 +8,7 @@ has several. Assumptions are in `notes`."""
 import math
 import re
 import shlex
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
@@ -56,6 +57,7 @@ MAX_CELL_VALUES = 10_000  # different cells in a column that may name aircraft
 MAX_LIKELY_TURNS = 3  # units of bearings that are named
 NOISE_TURNS = 1 + 10 / 360  # up to which a bearing beyond north is noise
 MAX_ALTITUDE_M = 20_000.0  # of an aircraft; higher altitudes are feet
+MAX_LISTED = 5  # sensors
 LEAP_SECOND_REASON = term("rows in a leap second (23:59:60), which seconds from 1970 do not count")
 
 
@@ -94,12 +96,15 @@ class Table:
         self.largest_bearing = 0.0  # of those beyond a turn, in the unit of its column
         self.flight_level_column = ""  # whose numbers were taken as hundreds of feet
         self.slashed_dates: dict[str, str] = {}  # the first date of 1/2/2024 by what it shows: the order, or nothing
+        used_indices = {column.position for column in self.columns.values()}
+        sensor = self.header.sensor_index
+        self.sensor_index = -1 if sensor is None or self.kind == records.POSITIONS or sensor in used_indices else sensor
+        self.sensors: Counter[str] = Counter()
         self.last_positions: dict[str, tuple[float, ...]] = {}  # the last position of each track
         self.has_joint_position = (
             len({self.columns[ours].position for ours in EARTH_COLUMNS if ours in self.columns}) == 1
         )
         self.text_indices = {kind: index for kind, index in self.header.identities.items() if kind != "address"}
-        used_indices = {column.position for column in self.columns.values()}
         candidates = [] if "track" in self.columns else [i for i in range(self.width) if i not in used_indices]
         self.cell_values: dict[int, set[str]] = {i: set() for i in candidates}  # of columns that may name the aircraft
 
@@ -148,10 +153,27 @@ class Table:
             option = f"--column bearing_gon={shlex.quote(bearing.name)}"
             message = term("bearings up to {largest:.1f}° are read as beyond a turn; if they are in gon: {option}")
             lines.append(tr(message, largest=self.largest_bearing, option=option))
-        if likely := self._likely_track_columns():
+        if sensors_note := self._sensors_note():
+            lines += sensors_note
+        elif likely := self._likely_track_columns():
             lines.append(tr("no column identifies the tracks, all rows are taken as one; if a column does, "
                             "--column track=THEIRS; it may be: {likely}", likely=likely))  # fmt: skip
         return lines
+
+    def _sensors_note(self) -> list[str]:
+        """A note on a column of sensors that is not used, if it has several values."""
+        if len(self.sensors) < 2:
+            return []
+        name, first = self.header.names[self.sensor_index], next(iter(self.sensors))
+        listed = ", ".join(f"{sensor or '-'} ({count})" for sensor, count in self.sensors.most_common(MAX_LISTED))
+        if "track" in self.columns:
+            message = term("plots of several sensors, by {name} (rows): {listed}; their tracks of one name are taken "
+                           "as one: import each sensor from a file of its own")  # fmt: skip
+            return [tr(message, name=name, listed=listed)]
+        option = f"--column track={shlex.quote(name)}"
+        message = term("plots of several sensors, by {name} (rows): {listed}; they are taken as one track: {option} "
+                       "makes one of each, with --track {first} of that alone")  # fmt: skip
+        return [tr(message, name=name, listed=listed, option=option, first=shlex.quote(first))]
 
     def _likely_track_columns(self) -> str:
         """The columns that may identify the aircraft, if none is known: each value is in two rows on average."""
@@ -248,6 +270,8 @@ class Table:
                 self.skipped[term("rows that repeat the position before them")] += 1
                 return
             self.last_positions[name] = row[1:3]
+        if self.sensor_index >= 0 and len(self.sensors) < MAX_CELL_VALUES:
+            self.sensors[cells[self.sensor_index].strip()] += 1
         address_index = self.header.identities.get("address")
         address = "" if address_index is None else cells[address_index].strip().lower()
         builder.add(name, address, row, tuple(cells[index].strip() for index in self.text_indices.values()))
