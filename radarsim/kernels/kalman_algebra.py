@@ -232,22 +232,15 @@ def inverse(P):
     d1 = P[3] - l10 * P[1]
     m = P[4] - l10 * P[2]
     l21 = m / d1
-    i = 1.0 / P[0], 1.0 / d1, 1.0 / (P[5] - l20 * P[2] - l21 * m)
-    return inverse_of_factors((l10, l20, l21), i)
-
-
-@inline
-def inverse_of_factors(lower, i):
-    """The inverse of L D L', packed; lower, i: (l10, l20, l21) and 1 / D, as of `factorise`."""
-    l10, l20, l21 = lower
+    i0, i1, i2 = 1.0 / P[0], 1.0 / d1, 1.0 / (P[5] - l20 * P[2] - l21 * m)
     a = l10 * l21 - l20  # L⁻¹ = [[1, 0, 0], [-l10, 1, 0], [a, -l21, 1]]
     return (
-        i[0] + l10 * l10 * i[1] + a * a * i[2],
-        0.0 - (l10 * i[1] + a * l21 * i[2]),
-        a * i[2],
-        i[1] + l21 * l21 * i[2],
-        0.0 - l21 * i[2],
-        i[2],
+        i0 + l10 * l10 * i1 + a * a * i2,
+        0.0 - (l10 * i1 + a * l21 * i2),
+        a * i2,
+        i1 + l21 * l21 * i2,
+        0.0 - l21 * i2,
+        i2,
     )
 
 

@@ -343,63 +343,67 @@ def density_rounding(case, columns):
     return rounding(scaled_condition(local_plots(case.spec, columns)[1]).max(), 200)
 
 
-def interacting(case, options, columns, T, shares=(0.0, 0.0)):
+NO_OUTLIERS = ((0.0, 0.0),) * 3  # shares of near and far ones, of each number of a plot
+
+
+def interacting(case, options, columns, T, shares=NO_OUTLIERS):
     """IMM of the book over a track (one model: a Kalman filter), with outliers merged by moments; T: over the scan."""
     spec, t = case.spec, columns["t_s"]
-    z, R = local_plots(spec, columns)
+    z, _ = local_plots(spec, columns)
     a, b, g = start_weights(t[:3], spec.start_acceleration_mps2).reshape(3, 3)
     x = np.concatenate([[a @ z[:3, i], b @ z[:3, i], 0.0] for i in range(3)])
     lifts = [np.kron(np.eye(3), np.array([[a[k]], [b[k]], [0.0]])) for k in range(3)]
-    chance = 2 / (1 + 3 * sum(shares))  # of the whole plot, or of a number alone
     # the mean square of an error in a number that starts the track
-    wider = 1 + chance * (sum(size**2 for size in SIZES) * shares[0] + 99 * shares[1])
-    P = wider * sum(lift @ R[k] @ lift.T for k, lift in enumerate(lifts)) + np.kron(np.eye(3), np.outer(g, g))
+    wider = [1 + sum(size**2 for size in SIZES) * near + 99 * far for near, far in shares]
+    R = [sum(w * np.outer(s, s) for w, s in zip(wider, number_shifts(spec, columns, k), strict=True)) for k in range(3)]
+    P = sum(lift @ R[k] @ lift.T for k, lift in enumerate(lifts)) + np.kron(np.eye(3), np.outer(g, g))
     M, H = len(options.models), np.kron(np.eye(3), np.array([[1.0, 0, 0]]))
     bank, p, total = [(x, P)] * M, np.full(M, 1 / M), 0.0
     for k in range(3, len(t)):
         c = T @ p
-        possible = errors_of_plot(spec, columns, k, shares)
-        scores, parts = np.zeros((M, len(possible))), []
+        scores, parts = np.log(c), []
+        directions, numbers = numbers_of_plot(spec, columns, k, shares)
         for i, (F, Q) in enumerate(models_over(options, t[k] - t[k - 1])):
             mean, P = merged(T[i] * p / c[i], bank)
             mean, P = F @ mean, F @ P @ F.T + Q
-            parts.append([])
-            for law, (chance, shift, noise) in enumerate(possible):
-                S = H @ P @ H.T + noise
-                scores[i, law] = normal.logpdf(z[k], H @ mean + shift, S) + np.log(chance)
-                K = P @ H.T @ np.linalg.inv(S)
-                parts[-1].append((mean + K @ (z[k] - shift - H @ mean), P - K @ S @ K.T))
-        scores += np.log(c)[:, None]
+            scores[i] += np.linalg.slogdet(directions)[1]
+            for direction, laws in zip(directions, numbers, strict=True):
+                score, mean, P = taken_number(mean, P, direction @ H, direction @ z[k], laws)
+                scores[i] += score
+            parts.append((mean, P))
         density = logsumexp(scores)
         total += density
-        p = np.exp(logsumexp(scores, axis=1) - density)
-        bank = [merged(np.exp(scores[i] - logsumexp(scores[i])), parts[i]) for i in range(M)]
+        p, bank = np.exp(scores - density), parts
     return total
 
 
-def errors_of_plot(spec, columns, k, shares):
-    """The probability, mean and covariance of a plot under each law: sound, or an outlier as a whole or in a number."""
-    R, none = local_plots(spec, columns)[1][k], np.zeros(3)
-    numbers = zip(("range_m", "elevation_rad", "azimuth_rad"), np.square(spec.sensor.sigma), strict=True)
-    laws = [error_laws(outlier_law(*shares, *SIZES), np.ptp(columns[name]), variance) for name, variance in numbers]
-    shifts = [number_shift(spec, columns, k, i) for i in range(3)]
-    parts = [np.outer(shift, shift) for shift in shifts]
-    chances = laws[0][0]
-    result = [(chances[0], none, R), (chances[1] + chances[2], none, R * (1 + sum(size**2 for size in SIZES)))]
-    for i in range(3, len(chances)):
-        spread = [widths[i] ** 2 * part for (*_, widths), part in zip(laws, parts, strict=True)]
-        result.append((chances[i], none, sum(spread)))
-    for (_, offsets, widths), shift, part in zip(laws, shifts, parts, strict=True):
-        result += [(chances[i], offsets[i] * shift, R + (widths[i] ** 2 - 1) * part) for i in range(1, len(chances))]
-    total = sum(chance for chance, *_ in result)
-    return [(chance / total, mean, covariance) for chance, mean, covariance in result if chance > 0]
+def numbers_of_plot(spec, columns, k, shares):
+    """The directions (3, 3) along which the numbers of plot k are measured in the local axes, and of each number the
+    probabilities, means and variances of its error."""
+    shifts, numbers = number_shifts(spec, columns, k).T / spec.sensor.sigma, []
+    for name, sigma, one in zip(("range_m", "elevation_rad", "azimuth_rad"), spec.sensor.sigma, shares, strict=True):
+        chances, means, widths = error_laws(outlier_law(*one, *SIZES), np.ptp(columns[name]), sigma**2)
+        numbers.append((chances, means * sigma, (widths * sigma) ** 2))
+    return np.linalg.inv(shifts), numbers
 
 
-def number_shift(spec, columns, k, i):
-    """How far an error of one σ in number i moves plot k in the local axes."""
+def taken_number(mean, P, h, z, laws):
+    """The logarithm of a number's density, and the mean and covariance after it, of all laws of its error."""
+    scores, hypotheses = [], []
+    for chance, shift, variance in zip(*laws, strict=True):
+        if chance > 0:
+            S, e = h @ P @ h + variance, z - shift - h @ mean
+            scores.append(np.log(chance) + normal.logpdf(e, 0.0, S))
+            hypotheses.append((mean + P @ h * e / S, P - np.outer(P @ h, P @ h) / S))
+    score = logsumexp(scores)
+    return score, *merged(np.exp(np.array(scores) - score), hypotheses)
+
+
+def number_shifts(spec, columns, k):
+    """How far (3, 3) an error of one σ in each number moves plot k in the local axes."""
     seen = np.array([columns[name][k] for name in ("range_m", "elevation_rad", "azimuth_rad")])
     turn = frames.rotation(spec.sensor.antenna_azimuth_rad, spec.sensor.antenna_elevation_rad)
-    return turn @ frames.jacobian(seen)[:, i] * spec.sensor.sigma[i]
+    return (turn @ frames.jacobian(seen) * spec.sensor.sigma).T
 
 
 def merged(weights, hypotheses):
@@ -431,14 +435,14 @@ PAIR = (
 )
 
 
-@pytest.mark.parametrize("shares", [(0.0, 0.0), (0.03, 0.07)])
+@pytest.mark.parametrize("shares", [NO_OUTLIERS, ((0.03, 0.07), (0.0, 0.02), (0.1, 0.0))])
 def test_the_multimodel_likelihood_is_that_of_a_textbook_filter(shares):
     case, columns = loaded("multimodel_1hz", "scans=30", PAIR), recording("multimodel_1hz", "scans=30")
     for name, T in (("two", np.array([[0.9, 0.1], [0.1, 0.9]])), ("one", np.ones((1, 1)))):
         one = likelihood(case, name, columns)
         (options,) = (each for each in case.spec.filters if each.name == name)
         expected = interacting(case, options, columns, T, shares)
-        law = ErrorLaw(outlier_laws=(outlier_law(*shares, *SIZES),))
+        law = ErrorLaw(outlier_laws=tuple(outlier_law(*one_share, *SIZES) for one_share in shares))
         assert one(one.stated, law) == pytest.approx(expected, rel=density_rounding(case, columns))
 
 

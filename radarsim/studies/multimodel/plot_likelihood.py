@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from radarsim.config.experiment import Case
+from radarsim.kernels.lanes import WIDTH
 from radarsim.kernels.likelihood import FAR, FAR_WIDTH, NEAR, start_factor
 from radarsim.studies.error_law import OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
@@ -14,11 +15,11 @@ from radarsim.studies.multimodel.config import Filter, Keys, Sensor
 from radarsim.studies.multimodel.kernels import filter_strip, layout
 from radarsim.studies.multimodel.kernels.hypothesis import work_arrays
 from radarsim.studies.multimodel.kernels.likelihood import log_likelihood
-from radarsim.studies.multimodel.kernels.robust_likelihood import STRIPS, robust_log_likelihood
+from radarsim.studies.multimodel.kernels.robust_likelihood import LAW_ROWS, fill_laws, robust_log_likelihood
 from radarsim.studies.multimodel.scenario import intervals, local_plots, sensor_frame
 from radarsim.studies.multimodel.study import banks, filter_numbers
 from radarsim.studies.multimodel.tracking import lane_rows, sigmas
-from radarsim.studies.recording_interface import ALL_KINDS, usual_interval_s
+from radarsim.studies.recording_interface import usual_interval_s
 
 UPPER = np.triu_indices(3)  # elements of a packed covariance
 MIN_VALUE_RATIO = 1e-4  # to a key's configured value: smaller values count as zero
@@ -44,11 +45,11 @@ class PlotLikelihood:
         self.keys = (*names, f"filters.{filter_index}.models.{self.hardest}.sigma_acceleration_mps2")
         self.stated = np.array([*self.spec.sensor.sigma, spreads[self.hardest]])
         self.zero_limits = np.append(MIN_VALUE_RATIO * self.stated[:3], MIN_VALUE_RATIO * (self.stated[3] or 1.0))
-        self.outlier_kinds = ALL_KINDS
         self.far_kinds: tuple[str, ...] = ()
         self.has_offsets = True
         self.is_smooth = True
         self.given_tracks, self.columns = list(tracks), tuple(name for name in tracks[0] if name != "t_s")
+        self.outlier_kinds = self.columns
         self.spans = data_span(tracks, self.columns)
         self.cleaned_tracks = [without_gross_starts(columns, self.columns, layout.START) for columns in tracks]
         self.measured = np.concatenate(
@@ -71,9 +72,7 @@ class PlotLikelihood:
         # Positions and covariances of plots are linear in the variances of the sensor.
         self.exact_plots = self._plots(np.zeros(3))
         self.plot_parts = np.stack([self._plots(one) - self.exact_plots for one in np.eye(3)])
-        # How far (n, 9) an error of 1 m or 1 rad in each number moves a plot.
-        covariances = self.plot_parts[:, :, layout.COVARIANCE : layout.DETECTED]
-        self.unit_shifts = np.concatenate([_root(part) for part in covariances], axis=1)
+        self.directions, self.log_determinants = self._measured_directions(is_valid)
 
     def _track_scores(
         self, values: np.ndarray, merge: str, law: ErrorLaw
@@ -83,26 +82,38 @@ class PlotLikelihood:
         models, rules = self.models.copy(), self.rules[merge]
         models[layout.MODEL_NUMBERS * (self.hardest + 1) - 1] = values[3]
         plots = self.exact_plots + np.tensordot(np.square(values[:3]), self.plot_parts, 1)
-        outliers, result = law.outlier_rows(1)[0], []
-        is_robust = outliers[NEAR] + outliers[FAR] > 0
-        # A number is an outlier in two of the strips: with its whole plot, or alone.
-        chance = 2 / (1 + (STRIPS - 1) * (outliers[NEAR] + outliers[FAR]))
-        growth_at_start = start_factor(outliers * [chance, chance, 1.0, 1.0])
-        far_ratios, shifts = self._far_ratios(values[:3]), values[:3].repeat(3) * self.unit_shifts
+        outliers, result = law.outlier_rows(3), []
+        is_robust = bool(outliers[:, [NEAR, FAR]].any())
+        laws = np.zeros((3, LAW_ROWS, WIDTH))
+        fill_laws(laws, outliers, values[:3], self._far_ratios(values[:3]))
+        covariance = slice(layout.COVARIANCE, layout.DETECTED)
+        extra_variances = np.array([start_factor(row) - 1 for row in outliers]) * np.square(values[:3])
+        extra_covariances = np.tensordot(extra_variances, self.plot_parts[:, :, covariance], 1)
         for problem in self.problems:
             start, later = plots[problem.start_rows], plots[problem.later_plots]
-            start[:, layout.COVARIANCE : layout.DETECTED] *= growth_at_start
+            start[:, covariance] += extra_covariances[problem.start_rows]
             work, numbers = work_arrays()
             filter_strip.start_strip(work, numbers, lane_rows(start), problem.weights, self.probabilities)
             score, soundness = np.empty(len(later)), np.ones((len(later), 3))
             arguments = models, problem.transitions, problem.intervals, problem.times, rules
             if is_robust:
-                errors = shifts[problem.later_plots], *arguments, outliers, far_ratios
-                robust_log_likelihood(work, numbers, later, *errors, score, soundness)
+                directions = self.directions[problem.later_plots]
+                robust_log_likelihood(work, numbers, later, directions, *arguments, laws, score, soundness)
+                score += self.log_determinants[problem.later_plots]
             else:
                 log_likelihood(work, numbers, lane_rows(later), *arguments, self.frame, score)
             result.append((problem, score, soundness))
         return result
+
+    def _measured_directions(self, is_valid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The directions (n, 9) along which the numbers of plots are measured, 1 or rad by m, and the logarithm (n,) of
+        their determinant; zero where no plot is."""
+        shifts = np.stack([_root(part) for part in self.plot_parts[:, :, layout.COVARIANCE : layout.DETECTED]], axis=2)
+        directions, log_determinants = np.zeros((len(is_valid), 3, 3)), np.zeros(len(is_valid))
+        directions[is_valid] = np.linalg.pinv(shifts[is_valid])
+        log_determinants[is_valid] = -np.linalg.slogdet(shifts[is_valid])[1]
+        # At the zenith no direction changes the azimuth.
+        return directions.reshape(-1, 9), np.where(np.isfinite(log_determinants), log_determinants, 0.0)
 
     def _far_ratios(self, sigmas: np.ndarray) -> np.ndarray:
         """The ratio (3,) of the widest law of far outliers to the least wide, for each number.

@@ -216,12 +216,23 @@ def innovation_covariance(predicted, R):
 
 @inline
 def whitened_columns(predicted, L):
-    """The rows of P H', which are the columns of P that belong to the three coordinates, whitened: wx, wy, wz."""
+    """The rows of P H' of each axis, whitened: wx, wy, wz."""
+    x, y, z = position_rows(predicted)
+    return (
+        (whiten(x[0], L), whiten(x[1], L), whiten(x[2], L)),
+        (whiten(y[0], L), whiten(y[1], L), whiten(y[2], L)),
+        (whiten(z[0], L), whiten(z[1], L), whiten(z[2], L)),
+    )
+
+
+@inline
+def position_rows(predicted):
+    """The rows of P H', which are the columns of P that belong to the three coordinates, of each axis (3 x 3)."""
     _, (xx, yy, zz), (xy, xz, yz) = predicted
     return (
-        (whiten((xx[0], xy[0], xz[0]), L), whiten((xx[1], xy[3], xz[3]), L), whiten((xx[2], xy[6], xz[6]), L)),
-        (whiten((xy[0], yy[0], yz[0]), L), whiten((xy[1], yy[1], yz[3]), L), whiten((xy[2], yy[2], yz[6]), L)),
-        (whiten((xz[0], yz[0], zz[0]), L), whiten((xz[1], yz[1], zz[1]), L), whiten((xz[2], yz[2], zz[2]), L)),
+        ((xx[0], xy[0], xz[0]), (xx[1], xy[3], xz[3]), (xx[2], xy[6], xz[6])),
+        ((xy[0], yy[0], yz[0]), (xy[1], yy[1], yz[3]), (xy[2], yy[2], yz[6])),
+        ((xz[0], yz[0], zz[0]), (xz[1], yz[1], zz[1]), (xz[2], yz[2], zz[2])),
     )
 
 

@@ -1,94 +1,49 @@
-"""The log likelihood of recorded plots that may be outliers, under a filter that merges by moments.
+"""The log likelihood of recorded plots whose numbers may be outliers, under a filter that merges by moments.
 
-An outlier is the whole plot or one of its numbers alone, all equally likely, and never two of these at once. Its error
-follows one of the laws of `radarsim.kernels.likelihood`, in four strips of eight lanes, a law each. In the first strip,
-of the whole plot, lane 0 has the configured σ and lane 1 near outliers; in the others, of a number each, these two have
-near outliers to either side. The rest of all are far ones of one width each.
+A plot is taken in one number after the other. The error of each follows one of the laws of
+`radarsim.kernels.likelihood`: the stated one, or one of eight of outliers, a lane each: of near ones to either side in
+lanes 0 and 1, of far ones in the rest.
 
-All laws share what a model predicts. They differ by the inverse N of the innovation's covariance and by g = N e of an
-innovation e. Merged by moments, the laws of weights w, Σ w = 1, are one update of the prediction, with Σ w g in place
-of g and Σ w N less the spread of g in place of N. All three are in the units in which S, the covariance of the stated
-law, is the unit matrix.
+All laws share what a model predicts. Merged by moments, they are one update of it: of an innovation e whose covariance
+with the state is c, and whose variance is T under a law of weight w, Σ w = 1, the pull Σ w e / T moves the mean along
+c, and the shrinkage Σ w / T, less the spread of e / T, takes c c' from the covariance.
 
-    v            innovation in these units (3)
-    y            of a number: how far an error of one σ moves v (3)
-    N            inverse of 1 + Σ a y y' (6), with a in σ² by which a law's variance exceeds the stated one"""
-
-from typing import NamedTuple
+    e            innovations of the three numbers (3)
+    A            covariance of what is predicted of them (6)
+    L            lower factor by which a number, once taken, changes those that follow (3), as of `factorise`
+    cx, cy, cz   covariance of an axis with the numbers (3 x 3); wx, wy, wz: of each number when its turn comes"""
 
 import numpy as np
 
 from radarsim.kernels.compiler import inline, kernel, kernel_part
-from radarsim.kernels.kalman_algebra import (
-    add_outer,
-    add_scaled,
-    dot,
-    factorise,
-    inverse_of_factors,
-    scale_row,
-    times,
-    whiten,
-)
+from radarsim.kernels.kalman_algebra import dot, scale_row, whiten
 from radarsim.kernels.lane_matrices import get6
 from radarsim.kernels.lanes import WIDTH, address, exponential, full, get, put, row, square_root, total, where_greater
 from radarsim.kernels.likelihood import FAR, FAR_COUNT, FAR_WIDTH, NEAR, OFFSET, SPREAD
 from radarsim.studies.multimodel.kernels import layout
 from radarsim.studies.multimodel.kernels.filter_strip import make_rules, prepare_step
-from radarsim.studies.multimodel.kernels.hypothesis import (
-    innovation_covariance,
-    merge,
-    mix_hypotheses,
-    predict,
-    put_updated,
-    whitened_columns,
-)
+from radarsim.studies.multimodel.kernels.hypothesis import merge, mix_hypotheses, position_rows, predict, put_updated
 from radarsim.studies.multimodel.kernels.merging_rules import put_shares
 from radarsim.studies.multimodel.kernels.multimodel_filters import merge_gpb1, minimum, predict_weights
 
-STRIPS = 4  # of laws: those of outliers that are the whole plot, and those of each of its three numbers
-CHANCE = 0  # rows of the laws: the chances of each strip
-WHOLE = CHANCE + STRIPS  # of each number, the excess of its variance where the whole plot is an outlier, in σ²
-ALONE = WHOLE + 3  # the same where the number alone is one
-SHIFT = ALONE + 3  # mean of its error, in σ
-LAW_ROWS = SHIFT + 1
+# Rows of the laws of a number: chance, variance and mean of its error as an outlier; chance and variance as stated.
+CHANCE, VARIANCE, SHIFT, STATED_CHANCE, STATED_VARIANCE, LAW_ROWS = range(6)
 IMPOSSIBLE = -1e300  # stands for the logarithm of zero
-MIN_WEIGHT = 1e-300  # of a strip
 LOG_WEIGHT, SOUNDNESS, UPDATE = 0, 1, 4  # of an update of a hypothesis by all laws; soundness of each number
-
-
-class PlotLaws(NamedTuple):
-    """The laws of outliers that are the whole plot: g (3), N (6), the distance g e, and the determinant of N⁻¹."""
-
-    g: tuple
-    N: tuple
-    distance: float
-    determinant: float
-
-
-class NumberLaws(NamedTuple):
-    """The laws of outliers that are one number alone: what all have of g (3), the multiple of y in it, that of -y y' in
-    N, the distance g e, and the determinant of N⁻¹."""
-
-    rest: tuple
-    pull: float
-    shrink: float
-    distance: float
-    determinant: float
 
 
 @kernel
 def robust_log_likelihood(
-    work, numbers, plots, shifts, models, transitions, intervals, times, rules, outliers, ratios, score, soundness
+    work, numbers, plots, directions, models, transitions, intervals, times, rules, laws, score, soundness
 ):
     """Fill score (n,) with the logarithm of each plot's density given the earlier plots, and soundness (n, 3) with the
     probability of each of its numbers to be no outlier; zero and one where there is no plot.
 
-    work, numbers: a filter's memory, started; plots (n, PLOT); shifts (n, 9): of a plot by one σ of each number;
-    models, transitions, intervals (n,), times, rules as in `filter_strip`; outliers (4,): their law; ratios (3,): of
-    the widest far outliers to the least wide, for each number."""
-    laws, listed = np.zeros((LAW_ROWS, WIDTH)), np.zeros(layout.MAX_MODELS, dtype=np.int64)
+    work, numbers: a filter's memory, started; plots (n, PLOT); directions (n, 9): along which each number is measured,
+    whose densities are those of the numbers; models, transitions, intervals (n,), times, rules as in `filter_strip`;
+    laws (3, LAW_ROWS, WIDTH) as of `fill_laws`."""
+    listed = np.zeros(layout.MAX_MODELS, dtype=np.int64)
     updates = np.zeros((layout.MAX_MODELS * layout.MAX_MODELS, UPDATE))
-    fill_laws(laws, outliers, ratios)
     filter_rules = make_rules(rules, models.size // layout.MODEL_NUMBERS)
     for k in range(score.size):
         score[k], soundness[k, 0], soundness[k, 1], soundness[k, 2] = 0.0, 1.0, 1.0, 1.0
@@ -103,32 +58,29 @@ def robust_log_likelihood(
         if plots[k, layout.DETECTED] > 0.5:
             old = numbers[layout.CURRENT] * layout.BANK
             memory = address(work), address(listed), old, layout.BANK - old
-            plot = address(plots[k]), address(shifts[k]), address(laws)
+            plot = address(plots[k]), address(directions[k]), address(laws)
             score[k] = take_plot(*memory, filter_rules, *plot, updates, soundness[k])
             numbers[layout.CURRENT], numbers[layout.NONE_WAITING] = 1 - numbers[layout.CURRENT], 1
 
 
 @kernel
-def fill_laws(laws, outliers, ratios):
-    """Fill the rows of the laws (LAW_ROWS, WIDTH): the shares are odds of each kind of outlier alone."""
-    near, far, offset, spread = outliers[NEAR], outliers[FAR], outliers[OFFSET], outliers[SPREAD]
-    for lane in range(WIDTH):
-        for strip in range(STRIPS):
-            laws[CHANCE + strip, lane] = near / 2.0 if lane < 2 else far / FAR_COUNT
-        for i in range(3):
-            width = FAR_WIDTH * ratios[i] ** ((lane - 2) / (FAR_COUNT - 1))
-            laws[WHOLE + i, lane] = lane * (offset * offset + spread * spread) if lane < 2 else width * width - 1.0
-            laws[ALONE + i, lane] = spread * spread if lane < 2 else width * width - 1.0
-    laws[CHANCE, 0], laws[CHANCE, 1] = 1.0 - near - far, near
-    laws[SHIFT, 0], laws[SHIFT, 1] = offset, -offset
-    scale = 1.0 / laws[:STRIPS].sum()
-    for strip in range(STRIPS):
+def fill_laws(laws, outliers, sigmas, ratios):
+    """Fill the laws (3, LAW_ROWS, WIDTH) of three numbers. outliers (3, 4): the law of outliers of each; sigmas (3,);
+    ratios (3,): of the widest far outliers to the least wide."""
+    for i in range(3):
+        variance, near, far = sigmas[i] * sigmas[i], outliers[i, NEAR], outliers[i, FAR]
+        laws[i, STATED_CHANCE], laws[i, STATED_VARIANCE], laws[i, SHIFT] = 1.0 - near - far, variance, 0.0
+        laws[i, SHIFT, 0] = outliers[i, OFFSET] * sigmas[i]
+        laws[i, SHIFT, 1] = -laws[i, SHIFT, 0]
         for lane in range(WIDTH):
-            laws[CHANCE + strip, lane] *= scale
+            width = FAR_WIDTH * ratios[i] ** ((lane - 2) / (FAR_COUNT - 1))
+            spread = outliers[i, SPREAD]
+            laws[i, CHANCE, lane] = near / 2.0 if lane < 2 else far / FAR_COUNT
+            laws[i, VARIANCE, lane] = (1.0 + spread * spread if lane < 2 else width * width) * variance
 
 
 @kernel_part
-def take_plot(work, listed, old, new, rules, plot, shifts, laws, updates, soundness):
+def take_plot(work, listed, old, new, rules, plot, directions, laws, updates, soundness):
     """Compute the new bank from the old one and a plot, and its soundness (3,); returns the logarithm of its density,
     not-a-number if it has none.
 
@@ -148,7 +100,7 @@ def take_plot(work, listed, old, new, rules, plot, shifts, laws, updates, soundn
             else:
                 merged = put_shares(work, listed, old, size, c, full(float(i)), layout.MOMENT)
             update = address(updates[count])
-            update_by_laws(work, listed, merged, row(work, target), model, plot, shifts, laws, update)
+            update_by_laws(work, listed, merged, row(work, target), model, plot, directions, laws, update)
             w = work[weight_row * WIDTH]
             update[LOG_WEIGHT] = update[LOG_WEIGHT] + np.log(w) if w > 0.0 else IMPOSSIBLE
             count += 1
@@ -191,125 +143,84 @@ def merge_pairs(work, listed, size, updates, first, target):
 
 
 @kernel_part
-def update_by_laws(work, listed, count, target, model, plot, shifts, laws, update):
+def update_by_laws(work, listed, count, target, model, plot, directions, laws, update):
     """Merge the listed hypotheses, predict with the model in row `model`, update with a plot under all laws, write the
     laws' merged hypothesis to `target`, and the logarithm of the plot's density and its soundness to `update`."""
     F = get(work, model), get(work, model + 1), get(work, model + 2), get(work, model + 3), get(work, model + 4)
     Q = get6(work, model + layout.MODEL_Q)
     predicted = predict(mix_hypotheses(work, listed, count), F, Q)
     x, y, z = predicted[0]
-    R = plot[3], plot[4], plot[5], plot[6], plot[7], plot[8]
-    L, i, determinant = factorise(innovation_covariance(predicted, R))
-    root = square_root(i[0]), square_root(i[1]), square_root(i[2])
-    v = scale_row(whiten((plot[0] - x[0], plot[1] - y[0], plot[2] - z[0]), L), root)
-    units = (
-        scale_row(whiten((full(shifts[0]), full(shifts[1]), full(shifts[2])), L), root),
-        scale_row(whiten((full(shifts[3]), full(shifts[4]), full(shifts[5])), L), root),
-        scale_row(whiten((full(shifts[6]), full(shifts[7]), full(shifts[8])), L), root),
+    D = (
+        (full(directions[0]), full(directions[1]), full(directions[2])),
+        (full(directions[3]), full(directions[4]), full(directions[5])),
+        (full(directions[6]), full(directions[7]), full(directions[8])),
     )
-    g, N = merge_laws(work, v, units, laws, update)
-    put(work, layout.RESULT, determinant)
-    update[LOG_WEIGHT] -= 0.5 * np.log(work[layout.RESULT * WIDTH])
-    wx, wy, wz = whitened_columns(predicted, L)
-    wx = scale_row(wx[0], root), scale_row(wx[1], root), scale_row(wx[2], root)
-    wy = scale_row(wy[0], root), scale_row(wy[1], root), scale_row(wy[2], root)
-    wz = scale_row(wz[0], root), scale_row(wz[1], root), scale_row(wz[2], root)
+    rows_x, rows_y, rows_z = position_rows(predicted)
+    cx = along(rows_x[0], D), along(rows_x[1], D), along(rows_x[2], D)
+    cy = along(rows_y[0], D), along(rows_y[1], D), along(rows_y[2], D)
+    cz = along(rows_z[0], D), along(rows_z[1], D), along(rows_z[2], D)
+    e = along((plot[0] - x[0], plot[1] - y[0], plot[2] - z[0]), D)
+    c0, c1, c2 = (cx[0][0], cy[0][0], cz[0][0]), (cx[0][1], cy[0][1], cz[0][1]), (cx[0][2], cy[0][2], cz[0][2])
+    A = dot(D[0], c0), dot(D[0], c1), dot(D[0], c2), dot(D[1], c1), dot(D[1], c2), dot(D[2], c2)
+    L, pull, shrinkage = take_numbers(work, e, A, laws, update)
+    wx = whiten(cx[0], L), whiten(cx[1], L), whiten(cx[2], L)
+    wy = whiten(cy[0], L), whiten(cy[1], L), whiten(cy[2], L)
+    wz = whiten(cz[0], L), whiten(cz[1], L), whiten(cz[2], L)
     means = (
-        (x[0] + dot(wx[0], g), x[1] + dot(wx[1], g), x[2] + dot(wx[2], g)),
-        (y[0] + dot(wy[0], g), y[1] + dot(wy[1], g), y[2] + dot(wy[2], g)),
-        (z[0] + dot(wz[0], g), z[1] + dot(wz[1], g), z[2] + dot(wz[2], g)),
+        (x[0] + dot(wx[0], pull), x[1] + dot(wx[1], pull), x[2] + dot(wx[2], pull)),
+        (y[0] + dot(wy[0], pull), y[1] + dot(wy[1], pull), y[2] + dot(wy[2], pull)),
+        (z[0] + dot(wz[0], pull), z[1] + dot(wz[1], pull), z[2] + dot(wz[2], pull)),
     )
-    gx = times(N, wx[0]), times(N, wx[1]), times(N, wx[2])
-    gy = times(N, wy[0]), times(N, wy[1]), times(N, wy[2])
-    gz = times(N, wz[0]), times(N, wz[1]), times(N, wz[2])
+    gx = scale_row(wx[0], shrinkage), scale_row(wx[1], shrinkage), scale_row(wx[2], shrinkage)
+    gy = scale_row(wy[0], shrinkage), scale_row(wy[1], shrinkage), scale_row(wy[2], shrinkage)
+    gz = scale_row(wz[0], shrinkage), scale_row(wz[1], shrinkage), scale_row(wz[2], shrinkage)
     put_updated(target, predicted, means, (gx, gy, gz), (wx, wy, wz))
 
 
 @inline
-def merge_laws(work, v, units, laws, update):
-    """Σ w g, and Σ w N less the spread of g, over all laws of an innovation v; units: y of each number. Written to
-    `update`: the logarithm of Σ chance · density for S = 1, and the soundness."""
-    whole = plot_laws(v, units, laws)
-    strips = (
-        number_laws(v, units[0], get(laws, ALONE), get(laws, SHIFT)),
-        number_laws(v, units[1], get(laws, ALONE + 1), get(laws, SHIFT)),
-        number_laws(v, units[2], get(laws, ALONE + 2), get(laws, SHIFT)),
-    )
-    put_weights(work, laws, whole, strips, update)
-    w = get(work, layout.RESULT)
-    weight_sum, g = total(w), (full(total(w * whole.g[0])), full(total(w * whole.g[1])), full(total(w * whole.g[2])))
-    update[SOUNDNESS] = update[SOUNDNESS + 1] = update[SOUNDNESS + 2] = work[layout.RESULT * WIDTH] - weight_sum
-    for i in range(3):
-        strip_sum, _, strip_g = strip_means(get(work, layout.RESULT + 1 + i), strips[i], units[i])
-        update[SOUNDNESS + i] -= strip_sum
-        weight_sum, g = weight_sum + strip_sum, add_scaled(g, strip_sum, strip_g)
-    scale = 1.0 / weight_sum
-    g = g[0] * scale, g[1] * scale, g[2] * scale
-    d = whole.g[0] - g[0], whole.g[1] - g[1], whole.g[2] - g[2]
-    N = add_outer(whole.N, -1.0, d)
-    N = (
-        full(total(w * N[0])), full(total(w * N[1])), full(total(w * N[2])),
-        full(total(w * N[3])), full(total(w * N[4])), full(total(w * N[5])),
-    )  # fmt: skip
-    for i in range(3):
-        w = get(work, layout.RESULT + 1 + i)
-        strip_sum, pull, strip_g = strip_means(w, strips[i], units[i])
-        offset = strips[i].pull - pull
-        d = strip_g[0] - g[0], strip_g[1] - g[1], strip_g[2] - g[2]
-        N = add_outer(add_outer(N, -strip_sum, d), -total(w * (strips[i].shrink + offset * offset)), units[i])
-        N = N[0] + strip_sum, N[1], N[2], N[3] + strip_sum, N[4], N[5] + strip_sum
-    for i in range(3):
-        update[SOUNDNESS + i] = 1.0 + scale * update[SOUNDNESS + i]
-    update[LOG_WEIGHT] += np.log(weight_sum)
-    return g, (N[0] * scale, N[1] * scale, N[2] * scale, N[3] * scale, N[4] * scale, N[5] * scale)
+def along(h, D):
+    """The components of h (3) along the directions D (3)."""
+    return dot(h, D[0]), dot(h, D[1]), dot(h, D[2])
 
 
 @inline
-def put_weights(work, laws, whole, strips, update):
-    """Put the weights of the laws, chance times density for S = 1, into rows RESULT …, up to a factor, of which
-    `update` has the logarithm."""
-    zero, distances = full(0.0), (whole.distance, strips[0].distance, strips[1].distance, strips[2].distance)
-    determinants = whole.determinant, strips[0].determinant, strips[1].determinant, strips[2].determinant
-    least = full(1e300)
-    for s in range(STRIPS):
-        least = where_greater(get(laws, CHANCE + s), zero, minimum(least, distances[s]), least)
-    put(work, layout.RESULT, least)
+def take_numbers(work, e, A, laws, update):
+    """L, pull (3) and shrinkage (3) of the three numbers, each taken after those before it. Written to `update`: the
+    logarithm of the density of all three, and their soundness."""
+    update[LOG_WEIGHT] = -1.5 * np.log(2.0 * np.pi)
+    pull_0, shrinkage_0, update[SOUNDNESS] = merge_laws(work, e[0], A[0], row(laws, 0), update)
+    l10, l20 = A[1] * shrinkage_0, A[2] * shrinkage_0
+    e1, a11, a12 = e[1] - A[1] * pull_0, A[3] - l10 * A[1], A[4] - l10 * A[2]
+    pull_1, shrinkage_1, update[SOUNDNESS + 1] = merge_laws(work, e1, a11, row(laws, LAW_ROWS), update)
+    l21 = a12 * shrinkage_1
+    e2, a22 = e[2] - A[2] * pull_0 - a12 * pull_1, A[5] - l20 * A[2] - l21 * a12
+    pull_2, shrinkage_2, update[SOUNDNESS + 2] = merge_laws(work, e2, a22, row(laws, 2 * LAW_ROWS), update)
+    return (l10, l20, l21), (pull_0, pull_1, pull_2), (shrinkage_0, shrinkage_1, shrinkage_2)
+
+
+@inline
+def merge_laws(work, e, a, laws, update):
+    """Pull and shrinkage of a number with innovation e, of whose variance a is that of its prediction; and its
+    soundness. The logarithm of its density but for the factor 1/√2π is added to that in `update`."""
+    zero, chance = full(0.0), get(laws, CHANCE)
+    T, stated_T, off = a + get(laws, VARIANCE), a + get(laws, STATED_VARIANCE), e - get(laws, SHIFT)
+    pulls, stated_pull = off / T, e / stated_T
+    distances, stated_distance = off * pulls, e * stated_pull
+    put(work, layout.RESULT, where_greater(chance, zero, minimum(distances, stated_distance), stated_distance))
     min_distance = work[layout.RESULT * WIDTH]
     for lane in range(1, WIDTH):
         min_distance = min(min_distance, work[layout.RESULT * WIDTH + lane])
-    for s in range(STRIPS):
-        chance = get(laws, CHANCE + s)
-        exponent = where_greater(chance, zero, 0.5 * (min_distance - distances[s]), zero)
-        put(work, layout.RESULT + s, chance * exponential(exponent) / square_root(determinants[s]))
-    update[LOG_WEIGHT] = -0.5 * min_distance - 1.5 * np.log(2.0 * np.pi)
-
-
-@inline
-def plot_laws(v, units, laws):
-    """The laws of outliers that are the whole plot, at an innovation v."""
-    one, zero = full(1.0), full(0.0)
-    M = add_outer((one, zero, zero, one, zero, one), get(laws, WHOLE), units[0])
-    M = add_outer(add_outer(M, get(laws, WHOLE + 1), units[1]), get(laws, WHOLE + 2), units[2])
-    L, i, determinant = factorise(M)
-    N, whitened = inverse_of_factors(L, i), whiten(v, L)
-    return PlotLaws(times(N, v), N, dot(scale_row(whitened, i), whitened), determinant)
-
-
-@inline
-def number_laws(v, y, excess, shift):
-    """The laws of outliers that are one number alone, at an innovation v: N is 1 less a multiple of y y'."""
-    square, along = dot(y, y), dot(y, v)
-    inverse = 1.0 / where_greater(square, full(0.0), square, full(1.0))
-    determinant = 1.0 + excess * square
-    scale, rest = 1.0 / determinant, add_scaled(v, 0.0 - along * inverse, y)
-    off = along + shift * square
-    pull = off * inverse * scale
-    return NumberLaws(rest, pull, excess * scale, dot(rest, rest) + off * pull, determinant)
-
-
-@inline
-def strip_means(w, strip, y):
-    """The sum of the weights of a number's laws, and their means of the multiple of y in g and of g."""
-    weight_sum = total(w)
-    pull = total(w * strip.pull) / max(weight_sum, MIN_WEIGHT)
-    return weight_sum, pull, add_scaled(strip.rest, pull, y)
+    least = full(min_distance)
+    exponents = where_greater(chance, zero, 0.5 * (least - distances), zero)
+    weights = chance * exponential(exponents) / square_root(T)
+    stated = get(laws, STATED_CHANCE) * exponential(0.5 * (least - stated_distance)) / square_root(stated_T)
+    weight_sum = full(total(weights)) + stated
+    scale = 1.0 / weight_sum
+    pull = (full(total(weights * pulls)) + stated * stated_pull) * scale
+    d, stated_d = pulls - pull, stated_pull - pull
+    stated_part = stated * (1.0 / stated_T - stated_d * stated_d)
+    shrinkage = (full(total(weights * (1.0 / T - d * d))) + stated_part) * scale
+    put(work, layout.RESULT, weight_sum)
+    put(work, layout.RESULT + 1, stated * scale)
+    update[LOG_WEIGHT] += np.log(work[layout.RESULT * WIDTH]) - 0.5 * min_distance
+    return pull, shrinkage, work[(layout.RESULT + 1) * WIDTH]
