@@ -3,7 +3,7 @@ stand for none."""
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 
 from radarsim.recordings.formats.units import DEGREES, EARTH_DEGREES, RADIANS, cell_unit
 
@@ -24,6 +24,9 @@ GROUPED_PATTERN = re.compile(  # 1,234.5, 1.234,5, 1 234,5 and 1,234,567: commas
     rf"([-+]?\d{{1,3}}(?:(?:,\d{{3}})+(?=\.)|(?:\.\d{{3}})+(?=,)|(?:[{GROUP_SPACES}]\d{{3}})+|"
     r"(,|\.)\d{3}(?:\2\d{3})+))(?:[.,](\d+))?"
 )
+COMMA_PATTERN = re.compile(r"[-+]?(?:\d+,(?:\d{1,2}|\d{4,})|\d{1,3}(?:\.\d{3})+,\d+|0,\d+)")  # decimal for certain
+POINT_PATTERN = re.compile(r"[-+]?(?:\d*\.(?:\d{1,2}|\d{4,})|0\.\d+|\d{4,}\.\d*)")
+GROUP_PATTERN = re.compile(r"[-+]?[1-9]\d{0,2}(?:\.\d{3})+")
 MONTH_PATTERN = re.compile(r"\d{1,2}[.\s-]+[^\W\d_]{3,}\.?(?:[\s-]+\d{2,4})?|[^\W\d_]{3,}\.?[\s-]+\d{2,4}")
 UNIT_CELL_PATTERN = re.compile(r"([-+]?[\d.,]*\d[\d.,]*(?:[eE][-+]?\d+)?)\s*([^\W\d_°º].*|[°º].*)")
 SEXAGESIMAL_PATTERN = re.compile(  # 52°18'30.5", 52° 18.5', 52 18 30
@@ -40,6 +43,22 @@ HEMISPHERES = {  # by quantity: those whose coordinates are negative last; in th
     ),
 }
 EAST_OR_WEST = "o"  # of Ost, ouest, oeste, ovest
+
+
+def has_decimal_commas(cells: Iterable[str]) -> bool:
+    """Whether the numbers in cells have decimal commas, so that their points can only separate thousands."""
+    texts = [cell.strip() for cell in cells]
+    return any(map(COMMA_PATTERN.fullmatch, texts)) and not any(map(POINT_PATTERN.fullmatch, texts))
+
+
+def ungrouped(cell: str) -> str:
+    """A cell without the points that separate thousands in 30.004 or 1.030.004."""
+    return cell.replace(".", "") if GROUP_PATTERN.fullmatch(cell.strip()) else cell
+
+
+def ungrouped_cells(row: Sequence[str], places: Container[int]) -> list[str]:
+    """A row whose cells in some places are without such points."""
+    return [ungrouped(cell) if i in places else cell for i, cell in enumerate(row)]
 
 
 class CellNumbers:

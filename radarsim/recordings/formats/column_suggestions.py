@@ -56,7 +56,10 @@ def _score(
         return _likeness(stem, known_names) + 2.0 * bool(cells and all(map(TIME_CELL.fullmatch, cells))) + 1.0 * rises
     if ours == "track":
         return _likeness(stem, known_names)
-    return 0.0 if unit and not has_unit else _likeness(stem, known_names) + 1.0 * bool(unit)
+    has_numbers = not cells or not all(math.isnan(cell_number(cell)) for cell in cells)
+    if (unit and not has_unit) or not has_numbers:
+        return 0.0
+    return _likeness(stem, known_names) + 1.0 * bool(unit)
 
 
 def _likeness(stem: str, known_names: Sequence[str]) -> float:

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from radarsim.errors import ConfigError
-from radarsim.language.translate import tr
+from radarsim.language.translate import term, tr
 from radarsim.recordings.formats import wide_tables
 from radarsim.recordings.formats.cell_numbers import hemisphere_sign, split_hemisphere, unit_of_cells
 from radarsim.recordings.formats.column_suggestions import cell_number, name_by_cells, suggest_options
@@ -33,6 +33,9 @@ from radarsim.recordings.formats.units import (
 
 MILES = re.compile(r"dm|rm|.*miles?|.*мил[ияь]|.*meilen?|mil+as?|mile|mille?s?")  # that may be of several lengths
 MINUTE_NAME = re.compile(r"(?:lat|lon|lng|long)(?:itude)?[_ ]*(?:min|minutes?|sec|seconds?)")
+RELATIVE_BEARING = r"rel(?:ative)?_(?:bearing|azimuth|az|brg)|(?:bearing|azimuth|az|brg)_rel(?:ative)?"
+MAGNETIC_NAME = re.compile(r".*(?:\bmag|_mag|magnet|магн).*|.*\(m\)")
+HEADING_NAMES = ("heading", "hdg", "ship_heading", "own_heading", "platform_heading", "kurs", "курс")
 FORMULAS = {  # what no option makes a range or a time, by the names of its columns
     r"(?:.*_)?(?:gate|bin|cell|sample)s?(?:_(?:no|nr|num|number|index|id))?": "a number of range gates times their "
     "length is the range",
@@ -40,6 +43,9 @@ FORMULAS = {  # what no option makes a range or a time, by the names of its colu
     "height is the slant range",
     r"(?:.*_)?(?:delay|tof|time_of_flight|round_?trip)(?:_.*)?": "half the delay times the speed of light is the range",
     r"x|east|easting|y|north|northing": "the root of x² + y² is the range, the angle from north to east the bearing",
+    r"(?:scan|frame|dwell|sweep|rotation)s?(?:_(?:no|nr|num|number|index|id|count))?": "a number of scans times the "
+    "scan period is the time",
+    RELATIVE_BEARING: "a relative bearing plus the heading is the bearing",
     r"hour|hours|hh|minute|minutes|second|seconds": "hours, minutes and seconds are a time in one column, HH:MM:SS",
 }
 FREQUENCY_UNITS = ("hz", "khz", "гц", "кгц")
@@ -333,6 +339,9 @@ class Header:
             ready = f"; perhaps {' '.join(guesses)}" if guesses else ""
             formulas = {text for text in map(_formula, (stem for stem, _ in self.stems)) if text}
             ready += "".join(f"; {text}: make such a column" for text in sorted(formulas))
+            if self.sample and not any(letter.isdigit() for cell in self.sample[0] for letter in cell):
+                below = ", ".join(cell.strip() for cell in self.sample[0])[:200]
+                ready += f"; if the line below belongs to the header ({below}), make one line of both"
             faults.append(f"{self.path}:1: must have {needed}; missing ({hints}); got {got}{ready}")
         minutes = [name for name in self.names if MINUTE_NAME.fullmatch(name.lower())]
         if self.reads_positions and minutes:
@@ -409,10 +418,31 @@ class Header:
             lines.append(
                 tr("no speeds: {heading} is where the bow points, not the course", heading=names_by_stem[HEADING_NAME])
             )
+        if not self.reads_positions:
+            lines += self._bearing_notes(names_by_stem)
         ranges = [names_by_stem[stem] for stem in names_by_stem if stem in QUANTITIES["range_m"].names]
         if self.reads_positions and ranges:
             column = f"--column range_UNIT={shlex.quote(ranges[0])}"
             lines.append(tr("positions are read, not plots; for these: {column}", column=column))
+        return lines
+
+    def _bearing_notes(self, names_by_stem: Mapping[str, str]) -> list[str]:
+        """Notes on bearings that may not count from north."""
+        bearing = self.columns.get("bearing_rad")
+        if bearing is None:
+            message = term("{name} counts from the bow: add the heading to it in a column `bearing`")
+            return [
+                tr(message, name=name) for stem, name in names_by_stem.items() if re.fullmatch(RELATIVE_BEARING, stem)
+            ]
+        headings = [names_by_stem[name] for name in HEADING_NAMES if name in names_by_stem]
+        lines = [
+            tr("{bearing} is taken from north, and {heading} is not used: if it counts from the bow, add that to it",
+               bearing=bearing.name, heading=name)
+            for name in headings[:1]
+        ]  # fmt: skip
+        if MAGNETIC_NAME.fullmatch(bearing.name.lower()):
+            lines.append(tr("{bearing} is magnetic: --bias bearing_deg=-D adds a declination of D° east",
+                            bearing=bearing.name))  # fmt: skip
         return lines
 
 

@@ -469,9 +469,15 @@ class _Import:
         lost = sum(counts.values())
         if self.options.allow_loss or lost <= MAX_LOSS * (self.result.rows + lost):
             return None
-        reasons = f"{', '.join(skip_counts(counts))}{self.later_rows.cause()}"
+        reasons = f"{', '.join(skip_counts(counts))}{self._loss_cause()}"
         return (f"{self.reader.path}: {lost} of {self.result.rows + lost} rows would be left out: {reasons}; "
                 "--allow-loss imports the others")  # fmt: skip
+
+    def _loss_cause(self) -> str:
+        """Why rows have equal times, in English; '' where that is not known."""
+        if self.later_rows.lost and isinstance(self.reader, Table) and (cell := self.reader.lost_digits("t_s")):
+            return f"; times have lost digits, as {cell} shows: export the column as numbers"
+        return self.later_rows.cause()
 
     def finish(self) -> ImportResult:
         """The result, with notes for the user."""
@@ -490,6 +496,8 @@ class _Import:
             result.notes += row_order.rollover_notes(self.reader.path, last_s)
         if self.truth is not None:
             result.notes += self.truth.notes()
+        if self.site_distance is not None:
+            result.notes += self.site_distance.notes()
         # Where a unit changes within the recording, what the velocities miss follows from that.
         result.notes += self.courses.notes()
         result.notes += [self.jumps.message()] if self.jumps else self.doppler.notes(self.options.towards)

@@ -7,7 +7,7 @@ import os
 import re
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, cast
 
 from radarsim.errors import ConfigError
@@ -43,8 +43,11 @@ OTHER_FILES = {  # how files begin that are none, and what helps
 }
 CELL_BREAK = re.compile(rb"[,;\t|]|(?<=\S)[ ]+(?=\S)")
 
+CUT_REASON = "unexpected end of data"  # of a decoder, where a text ends within a letter
+UTF32_MARKS = (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)
 UTF16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 ENCODING_NAMES = {  # as spreadsheets write them
+    "utf-32": "UTF-32",
     **dict.fromkeys(("utf-16", "utf-16-le", "utf-16-be"), "UTF-16"),
     **{"utf-8-sig": "UTF-8", "cp1252": "Windows-1252", "cp1251": "Windows-1251", "koi8-r": "KOI8-R", "cp866": "CP866"},
 }
@@ -67,13 +70,17 @@ def detect_encoding(path: str | os.PathLike, fallback: str) -> str:
             while piece := file.read(1 << 20):
                 decoder.decode(piece)
             decoder.decode(b"", final=True)
-        except UnicodeDecodeError:
+        except UnicodeDecodeError as error:
+            if CUT_REASON in error.reason:
+                return fallback or "utf-8-sig"
             return fallback or _detect_code_page(head)
     return "utf-8-sig"
 
 
 def _wide_encoding(head: bytes) -> str:
-    """UTF-16 by its mark or zeros; '' of another text."""
+    """UTF-16 by its mark or zeros, UTF-32 by its mark; '' of another text."""
+    if head[:4] in UTF32_MARKS:
+        return "utf-32"
     if head[:2] in UTF16_MARKS:
         return "utf-16"
     even, odd = head[::2].count(0), head[1::2].count(0)
@@ -96,12 +103,12 @@ def _detect_code_page(head: bytes) -> str:
 @contextmanager
 def open_unzipped(path: str | os.PathLike) -> Iterator["io.BufferedReader[Any]"]:
     """Open a file of bytes; a gzipped one is unzipped."""
-    with open(path, "rb") as file:
-        if file.peek(2)[:2] != GZIP_MAGIC:
-            yield file
-        else:
-            with io.BufferedReader(cast(io.RawIOBase, gzip.open(file))) as inside:
-                yield inside
+    with open(path, "rb") as file, ExitStack() as stack:
+        inside = cast("io.BufferedReader[Any]", file)
+        while inside.peek(2)[:2] == GZIP_MAGIC:  # by some programs twice
+            raw = cast(io.RawIOBase, stack.enter_context(gzip.open(inside)))
+            inside = stack.enter_context(io.BufferedReader(raw))
+        yield inside
 
 
 @contextmanager
@@ -127,6 +134,8 @@ def open_recording(path: str, options: Options, truth: bool = False) -> Iterator
                 text = io.TextIOWrapper(file, encoding=encoding, newline="")
                 yield format_, Table(read_csv(path, text, ENCODING_NAMES.get(encoding, encoding)), options.columns)
     except UnicodeDecodeError as error:
+        if error.reason in (CUT_REASON, "truncated data"):
+            raise ConfigError(f"{path}: is damaged: it ends within a letter; take out the last line") from error
         raise ConfigError(
             f"{path}: is not {ENCODING_NAMES.get(encoding, encoding)} text: --encoding NAME names it"
         ) from error

@@ -19,6 +19,7 @@ from radarsim.recordings.time_spans import HOUR_S, MIN_DATED_S, ROLLOVER_S, WEEK
 
 MAX_AGE_S = 2 * DAY_S  # of a file, from the last time in it to when it was written
 MAX_STEP_INTERVALS, MAX_STEP_S = 3.0, 300.0  # from the row before a clock is set back to that after it
+SINGLE_STEP_S = 64.0  # between times from 1970 that are numbers of 32 bits: 128 s today
 MIN_LOST_TIMES, MAX_LOST_TIMES = 5, 1000  # of rows with the time of another, that show what their times lack
 LEAP_DAYS = ((1, 1), (7, 1))  # months and days before which leap seconds are
 ZONE_STEP_HOURS, ZONE_TOLERANCE = 0.5, 0.01  # by which time zones differ; of that
@@ -129,6 +130,8 @@ class LaterRows:
     def cause(self) -> str:
         """Why rows have equal times, in English: that their times lack seconds, or parts of them; '' if they do not."""
         times = np.array(self.lost_times)
+        if len(times) >= MIN_LOST_TIMES and times.max() > SINGLE_STEP_S and (times % SINGLE_STEP_S == 0).all():
+            return "; times are multiples of 64 s, as numbers of single precision are: their digits are lost"
         for unit_s, unit, missing in ((60.0, "minutes", "seconds"), (1.0, "seconds", "decimals")):
             if len(times) >= MIN_LOST_TIMES and (times % unit_s == 0).all():
                 return f"; times are whole {unit}: their {missing} may be missing, or two sensors have one name"

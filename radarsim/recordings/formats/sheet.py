@@ -73,15 +73,21 @@ def read_csv(path: str, file: TextIO, encoding: str) -> Sheet:
     cells = csv.reader(_cell_lines(lines, delimiter), strict=True, delimiter=CSV_DELIMITERS.get(delimiter, delimiter))
 
     def rows() -> Iterator[tuple[int, list[str]]]:
+        last_line = 0
         try:
             for row in cells:
+                last_line = cells.line_num
                 if row:
-                    yield above + cells.line_num, row
+                    yield above + last_line, row
         except csv.Error as error:
+            if "unexpected end" in str(error):
+                raise ConfigError(f"{path}:{above + last_line + 1}: must have pairs of quotation marks; one is open to "
+                                  "the end of the file") from error  # fmt: skip
             raise ConfigError(f"{path}:{above + cells.line_num}: not a CSV row: {error}") from error
 
     numbered_rows = rows()
     _, header = next(numbered_rows, (0, []))
+    header = [name.lstrip("\ufeff") for name in header]  # the mark of a file that was put into another
     while header and not header[-1].strip():
         header.pop()
     split_rows = (_split(line, delimiter) for line in sample[:SAMPLE_LINES])

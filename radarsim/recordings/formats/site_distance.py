@@ -1,18 +1,21 @@
 """Positions that cannot be seen from a radar: of no fix, or with swapped or turned coordinates."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
 
 from radarsim.constants import EARTH_RADIUS_M
-from radarsim.language.translate import term
+from radarsim.language.translate import term, tr
 from radarsim.recordings.formats.records import POSITIONS, Batch
 from radarsim.recordings.formats.sites import Site
 from radarsim.recordings.formats.table_checks import horizon_m
 from radarsim.recordings.formats.units import degrees_of_minutes
 
 MAX_RADAR_DISTANCE_M = 1e6  # of a target that a radar sees along a straight line: an aircraft at 20 km from a mountain
+MAX_SWAPPED_M, MIN_SWAPPED_SHARE = 500e3, 0.1  # of positions with swapped coordinates; of all
+MAX_NAMED = 3  # tracks
 MAX_KEPT_ROWS = 2000  # from which the cause is told
 BELOW_HORIZON, MIN_HIDDEN_M = 1.2, 200e3  # horizons, and least distance, from which a target is hidden
 MIN_HIDDEN_SHARE = 0.95  # of the positions
@@ -35,6 +38,8 @@ class SiteDistance:
     def __init__(self, site: Site):
         self.latitude_deg, self.longitude_deg = site.coordinates[:2]
         self.rows = self.near_rows = 0
+        self.swapped_rows = Counter[str]()  # far ones of tracks, near where latitude and longitude are swapped
+        self.far_km = self.swapped_km = math.nan
         self.sample: list[np.ndarray] = []
 
     def add(self, batch: Batch) -> None:
@@ -45,6 +50,26 @@ class SiteDistance:
         self.rows += len(lat)
         distance = _distance_m(self.latitude_deg, self.longitude_deg, lat, lon)
         self.near_rows += int((distance < MAX_RADAR_DISTANCE_M).sum())
+        if not (far := np.flatnonzero(distance >= MAX_RADAR_DISTANCE_M)).size:
+            return
+        swapped = _distance_m(self.latitude_deg, self.longitude_deg, lon[far], lat[far])
+        is_swapped = swapped < MAX_SWAPPED_M
+        for name, is_near in zip((batch.track[row] for row in far), is_swapped.tolist(), strict=True):
+            self.swapped_rows[name] += is_near
+        if is_swapped.any():
+            self.far_km = float(np.median(distance[far][is_swapped])) / 1e3
+            self.swapped_km = float(np.median(swapped[is_swapped])) / 1e3
+
+    def notes(self) -> list[str]:
+        """A note on tracks of swapped coordinates beside others, if they are not few."""
+        names = [name for name, count in self.swapped_rows.items() if count]
+        count = self.swapped_rows.total()
+        if not self.near_rows or count < MIN_SWAPPED_SHARE * self.rows:
+            return []
+        return [tr("{count} of {all} positions, of {names}, lie {far:.0f} km from the radar; {near:.0f} km if latitude "
+                   "and longitude are swapped there", count=count, all=self.rows,
+                   names=", ".join(names[:MAX_NAMED]) + " …" * (len(names) > MAX_NAMED),
+                   far=self.far_km, near=self.swapped_km)]  # fmt: skip
 
     def fault(self) -> str | None:
         """That no position is near the radar, and what would explain it: coordinates that are swapped, turned in sign,

@@ -20,9 +20,12 @@ from radarsim.recordings.formats import cell_times, columns, records, table_chec
 from radarsim.recordings.formats.cell_numbers import (
     LARGEST_NUMBER,
     CellNumbers,
+    has_decimal_commas,
     hemisphere_sign,
     is_missing,
     spoiled_number_cure,
+    ungrouped,
+    ungrouped_cells,
 )
 from radarsim.recordings.formats.cell_times import TIME_FORMATS
 from radarsim.recordings.formats.column_suggestions import cell_number
@@ -45,7 +48,8 @@ from radarsim.recordings.row_faults import Faults
 from radarsim.recordings.time_spans import HOUR_S
 
 LARGEST_DEGREES, LARGEST_DDMM, MINUTES_OF_DEGREE = 360.0, 36_000.0, 60  # of coordinates as degrees and minutes, 5236.5
-COMMENT_MARKS = ("#", "//")
+COMMENT_MARKS = frozenset("#%;!/")  # with which a line of comment begins
+MAX_FOOTER_ROWS = 3  # below the table, as sums
 BLANKS = " \t\ufeff"  # about a name, with the mark at the beginning of a file that another was added to
 RowReader = Callable[[list[str]], tuple[float, ...]]  # a row of numbers from the cells of a line
 MAX_SPEED_MPS, UNKNOWN_COURSE_DEG = 102.2 * KNOT_MPS, 360.0  # of AIS: what is not below them means missing
@@ -57,7 +61,12 @@ MAX_CELL_VALUES = 10_000  # different cells in a column that may name aircraft
 MAX_LIKELY_TURNS = 3  # units of bearings that are named
 NOISE_TURNS = 1 + 10 / 360  # up to which a bearing beyond north is noise
 MAX_ALTITUDE_M = 20_000.0  # of an aircraft; higher altitudes are feet
+GROUPED_CELL = re.compile(r"[-+]?[1-9]\d{0,2}\.\d{3}")  # whose point may separate thousands
+METRES_OF_GROUPS = 100.0  # of a unit of ranges that have rarely three decimals
+LOSSY_PATTERN = re.compile(r"[-+]?\d(?:[.,]\d{0,8})?[eE]\+?(?:0?[4-9]|1\d)")
 MAX_LISTED = 5  # sensors
+NO_ROW_REASON = term("lines at the end that are no rows, or cut off")
+NAME_CURE = "if this is not {0}, name the column: --column {0}=THEIRS"
 LEAP_SECOND_REASON = term("rows in a leap second (23:59:60), which seconds from 1970 do not count")
 
 
@@ -67,6 +76,7 @@ class Table:
     def __init__(self, sheet: Sheet, assigned: Mapping[str, str] | None = None):
         self.path, self.sheet, self.skipped = sheet.path, sheet, sheet.skipped
         self.line = 0
+        self.footer_rows: list[tuple[int, str]] = []  # lines and cells of words in place of times, if the last ones
         self.cut_row: tuple[int, ...] = ()  # line and number of cells of the last row, if it has too few
         self.records, self.highest_m, self.barometric_count, self.silent_count = 0, 0.0, 0, 0
         self.of_day = False  # known after the first rows
@@ -81,6 +91,7 @@ class Table:
             encoding = f"the text is read as {sheet.encoding}; for another: --encoding NAME"
             raise ConfigError(*error.lines[:-1], f"{error.lines[-1]}; {encoding}") from error
         self.columns, self.numbers.o_sign = self.header.columns, self.header.o_sign
+        self._remove_grouping_points()
         self.kind = records.POSITIONS if self.header.reads_positions else records.PLOTS
         self.time_index = self.columns["t_s"].position
         self.time_name = sheet.header[self.time_index]
@@ -108,9 +119,18 @@ class Table:
         candidates = [] if "track" in self.columns else [i for i in range(self.width) if i not in used_indices]
         self.cell_values: dict[int, set[str]] = {i: set() for i in candidates}  # of columns that may name the aircraft
 
+    def _remove_grouping_points(self) -> None:
+        """Take the points out of numbers as 30.004 if other numbers of the table have decimal commas."""
+        sheet = self.sheet
+        places = {column.position for ours, column in self.columns.items() if ours not in ("date", "track")}
+        cells = [row[i] for row in sheet.sample for i in places if i < len(row)]
+        if sheet.decimal_comma and has_decimal_commas(cells) and any(ungrouped(cell) != cell for cell in cells):
+            sheet.rows = ((line, ungrouped_cells(row, places)) for line, row in sheet.rows)
+            sheet.sample = [ungrouped_cells(row, places) for row in sheet.sample]
+
     def notes(self, radars: Iterable[str] = ()) -> list[str]:
         """Notes on assumed units and times, and on signs against them."""
-        lines = [*self.clock.notes(), *self.header.notes(), *self.sheet.notes]
+        lines = [*self.clock.notes(), *self.header.notes(), *self.sheet.notes, *self._digit_notes()]
         if (encoding := self.sheet.encoding) != "UTF-8":
             lines.append(
                 tr("the text is read as {name}, as it is not UTF-8; for another: --encoding NAME", name=encoding)
@@ -160,6 +180,20 @@ class Table:
                             "--column track=THEIRS; it may be: {likely}", likely=likely))  # fmt: skip
         return lines
 
+    def _digit_notes(self) -> list[str]:
+        """Notes on numbers that have lost digits, or whose points may separate thousands."""
+        lines = []
+        if cell := self.lost_digits("range_m"):
+            message = term("{name} has lost digits, as {cell} shows: export the column as numbers")
+            lines.append(tr(message, name=self.columns["range_m"].name, cell=cell))
+        column = self.columns.get("range_m")
+        cells = [row[column.position].strip() for row in self.sheet.sample if column and column.position < len(row)]
+        is_grouped = self.sheet.decimal_comma and len(cells) > 1 and all(map(GROUPED_CELL.fullmatch, cells))
+        if column and is_grouped and column.factor < METRES_OF_GROUPS:
+            message = term("points are decimal: {cell} is read as {value:g}; if they separate thousands, take them out")
+            lines.append(tr(message, cell=cells[0], value=float(cells[0])))
+        return lines
+
     def _sensors_note(self) -> list[str]:
         """A note on a column of sensors that is not used, if it has several values."""
         if len(self.sensors) < 2:
@@ -196,6 +230,15 @@ class Table:
             f"name the column, --column track=THEIRS; it may be: {candidates}"
         )
 
+    def lost_digits(self, ours: str) -> str:
+        """A cell of a column whose numbers have lost digits, as those of a spreadsheet do that are shown as 1.7E+09; ''
+        where they have not."""
+        column = self.columns.get(ours)
+        cells = [row[column.position].strip() for row in self.sheet.sample if column and column.position < len(row)]
+        cells = [cell for cell in cells if cell]
+        is_lossy = bool(cells) and all(map(LOSSY_PATTERN.fullmatch, cells))
+        return cells[0] if is_lossy else ""
+
     def batches(self) -> Iterator[records.Batch]:
         """The rows in batches; raises ConfigError with all faults, each with its line and column."""
         names = records.POSITION_COLUMNS if self.kind == records.POSITIONS else records.PLOT_COLUMNS
@@ -210,9 +253,13 @@ class Table:
         except ConfigError as error:
             raise ConfigError(*self.faults.lines(), *error.lines) from error
         if self.cut_row and not self.faults and (self.is_checked or len(builder)):
-            self.skipped[term("lines at the end that are no rows, or cut off")] += 1
+            self.skipped[NO_ROW_REASON] += 1
         elif self.cut_row:
             self._add_width_fault(*self.cut_row)
+        if not self.is_checked and not len(builder):
+            self._add_footer_faults()
+        self.skipped[records.NO_TIME_OR_POSITION] -= len(self.footer_rows)
+        self.skipped[NO_ROW_REASON] += len(self.footer_rows)
         if self.faults:
             raise ConfigError(*self.faults.lines())
         if len(builder):
@@ -244,7 +291,7 @@ class Table:
         if self.cut_row:  # it was not the last one
             self._add_width_fault(*self.cut_row)
             self.cut_row = ()
-        if len(cells) != self.width:
+        if len(cells) != self.width or cells[0][:1] in COMMENT_MARKS:
             self._check_other_line(cells)
             return
         time_cell = cells[self.time_index]
@@ -252,6 +299,8 @@ class Table:
             self._check_second_header(cells)
             return
         row = row_of(cells)
+        if self.footer_rows and not math.isnan(row[0]):  # they were not the last ones
+            self._add_footer_faults()
         if self.faults:  # the rest is only read for further ones
             return
         if self.is_leap_second:
@@ -278,8 +327,10 @@ class Table:
 
     def _check_other_line(self, cells: list[str]) -> None:
         """Count a comment; any other line that is no row of the table is a fault, unless it is the last."""
-        if cells[0].lstrip().startswith(COMMENT_MARKS):
+        if cells[0].lstrip()[:1] in COMMENT_MARKS:
             self.skipped[term("lines of comment")] += 1
+        elif self.time_name.strip(BLANKS) in (cell.strip(BLANKS) for cell in cells):
+            self._add_other_header_fault(cells)
         elif len(cells) < self.width:
             self.cut_row = (self.line, len(cells))
         else:
@@ -291,11 +342,14 @@ class Table:
     def _check_second_header(self, cells: list[str]) -> None:
         """Count a row that repeats the header; one with other columns is a fault."""
         names = zip(cells, self.sheet.header, strict=True)
-        if other_names := [name.strip() for name, own in names if name.strip(BLANKS) != own.strip(BLANKS)]:
-            must = "must be a row of the table, not the header of another: import that from a file of its own"
-            self.faults.add(self.line, "", must, ", ".join(other_names))
+        if other_names := [name for name, own in names if name.strip(BLANKS) != own.strip(BLANKS)]:
+            self._add_other_header_fault(other_names)
         else:
             self.skipped[term("headers repeated within the table")] += 1
+
+    def _add_other_header_fault(self, names: list[str]) -> None:
+        must = "must be a row of the table, not the header of another: import that from a file of its own"
+        self.faults.add(self.line, "", must, ", ".join(name.strip() for name in names))
 
     def _position(self, cells: list[str]) -> tuple[float, ...]:
         """POSITION_COLUMNS of a row."""
@@ -407,8 +461,23 @@ class Table:
                 return self._at_date(t * records.DAY_S, cells) if is_time_of_day else cell_times.day_number_s(t + shift)
             return self._at_date(t, cells) if 0 <= t < records.DAY_S else self._scale_time(t)
         except ValueError:
-            self._add_fault("t_s", f"must be a time in s, {TIME_FORMATS}", repr(text[:60]), self._time_cure(text))
+            if text.replace(" ", "").isalpha() and len(self.footer_rows) < MAX_FOOTER_ROWS:
+                self.footer_rows.append((self.line, text))
+            else:
+                self._add_time_fault(self.line, text)
             return math.nan
+
+    def _add_time_fault(self, line: int, text: str) -> None:
+        column = self.columns["t_s"]
+        cure = self._time_cure(text)
+        self.faults.add(line, f"{column.position + 1}: {column.name}:", f"must be a time in s, {TIME_FORMATS}",
+                        repr(text[:60]), cure or NAME_CURE.format("t_s"), bool(cure))  # fmt: skip
+
+    def _add_footer_faults(self) -> None:
+        """Count words in place of times as faults, since rows follow."""
+        for line, text in self.footer_rows:
+            self._add_time_fault(line, text)
+        self.footer_rows = []
 
     def _time_cure(self, text: str) -> str:
         """What helps with the cell of a time that cannot be read; '' where that is not known."""
@@ -535,5 +604,5 @@ class Table:
 
     def _add_fault(self, ours: str, must: str, got: str, cure: str = "") -> None:
         column, always = self.columns[ours], bool(cure)
-        cure = cure or f"if this is not {ours}, name the column: --column {ours}=THEIRS"
+        cure = cure or NAME_CURE.format(ours)
         self.faults.add(self.line, f"{column.position + 1}: {column.name}:", must, got, cure, always)
