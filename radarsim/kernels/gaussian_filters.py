@@ -145,6 +145,12 @@ def log_densities(e: Sequence[Any], S: Sequence[Any]) -> list[Any]:
     return totals
 
 
+def log_mixture(first: Any, second: Any, p: Any) -> Any:
+    """The logarithm of a density that is one of two, by their logarithms, with the probabilities p and 1 - p."""
+    greatest = maximum(first, second)
+    return greatest + log(p * exp(first - greatest) + (1 - p) * exp(second - greatest))
+
+
 def take(state: State, law: Law, association: Association) -> State:
     """A state after plots of a law, whose covariance includes that of their errors; BST eq. 3.13 to 3.16."""
     (x, P), (_, _, C) = state, law

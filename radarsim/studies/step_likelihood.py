@@ -46,12 +46,9 @@ class StepLikelihood:
         if self.steps.merge is not None and self.steps.sigma_field is not None:
             self.explains = (OUTLIERS, MANOEUVRES) if self.steps.noise_field is not None else (OUTLIERS,)
             self.given_tracks = [unwrap_angles(study, self.columns, track) for track in tracks]
-            unfolded = [
-                m.column
-                for m in study.measured
-                if m.column in self.columns and (m.unit != "m/s" or study.span_mps(spec) is None)
-            ]
-            self.cleaned_tracks = [without_gross_starts(track, unfolded, 1) for track in self.given_tracks]
+            folds = study.span_mps(spec) is not None
+            smooth = [m.column for m in study.measured if m.column in self.columns and not (folds and m.unit == "m/s")]
+            self.cleaned_tracks = [without_gross_starts(track, smooth, 1) for track in self.given_tracks]
         self.spans = data_span(self.given_tracks, self.columns)
         self.recording, self.places = join_tracks(study, spec, self.columns, self.cleaned_tracks)
         self.kernels: dict[Any, CompiledLikelihood] = {}  # by the formulas that numbers choose

@@ -21,8 +21,9 @@
         def covariance(s, u, c): …                  # their packed covariance, or None
         def log_densities(s, z, u, c): …            # of a plot's first number, of the first two, … by the state before
         def innovation(s, z, u, c): …               # of a plot, with its packed covariance, or None
-        sigma_field = "sigma"                       # of the numbers: σ of what is measured, a tuple; noise_field: those
-        def merge(s, other, p, c): …                # of the process noise; a state of two, with probabilities p, 1 - p
+        def merge(s, other, p, c): …                # one state of two, with the probabilities p and 1 - p
+        sigma_field = "sigma"                       # the numbers' field of σ of what is measured, a tuple
+        noise_field = "noise"                       # that of σ of the process noise, which hard manoeuvres raise
 
 These are plain functions of numbers, tuples and named records; what calculates with numbers of a realisation is in
 `radarsim.kernels.tracing` (`sqrt`, `where`, …) and `radarsim.kernels.formula_functions` (`sin`, `atan2`, …). A state, a
@@ -32,7 +33,8 @@ and whole numbers of a record are no numbers of a realisation, and each of their
 
 The first plot is always there; `detection` is the probability of each later one. Where a filter gives a covariance,
 `believed_sigma` in `curves` and the table `consistency` say how it agrees with the errors, the latter from the scan
-`tested_from(spec, filter_keys)` on. A study that knows σ exactly gives `exact_sigma`.
+`tested_from(spec, filter_keys)` on. A study that knows σ exactly gives `exact_sigma`. `fit` allows for outliers where a
+filter gives `merge` and `sigma_field`.
 
 Among false plots a study gives more:
 

@@ -15,11 +15,11 @@ from radarsim.config.radial_keys import MAX_SPEED_MPS
 from radarsim.config.study_keys import Member
 from radarsim.errors import ConfigError
 from radarsim.kernels import gaussian_filters
-from radarsim.kernels.formula_functions import atan2, exp, log
+from radarsim.kernels.formula_functions import atan2
 from radarsim.kernels.planar_motion import predict
 from radarsim.kernels.polar_filters import is_fold_known, law_of_plot, plot_difference, take_converted_plot
 from radarsim.kernels.polar_plots import polar, polar_rows, speed_and_course_rows, state_of_plot
-from radarsim.kernels.small_matrices import congruence, dot
+from radarsim.kernels.small_matrices import congruence
 from radarsim.kernels.tracing import maximum, sqrt, where
 from radarsim.language.translate import term
 from radarsim.studies.planar import PlanarStudy
@@ -191,10 +191,11 @@ class Tracking(Steps):
         return congruence((*polar_rows(x)[:2], *speed_and_course_rows(moving)), P)
 
     def log_densities(s, z, u, c):
-        states, weights = (s[0][:2], (s[0][2], 1 - s[0][2])) if c.kind == "imm" else (s[:1], (1.0,))
-        laws = [expected_plot(state, c) for state in states]
+        laws = [expected_plot(state, c) for state in (s[0][:2] if c.kind == "imm" else s[:1])]
         by_model = [gaussian_filters.log_densities(plot_difference(z, mean, c.span), S) for mean, S, _ in laws]
-        return [log(maximum(dot(weights, [exp(a) for a in logs]), 1e-300)) for logs in zip(*by_model, strict=True)]
+        if c.kind != "imm":
+            return by_model[0]
+        return [gaussian_filters.log_mixture(a, b, s[0][2]) for a, b in zip(*by_model, strict=True)]
 
     def merge(s, other, p, c):
         mix = gaussian_filters.mix_pairs if c.kind == "imm" else gaussian_filters.mix

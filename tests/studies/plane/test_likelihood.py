@@ -248,3 +248,16 @@ def test_advice_names_an_outlier_before_a_sigma():
     findings = advice.find_errors(likelihood)
     assert findings[0].name == OUTLIERS
     assert [(row.t_s, row.column) for row in findings[0].rows] == [(t_s, "range_m")]
+
+
+@pytest.mark.parametrize("filter_keys", [FILTERS[0], FILTERS[2]], ids=lambda keys: keys["name"])
+def test_a_plot_far_off_costs_a_plain_likelihood_by_its_size(filter_keys):
+    case = case_of([filter_keys], STRAIGHT, 20, detection_probability=1.0)
+    sound, plots = recording(case, 1), study("plane").recording_interface()
+    values = []
+    for error in (1e6, 2e6):
+        columns = sound | {"range_m": sound["range_m"] + error * (np.arange(20) == 19)}
+        likelihood = plots.likelihood(case, None, [columns])
+        values.append(likelihood(likelihood.stated))
+    assert -values[0] > 1e6
+    assert values[1] / values[0] == pytest.approx(4.0, rel=0.2)
