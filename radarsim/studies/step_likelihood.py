@@ -14,7 +14,7 @@ from radarsim.studies.step_checks import record
 from radarsim.studies.step_laws import has_laws, plot_laws
 from radarsim.studies.step_likelihood_programs import CompiledLikelihood, compile_likelihood, formula_choices, sigmas
 from radarsim.studies.step_programs import to_numbers
-from radarsim.user_code.errors import study_context, user_code_error
+from radarsim.user_code.errors import call_user_function, study_context, user_code_error
 
 if TYPE_CHECKING:
     from radarsim.studies.stepwise import StepStudy
@@ -58,8 +58,8 @@ class StepLikelihood:
         part, _, name = key.rpartition(".")
         return part, getattr(getattr(self.spec, part) if part else self.filter_keys, name)
 
-    def _numbers(self, values: np.ndarray) -> Any:
-        """The numbers of the filter with these values of the keys."""
+    def _config(self, values: np.ndarray) -> tuple[Any, Any]:
+        """The config with these values of the keys, and the filter's part of it."""
         spec, filter_keys = self.spec, self.filter_keys
         for key, value in zip(self.keys, map(float, values), strict=True):
             part, _, name = key.rpartition(".")
@@ -67,7 +67,7 @@ class StepLikelihood:
                 spec = spec.model_copy(update={part: getattr(spec, part).model_copy(update={name: value})})
             else:
                 filter_keys = filter_keys.model_copy(update={name: value})
-        return record(self.steps.design, spec, filter_keys)
+        return spec, filter_keys
 
     def __call__(self, values: np.ndarray, law: ErrorLaw = STATED_ERRORS) -> float:
         if has_laws(law):
@@ -92,10 +92,10 @@ class StepLikelihood:
         """The logarithm of the density of all plots but the first of a track, given those before, by their numbers."""
         from radarsim.kernels.lanes import rows
 
-        c, compiled = self._compiled(values, several_laws=False)
+        _, numbers, compiled = self._compiled(values, several_laws=False)
         result = np.zeros((len(self.recording.kinds), len(self.columns)))
         work = [rows(n) for n in (compiled.rows, 1, len(self.study.measured), len(self.columns))]
-        compiled.kernel(*self.recording, to_numbers(c), *work, result)
+        compiled.kernel(*self.recording, numbers, *work, result)
         with np.errstate(invalid="ignore"):
             return np.diff(result.sum(axis=0), prepend=0.0)
 
@@ -104,25 +104,27 @@ class StepLikelihood:
         probabilities (n, m) of their numbers to be no outliers."""
         from radarsim.kernels.lanes import rows
 
-        c, compiled = self._compiled(values, several_laws=True)
+        c, numbers, compiled = self._compiled(values, several_laws=True)
         measured = [number.column for number in self.study.measured]
         used = [measured.index(name) for name in self.columns]
         laws = plot_laws(law, sigmas(self.steps, c, len(measured)), self.spans.tolist(), used)
         scores, soundness = np.zeros(len(self.recording.kinds)), np.ones((len(self.recording.kinds), len(used)))
         states = [compiled.rows * count for count in (1, len(laws.chances), 1)]
         work = tuple(rows(n) for n in (compiled.rows, 1, len(measured), len(used), *states, 1, 1))
-        compiled.kernel(self.recording, to_numbers(c), laws, work, scores, soundness)
+        compiled.kernel(self.recording, numbers, laws, work, scores, soundness)
         return scores, soundness
 
-    def _compiled(self, values: np.ndarray, several_laws: bool) -> tuple[Any, CompiledLikelihood]:
-        """The numbers of the filter with these values of the keys, and its kernel."""
+    def _compiled(self, values: np.ndarray, several_laws: bool) -> tuple[Any, np.ndarray, CompiledLikelihood]:
+        """The numbers of the filter with these values of the keys, as it has them and as an array, and its kernel."""
         with study_context(self.study.name), np.errstate(all="ignore"):
-            c = self._numbers(values)
-            choices = formula_choices(c), several_laws
-            if choices not in self.kernels:
+            config = self._config(values)
+            c = call_user_function(self.steps.design, *config)
+            numbers, choices = to_numbers(c), (formula_choices(c), several_laws)
+            if choices not in self.kernels or not np.isfinite(numbers).all():
+                record(self.steps.design, *config)  # refuses what no kernel can take
                 counts = len(self.study.measured), len(self.columns)
                 self.kernels[choices] = compile_likelihood(self.steps, c, *counts, several_laws)
-            return c, self.kernels[choices]
+            return c, numbers, self.kernels[choices]
 
 
 def unwrap_angles(study: "StepStudy", columns: Sequence[str], track: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
