@@ -183,6 +183,9 @@ class _Reader:
                     break
         except csv.Error as error:
             fault = f"{self.path}:{self.rows.line_num}: not a CSV row: {error}"
+            if "unexpected end" in str(error) and lines:
+                must = "must have pairs of quotation marks; one is open to the end of the file"
+                fault = f"{self.path}:{lines[-1] + 1}: {must}"
             raise ConfigError(*self.faults.lines(), fault) from error
         return lines, values, tracks, texts
 
@@ -224,7 +227,9 @@ class _Reader:
     def _row_numbers(self, row: list[str], line: int) -> list[float]:
         """The numbers of a row; faulty ones become NaN."""
         if len(row) != self.width:
-            self.faults.add(line, "", f"must have {self.width} cells as the header", len(row))
+            cure = f"comments, cut lines and empty cells at the end are left out by {import_command(self.path)}"
+            cure = cure if "range_m" in self.names else ""
+            self.faults.add(line, "", f"must have {self.width} cells as the header", len(row), cure, always=bool(cure))
             return [math.nan] * (len(self.names) + len(self.extra_indices))
         measured = [self._parse_number(row[index].strip(), line, j) for j, index in enumerate(self.indices)]
         return [*measured, *(_number_or_nan(row[index]) for index in self.extra_indices.values())]
@@ -238,10 +243,12 @@ class _Reader:
             value = math.nan
         if not abs(value) <= LARGEST_NUMBER or "_" in text:
             hint = " with a decimal point, not a comma" if DECIMAL_COMMA.fullmatch(text) else ""
-            what = "cells that stand for none" if j else "times of day and dates"
+            what = "cells that stand for none" if j else "times of day, dates, and lines that are no rows"
             cure = f"for {what}, {import_command(self.path)}" if not j or "range_m" in self.names else ""
             must = f"must be a finite number{hint}"
-            self.faults.add(line, self._column_label(j), must, repr(text[:60]), cure, always=bool(cure and j))
+            self.faults.add(
+                line, self._column_label(j), must, repr(text[:60]), cure, always=bool(cure) and "range_m" in self.names
+            )
             return math.nan
         return value
 

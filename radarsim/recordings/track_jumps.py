@@ -5,15 +5,19 @@ are neither: the rows before and after a jump must say it in the median. A jump 
 changes the range by the factor of a unit, or the track goes on after it as before, as no manoeuvre between two plots
 lets it; all are judged by the scatter of the same track."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from radarsim.language.translate import tr
+from radarsim.recordings.formats.clock_steps import SetBack
+from radarsim.recordings.formats.forward_steps import find_set_forward
 from radarsim.recordings.grouping import rows_by_name
 from radarsim.recordings.target_speed import MAX_JUMP_MPS, MIN_JUMP_LEGS, MIN_ROWS, POSITION_COLUMNS, TrackPositions
 
+USE_PATTERN = re.compile(r" \(\d+\)$")  # behind a track number that is used again
 MAX_JUMP_MPS2 = 100.0  # of a target that moves on as before: 10 g
 MIN_LASTING_SCATTER = 10.0  # median changes from leg to leg of a track
 MAX_JUMP_STEPS = 5.0  # median steps of a track: after a longer gap its number may be another target's
@@ -54,10 +58,11 @@ class Alternation(NamedTuple):
 
 
 class CourseFault(NamedTuple):
-    """What no course of a single target explains: jumps, or an alternation."""
+    """What no course of a single target explains: jumps, an alternation, or a clock that was set forward."""
 
     jumps: tuple[Jump, ...] = ()
     alternation: Alternation | None = None
+    forward_step: SetBack | None = None
 
     def message(self) -> str:
         """What is wrong, and what would explain it."""
@@ -65,6 +70,10 @@ class CourseFault(NamedTuple):
             track = self.alternation.track and tr(" of track {name}", name=self.alternation.track)
             return tr("the rows{track} alternate between two places, {distance:.0f} m apart (median): two sensors or "
                       "targets have one name", track=track, distance=self.alternation.distance_m)  # fmt: skip
+        if self.forward_step is not None:
+            return tr("the clock was set forward by {size:.6g} s at {time:g} s, as the targets go on from where they "
+                      "were: radarsim import undoes it",
+                      size=-self.forward_step.size_s, time=self.forward_step.until_s)  # fmt: skip
         name, time_s, before, after = self.jumps[0]
         track = name and tr(" in track {name}", name=name)
         return tr("positions jump as no target does (rows: {count}), first{track} from {before:.0f} to {after:.0f} m "
@@ -265,4 +274,21 @@ def column_fault(tracks: Mapping[str, Sequence[Mapping[str, np.ndarray]]]) -> Co
                 return CourseFault(alternation=alternation)
             jumps += find_jumps(name, track)
             rows += len(track.t_s)
-    return jumps_fault(jumps, rows)
+    return jumps_fault(jumps, rows) or _forward_fault(tracks)
+
+
+def _forward_fault(tracks: Mapping[str, Sequence[Mapping[str, np.ndarray]]]) -> CourseFault | None:
+    """The fault of a clock that was set forward, which may have given a track another name."""
+    parts: dict[str, list[TrackPositions]] = {}
+    for name, stretches in tracks.items():
+        for columns in stretches:
+            if (track := column_positions(columns)) is not None:
+                parts.setdefault(USE_PATTERN.sub("", name), []).append(track)
+    tables = [part for track in parts.values() for part in track]
+    if not tables or len({part.positions.shape[1] for part in tables}) > 1:
+        return None
+    t, positions = (np.concatenate(values) for values in zip(*tables, strict=True))
+    ends = np.cumsum([sum(len(part.t_s) for part in track) for track in parts.values()])
+    rows = np.split(np.arange(len(t)), ends[:-1])
+    step = find_set_forward(t, positions, rows)
+    return None if step is None else CourseFault(forward_step=step)

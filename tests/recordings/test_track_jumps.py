@@ -143,3 +143,33 @@ def test_a_slow_target_does_not_change_its_range_by_kilometres_within_a_scan():
         r = 20e3 + rng.uniform(-10, 10) * t + rng.normal(0, 20, N) + 2000 * (t >= t[N // 2])
         fault = column_fault({"": [{"t_s": t, "range_m": r}]})
         assert [jump.t_s for jump in fault.jumps] == [t[N // 2]], seed
+
+
+@pytest.mark.parametrize("track", ["", "7"])
+def test_track_and_fit_name_a_clock_that_was_set_forward(tmp_path, track):
+    """A gap of over a minute gives the track another name."""
+    t, r, v = course()
+    (experiment,) = load_experiments.load_all(["rls2"], ("radar.scan_period_s=4",))
+    path = write_plots(tmp_path / "plots.csv", t + 3600 * (t >= 120), r, v, track)
+    named = "the clock was set forward by 3600 s at 116 s, as the targets go on from where they were: radarsim import"
+    advised = advice.advise(recordings_track.track_plots(experiment, path))
+    assert advised.course_fault.message().startswith(named)
+    with pytest.raises(ConfigError) as caught:
+        fit_plots(experiment, path)
+    assert caught.value.lines[0].startswith(f"{path}: {named}")
+    path = write_plots(tmp_path / "gap.csv", t + 3600 * (t >= 120), r + 95 * 3600 * (t >= 120), v, track)
+    assert advice.advise(recordings_track.track_plots(experiment, path)).course_fault is None
+
+
+def test_track_and_fit_name_the_track_whose_velocities_have_the_other_sign(tmp_path):
+    (experiment,) = load_experiments.load_all(["rls2"], ("radar.scan_period_s=4",))
+    t, r, v = course()
+    _, other, w = course(speed_mps=-120.0, first_m=90_000.0, seed=2)
+    rows = [f"{a},1,{b:.2f},{c:.3f}\n{a},2,{d:.2f},{-e:.3f}" for a, b, c, d, e in zip(t, r, v, other, w, strict=True)]
+    path = tmp_path / "plots.csv"
+    path.write_text("\n".join(["t_s,track,range_m,velocity_mps", *rows]))
+    named = "in track 2 alone: the velocities have the opposite sign of the change of the range"
+    (message,) = advice.advise(recordings_track.track_plots(experiment, path)).velocity_faults
+    assert message.startswith(named)
+    with pytest.raises(ConfigError, match=named):
+        fit_plots(experiment, path)

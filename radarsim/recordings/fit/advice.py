@@ -34,7 +34,7 @@ from radarsim.recordings.fit.likelihood_slice import (
 from radarsim.recordings.fit.newton_steps import LEAP_STEPS, SMOOTH_STEPS, polish_maximum
 from radarsim.recordings.fit.profile_search import HALF_CHI2_95
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, sample_rows
-from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
+from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault, single_track_faults
 from radarsim.recordings.study_part import recording_interface, unknown_inherited_keys
 from radarsim.recordings.target_speed import impossible_column_speed
 from radarsim.recordings.track_jumps import CourseFault, column_fault
@@ -89,8 +89,8 @@ class Advice:
     """Advice from the likelihood of a config's filters over recorded plots: the best filter; the errors in the numbers
     of the one that takes most columns; the rows used. folding, doppler_scale: where the velocities are folded, or a
     multiple of the change of the range; impossible_speed: that no target has, m/s; course_fault: where positions jump
-    or alternate; nothing else is then examined. start_errors: outliers at the values of the config, as plots too far
-    off to start a track."""
+    or alternate; velocity_faults: of some tracks alone; nothing else is then examined. start_errors: outliers at the
+    values of the config, as plots too far off to start a track."""
 
     comparison: FilterComparison
     findings: list[Finding]
@@ -99,6 +99,7 @@ class Advice:
     doppler_scale: DopplerScale | None = None
     impossible_speed: float | None = None
     course_fault: CourseFault | None = None
+    velocity_faults: tuple[str, ...] = ()
     start_errors: tuple[OutlierRow, ...] = ()
 
 
@@ -125,6 +126,8 @@ def advise(followed: TrackingResult, progress: Progress = no_progress) -> Advice
         return Advice(comparison, [], used_rows, impossible_speed=speed)
     if course_fault := column_fault(_stretches_by_track(followed)):
         return Advice(comparison, [], used_rows, course_fault=course_fault)
+    if notes := single_track_faults(case, _stretches_by_track(followed)):
+        return Advice(comparison, [], used_rows, velocity_faults=tuple(notes))
     fault = detect_case_velocity_fault(case, stretches)
     if fault.folding is not None or fault.scale is not None:
         return Advice(comparison, [], used_rows, fault.folding, fault.scale)

@@ -34,7 +34,7 @@ from radarsim.recordings.fit.likelihood_slice import (
 from radarsim.recordings.fit.profile_intervals import FittedKey, ProfileIntervals
 from radarsim.recordings.fit.profile_search import EXPLANATION_EVALUATIONS, LikelihoodSearch, follows_another_law
 from radarsim.recordings.fit.row_sample import MIN_TRACK_ROWS, ROUGH_ROWS, sample_rows
-from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault
+from radarsim.recordings.fit.velocity_faults import detect_case_velocity_fault, single_track_faults
 from radarsim.recordings.rounding_guard import LOSS_GAP_PERIODS, gap_message
 from radarsim.recordings.rows_by_track import split_by_track
 from radarsim.recordings.study_part import recording_interface, refuse_inherited_part, single_case
@@ -237,6 +237,8 @@ def _refuse_impossible_motion(
         return
     fault = detect_case_velocity_fault(case, tracks)
     with use_language("en"):  # as all faults
+        if notes := single_track_faults(case, {name: [columns] for name, columns in named.items()}):
+            raise ConfigError(*(f"{source}: {note}" for note in notes))
         if fault.folding is not None:
             raise ConfigError(f"{source}: {folding_message(fault.folding, case)}")
         if fault.scale is not None:

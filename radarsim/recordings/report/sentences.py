@@ -163,6 +163,8 @@ def advice_statements(followed: TrackingResult, advice: Advice) -> list[Statemen
         statements.append(Statement("advice", speed_message(advice.impossible_speed)))
     elif advice.course_fault is not None:
         statements.append(Statement("advice", advice.course_fault.message()))
+    elif advice.velocity_faults:
+        statements += [Statement("advice", message) for message in advice.velocity_faults]
     elif advice.doppler_scale is not None:
         statements.append(Statement("advice", doppler_scale_message(advice.doppler_scale)))
     elif not advice.findings:
