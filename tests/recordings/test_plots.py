@@ -90,8 +90,8 @@ def test_equal_faults_are_one_line_with_their_cure(tmp_path, chunk):
     with pytest.raises(ConfigError) as caught:
         list(read_plots.pieces(path, CHOICES, chunk))
     assert sorted(line.replace(f"{tmp_path}/", "") for line in caught.value.lines) == [
-        f"plots.csv:2:1: t_s: must be a finite number, got '10:00' (and 4 more, in lines 4, 7, 8, …); for times of day, "
-        f"dates, and lines that are no rows, {IMPORT}",
+        f"plots.csv:2:1: t_s: must be a finite number, got '10:00' (and 4 more, in lines 4, 7, 8, …); for times of "
+        f"day, dates, and lines that are no rows, {IMPORT}",
         f"plots.csv:2:3: bearing_rad: must be in radians, from -2 pi to 2 pi, got 45 (and 3 more, in lines 4, 7, 8); "
         f"if these are degrees, name it bearing_deg and {IMPORT}",
         f"plots.csv:3:2: range_m: must be a finite number, got 'b' (and 1 more, in line 9); for cells that stand for "
