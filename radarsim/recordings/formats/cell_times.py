@@ -39,7 +39,9 @@ DAY_NUMBERS = (  # the first and last number of days of recordings, and that of 
     ("Julian days", 2440587.5, 2491000.0, 2440587.5),
 )
 FRACTIONS_OF_DAY = "fractions of a day"
-DATE_DIGITS_PATTERN = re.compile(r"(?:19|20)\d{2}[01]\d[0-3]\d[0-2]\d[0-5]\d[0-5]\d(?:\.\d*)?")  # 20261128120006.25
+DATE_DIGITS_PATTERN = re.compile(
+    r"(?:19|20)\d{2}[01]\d[0-3]\d[0-2]\d[0-5]\d[0-5]\d(?:\.\d*|\d{3}|\d{6})?"
+)  # 20261128120006.25
 MIN_CLOCK_ROWS, MIN_CLOCK_SECONDS = 20, 5  # different times, and seconds in them, that show what clock digits are
 MAX_DAY_STEP = 1.2e-3  # of day numbers from row to row: 100 s; of seconds it would be a kilohertz
 
@@ -132,7 +134,7 @@ def digits_date_s(text: str) -> float | None:
     """Seconds from 1970 of a date and time without separators, 20261128120006.25; None of another text."""
     if not DATE_DIGITS_PATTERN.fullmatch(text):
         return None
-    return utc_s(f"{text[:8]}T{text[8:14]}") + float(f"0{text[14:]}")
+    return utc_s(f"{text[:8]}T{text[8:14]}") + float(f"0.{text[14:].removeprefix('.')}")
 
 
 def clock_digits_s(number: float) -> float:

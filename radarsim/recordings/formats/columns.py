@@ -46,6 +46,7 @@ FORMULAS = {  # what no option makes a range or a time, by the names of its colu
     r"(?:scan|frame|dwell|sweep|rotation)s?(?:_(?:no|nr|num|number|index|id|count))?": "a number of scans times the "
     "scan period is the time",
     RELATIVE_BEARING: "a relative bearing plus the heading is the bearing",
+    r".*(?:^|_)[km]?hz": "half the wavelength times a Doppler frequency is the speed",
     r"hour|hours|hh|minute|minutes|second|seconds": "hours, minutes and seconds are a time in one column, HH:MM:SS",
 }
 FREQUENCY_UNITS = ("hz", "khz", "гц", "кгц")

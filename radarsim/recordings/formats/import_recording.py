@@ -140,6 +140,18 @@ def add_stated_sites(options: Options, reader: Reader) -> tuple[Options, list[st
     return (options if options.site else replace(options, sites=sites | dict(options.sites))), notes
 
 
+def _name_notes(tracks: Iterable[str]) -> list[str]:
+    """A note on tracks whose names differ in their writing alone, as 7 and 7.0, or a1 and A1."""
+    names_by_key: dict[str, list[str]] = {}
+    for name in tracks:
+        names_by_key.setdefault(name.casefold().removesuffix(".0").lstrip("0"), []).append(name)
+    alike = [names for names in names_by_key.values() if len(names) > 1]
+    if not alike:
+        return []
+    listed = "; ".join(", ".join(names) for names in alike[:MAX_LISTED])
+    return [tr("tracks whose names differ in their writing alone are taken as several: {names}", names=listed)]
+
+
 class _Import:
     """An import in progress: batches in, rows out."""
 
@@ -491,6 +503,7 @@ class _Import:
             result.notes.append(tr("plots of several radars, SAC/SIC (rows): {each}; the tracks of all but the first "
                                  "have its name before their number", each=counts_by_radar))  # fmt: skip
         result.notes += self.reader.notes(self.radars)
+        result.notes += _name_notes(result.tracks)
         if isinstance(self.reader, Table) and self.reader.sheet.is_one_track and not self.reader.of_day:
             last_s = max(self.later_rows.last_times.values(), default=math.nan)
             result.notes += row_order.rollover_notes(self.reader.path, last_s)

@@ -28,6 +28,7 @@ CSV_DELIMITERS = {"|": "|", " ": "\t"}  # of drawn tables, and of blanks, by tha
 RULE_PATTERN = re.compile(r"[-+|:=\s]*[-+=|]{2}[-+|:=\s]*")  # between the rows of a drawn table
 SEPARATOR_PATTERN = re.compile(r"\"?sep=(.)\"?[,;]*", re.IGNORECASE)  # a line that states the separator
 MAX_LINES_ABOVE, MIN_KNOWN_NAMES = 20, 2  # lines of text above a header; quantities that it then names
+MAX_HEADER_LINES = 20  # of cells with line breaks
 SAMPLE_LINES = 20  # lines after the header that show the separator, and what the columns hold
 BASESTATION_STARTS = ("MSG,", "STA,", "AIR,", "SEL,", "ID,", "CLK,")
 BASESTATION_HEADER = (  # of the fields of such a port; what is meant by a name that has no unit is fixed
@@ -62,15 +63,21 @@ def read_csv(path: str, file: TextIO, encoding: str) -> Sheet:
     and a line of units below it."""
     head = list(itertools.islice(file, MAX_LINES_ABOVE + SAMPLE_LINES))
     above, separator = _lines_above_header(head)
-    text, sample = (head[above] if above < len(head) else ""), head[above + 1 :]
+    last = _last_header_line(head, above)
+    text, sample = "".join(head[above:last]), head[last:]
     delimiter = separator or _find_delimiter(text, sample)
-    lines = itertools.chain([text], sample, file)
+    lines = itertools.chain(head[above:last], sample, file)
     comment = head[above - 1].removeprefix("#") if above and head[above - 1].startswith("#") else ""
     if text.startswith(BASESTATION_STARTS):
         lines, above = itertools.chain([",".join(BASESTATION_HEADER) + "\n"], lines), above - 1
     elif _is_header(comment, delimiter) and not _is_header(text, delimiter):
         lines, above = itertools.chain([comment], lines), above - 1
-    cells = csv.reader(_cell_lines(lines, delimiter), strict=True, delimiter=CSV_DELIMITERS.get(delimiter, delimiter))
+    cells = csv.reader(
+        _cell_lines(lines, delimiter),
+        strict=True,
+        delimiter=CSV_DELIMITERS.get(delimiter, delimiter),
+        quotechar="'" if text.startswith("'") and text.count("'") % 2 == 0 else '"',
+    )
 
     def rows() -> Iterator[tuple[int, list[str]]]:
         last_line = 0
@@ -83,7 +90,8 @@ def read_csv(path: str, file: TextIO, encoding: str) -> Sheet:
             if "unexpected end" in str(error):
                 raise ConfigError(f"{path}:{above + last_line + 1}: must have pairs of quotation marks; one is open to "
                                   "the end of the file") from error  # fmt: skip
-            raise ConfigError(f"{path}:{above + cells.line_num}: not a CSV row: {error}") from error
+            cure = "; a quotation mark may be open" if "field limit" in str(error) else ""
+            raise ConfigError(f"{path}:{above + cells.line_num}: not a CSV row: {error}{cure}") from error
 
     numbered_rows = rows()
     _, header = next(numbered_rows, (0, []))
@@ -118,6 +126,14 @@ def _lines_above_header(head: list[str]) -> tuple[int, str]:
             if is_header and not line.startswith("#"):
                 return later, separator
     return first, separator
+
+
+def _last_header_line(head: list[str], first: int) -> int:
+    """The line after a header, whose cells in quotation marks may go on in further lines."""
+    last = first + 1
+    while "".join(head[first:last]).count('"') % 2 and last < min(len(head), first + MAX_HEADER_LINES):
+        last += 1
+    return last if "".join(head[first:last]).count('"') % 2 == 0 else first + 1
 
 
 def _with_units(header: list[str], cells: list[str]) -> list[str]:

@@ -64,6 +64,7 @@ MAX_ALTITUDE_M = 20_000.0  # of an aircraft; higher altitudes are feet
 GROUPED_CELL = re.compile(r"[-+]?[1-9]\d{0,2}\.\d{3}")  # whose point may separate thousands
 METRES_OF_GROUPS = 100.0  # of a unit of ranges that have rarely three decimals
 LOSSY_PATTERN = re.compile(r"[-+]?\d(?:[.,]\d{0,8})?[eE]\+?(?:0?[4-9]|1\d)")
+SHORT_YEAR_PATTERN = re.compile(r"\d{1,2}([./-])\d{1,2}\1\d{2}(?!\d)")
 MAX_LISTED = 5  # sensors
 NO_ROW_REASON = term("lines at the end that are no rows, or cut off")
 NAME_CURE = "if this is not {0}, name the column: --column {0}=THEIRS"
@@ -481,6 +482,8 @@ class Table:
 
     def _time_cure(self, text: str) -> str:
         """What helps with the cell of a time that cannot be read; '' where that is not known."""
+        if SHORT_YEAR_PATTERN.match(text):
+            return "years have four digits"
         zone = re.search(r"[^\W\d_]+(?:/\w+)?$", text)
         if zone and ":" in text and zone[0].lower() not in ("am", "pm"):
             return f"a zone is stated by its offset, as +03:00 in place of {zone[0]}"

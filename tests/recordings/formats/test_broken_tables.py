@@ -28,6 +28,10 @@ READ = {
     "two marks of a file's beginning": b"\xef\xbb\xbf" * 2 + table(*LINES),
     "compressed twice": gzip.compress(gzip.compress(table(*LINES))),
     "UTF-32": table(*LINES).decode().encode("utf-32"),
+    "line breaks in the header": table(*LINES, header='"time\n[s]","range\n[m]"'),
+    "single quotation marks": table(
+        *(line.replace(",", "','").join("''") for line in LINES), header="'time','range_m'"
+    ),
     "sums below": table(*LINES, "Total,2470000.0", "Mean,41000.0"),
     "points of thousands": table(
         *(f"{t:.0f};{r / 1000:.3f};1,25" for t, r in zip(T, R, strict=True)), header="t;Entfernung [m];Vr [m/s]"
@@ -56,6 +60,7 @@ REFUSED = {
         "must be a row of the table, not the header of another",
     ),
     "cut within a letter": (table(*LINES, "240,52000.0,ж", header="time,range_m")[:-2], "it ends within a letter"),
+    "years of two digits": (table("20.11.26 10:00:00,30000.0"), "years have four digits"),
     "words between": (table(*with_lines(["pause,1"], 30)), "must be a time in s"),
     "digits lost by a spreadsheet": (
         table(*(f"{1.7e9 + t:.2E},{r:.1f}" for t, r in zip(T, R, strict=True))),
@@ -128,6 +133,14 @@ def test_coordinates_that_one_sensor_swaps_are_named(tmp_path):
         note.startswith("60 of 120 positions, of b, lie ") and "if latitude and longitude are swapped" in note
         for note in done.notes
     )
+
+
+@pytest.mark.parametrize("names", [("7", "7.0"), ("a1", "A1"), ("07", "7")])
+def test_names_that_differ_in_their_writing_alone_are_named(tmp_path, names):
+    rows = (f"{line},{names[k >= 30]}" for k, line in enumerate(LINES))
+    done, _, tracks = imported(tmp_path, table(*rows, header="time,range_m,track"))
+    assert done.notes == [f"tracks whose names differ in their writing alone are taken as several: {', '.join(names)}"]
+    assert set(tracks) == set(names)
 
 
 def test_numbers_that_may_have_points_of_thousands_or_lost_digits_are_named(tmp_path):
