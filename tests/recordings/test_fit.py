@@ -394,6 +394,22 @@ def test_a_law_of_many_outliers_that_gains_nothing_is_not_taken(realisation):
     assert all(key.lo <= key.stated <= key.hi for key in found.keys[:2])
 
 
+@pytest.mark.slow  # 3 s: fewer plots do not tell both σ
+@pytest.mark.parametrize("size_m", [25e3, 6e6])
+def test_gross_errors_do_not_lead_a_plain_search_astray(size_m):
+    """Every tenth range raises σ of range alone: σ of velocity was told as half a span, or manoeuvres as infinite."""
+
+    def change(columns):
+        return columns | {"range_m": columns["range_m"] + size_m * (np.arange(120) % 10 == 5)}
+
+    search = profile_search.LikelihoodSearch(folded_likelihood(8, change), False, no_progress)
+    sigma_range, sigma_velocity, manoeuvre = search.to_values(search.best)
+    assert sigma_range == pytest.approx(size_m * np.sqrt(0.1), rel=0.3)
+    assert sigma_velocity == pytest.approx(15, rel=0.3)
+    assert manoeuvre < 1e-3
+    assert search.evaluations < 700
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("is_folded", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_plots_that_follow_another_law_are_refused(is_folded, seed):

@@ -57,6 +57,7 @@ CLEAR_NEAR_GAIN = 3.9074  # half the 95 % point of chi-square of their three num
 NEAR_CLIMBS = 2  # searches from the likeliest of these
 END_STARTS = 2  # of these that are tried with smaller keys, where an end is
 LAW_SIZE = 4  # coordinates of an outlier law: the logits of its shares, the logarithms of offset and spread
+COARSE_GAIN = 1000.0  # of the log-likelihood by ten times a key, from which a search begins there
 # distance of an end from the maximum where curvature tells none, and the greatest that is tried first
 UNKNOWN_END_DISTANCE, MAX_FIRST_DISTANCE = 0.1, 1.0
 NEAR_MAXIMUM_EVALUATIONS = 30  # as MAXIMUM_EVALUATIONS, from near the maximum
@@ -89,11 +90,13 @@ class LikelihoodSearch:
             self.zero_reach = np.append(self.zero_reach, [NEAR_ZERO_LOG] * 2 + [NEAR_WIDTH_LOG] * 2)
         self.maximum_cost = (MAXIMUM_EVALUATIONS if start_point is None else NEAR_MAXIMUM_EVALUATIONS) * start.size
         self.curvature_model = Curvature(self.log_likelihood, self.steps)
+        self.differences = np.full(start.size, self.steps.curvature)
         self.rival, self.rival_top, self.near_points = np.zeros(0), -math.inf, dict[int, np.ndarray]()
         if start_point is not None:
             # Fewer rows may have been without the outliers of all: a share that is zero has no slope.
             start[: len(likelihood.stated)] = start_point[: len(likelihood.stated)]
             start = np.where(start_point > self.lowest, start_point, start)
+        start = self._coarse_start(start)
         self.best, self.top = self.climb(start, None, ROUGH_TOLERANCE)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
         for climb_count, factor in enumerate((0.1, 10.0) if start_point is None else (), 1):
@@ -111,6 +114,18 @@ class LikelihoodSearch:
         self.top = -math.inf
         self._polish(self.best)
         self.raise_zero_keys()
+
+    def _coarse_start(self, start: np.ndarray) -> np.ndarray:
+        """A start with keys changed by whole powers of ten, as long as that gains much: from σ far too small, a search
+        would wander through everything that may explain such plots."""
+        moves = np.eye(start.size)[: len(self.likelihood.keys)]
+        rises, value = np.log(10.0 ** np.arange(1, 5)), self.log_likelihood(start)
+        while True:
+            trials = [start + rise * move for move in moves for rise in rises]
+            trial_value, best = max((self.log_likelihood(trial), i) for i, trial in enumerate(trials))
+            if not trial_value > value + COARSE_GAIN:
+                return start
+            start, value = trials[best], trial_value
 
     def _prefer_plausible_laws(self) -> None:
         """Where outliers at the best point are implausibly many, but few of them plain, take the likeliest point with
@@ -302,7 +317,8 @@ class LikelihoodSearch:
     ) -> tuple[np.ndarray, float]:
         """The maximum reached from a start, one coordinate held or none, and the log-likelihood there: by Newton steps,
         until one gains less than `tolerance`; where they fail, by a simplex for a while. A likelihood over lists of
-        hypotheses jumps where one is dropped: a simplex that gains next to nothing shows that no step can."""
+        hypotheses leaps where one is dropped: a simplex that gains next to nothing shows that no step can. On a profile
+        of it, steps of wide differences take the place of the simplex."""
         free = np.array([i for i in range(len(start)) if i != fixed_index])
         point, value = start, self.log_likelihood(start)
         curvature = self.curvature_model if fixed_index is not None else Curvature(self.log_likelihood, self.steps)
@@ -311,7 +327,11 @@ class LikelihoodSearch:
             if is_maximum:
                 return point, value
             value_before = value
-            point, value = self._climb_by_simplex(point, free, tolerance, max_evaluations)
+            if self.likelihood.is_smooth or fixed_index is None:
+                point, value = self._climb_by_simplex(point, free, tolerance, max_evaluations)
+            else:
+                curvature = Curvature(self.log_likelihood, self.steps, self.differences)
+                return self._climb_by_newton(point, value, free, tolerance, curvature)[:2]
             if value - value_before < ROUGH_ACCURACY:
                 return point, value
             curvature = Curvature(self.log_likelihood, self.steps)
@@ -343,7 +363,7 @@ class LikelihoodSearch:
             if predicted_gain < SMALL_GAIN_FACTOR * tolerance:
                 return point, value, True
             if fraction < 1 or predicted_gain > ROUGH_ACCURACY:
-                curvature = Curvature(self.log_likelihood, self.steps)
+                curvature = Curvature(self.log_likelihood, self.steps, curvature.differences)
         return point, value, False
 
     def _set_zero(self, point: np.ndarray, value: float, free: np.ndarray) -> tuple[np.ndarray, float]:
