@@ -1,9 +1,10 @@
 """The laws of a plot's errors in strips of eight lanes, as `radarsim.kernels.step_likelihood` takes them.
 
-An outlier is the whole plot, in the first strip, or one of its numbers alone, all equally likely, and never two of
-these at once. In the first strip lane 0 has the stated σ and lane 1 near outliers, in the others these two near
-outliers to either side; the rest of all are far ones of one width each (`radarsim.kernels.likelihood`). A last strip
-has sound plots after a hard manoeuvre, in its first lane."""
+Each number is an outlier by a law of its own, whatever the others are. One of them is alone, or all are together:
+other sets are so rare that they are left out. In the first strip lane 0 has the stated σ, and of outliers in all
+numbers lane 1 has near ones, the others have far ones of one width each (`radarsim.kernels.likelihood`). A strip for
+each number alone has near ones to either side in lanes 0 and 1, and far ones. A last strip has sound plots after a hard
+manoeuvre, in its first lane."""
 
 import math
 from collections.abc import Sequence
@@ -35,28 +36,30 @@ def has_laws(law: ErrorLaw) -> bool:
 def plot_laws(law: ErrorLaw, sigmas: Sequence[float], spans: Sequence[float], used: Sequence[int]) -> PlotLaws:
     """The laws of the numbers of a plot with these σ; used: which of them a filter takes; spans: of their data."""
     from radarsim.kernels.lanes import WIDTH
-    from radarsim.kernels.likelihood import FAR_COUNT, FAR_WIDTH, HARD_FACTOR, start_factor
+    from radarsim.kernels.likelihood import FAR, FAR_COUNT, FAR_WIDTH, HARD_FACTOR, NEAR, OFFSET, SPREAD, start_factor
 
-    outliers = law.outlier_rows(1)[0]
-    near, far, offset, spread = outliers.tolist()
-    hard = 1 + len(used) if near + far > 0 else 1  # the strip of a hard manoeuvre
+    outliers = law.outlier_rows(len(used))
+    hard = 1 + len(used) if outliers[:, [NEAR, FAR]].any() else 1  # the strip of a hard manoeuvre
     strips = hard + 1 if law.manoeuvres else hard
     factors, shifts = np.ones((strips, len(sigmas), WIDTH)), np.zeros((strips, len(sigmas), WIDTH))
     weights, is_outlier = np.zeros((strips, WIDTH)), np.zeros((len(used), strips, WIDTH))
-    weights[0, :2], weights[1:hard, :2], weights[:hard, 2:] = (1 - near - far, near), near / 2, far / FAR_COUNT
-    is_outlier[:, 0, 1:] = 1.0
+    start_factors = np.ones((len(sigmas), WIDTH))
+    odds = outliers[:, [NEAR, FAR]] / (1 - outliers[:, [NEAR, FAR]].sum(axis=1, keepdims=True))
+    weights[0, 0], is_outlier[:, 0, 1:] = 1.0, 1.0
+    if len(used) > 1:
+        weights[0, 1], weights[0, 2:] = odds.prod(axis=0) / (1, FAR_COUNT)
     for strip, (number, span) in enumerate(zip(used[: hard - 1], spans, strict=False), 1):
+        offset, spread = outliers[strip - 1, [OFFSET, SPREAD]]
         ratio = max(span / (FAR_WIDTH * sigmas[number]), 1.0) if sigmas[number] > 0 else 1.0
+        weights[strip, :2], weights[strip, 2:] = odds[strip - 1] / (2, FAR_COUNT)
         factors[[0, strip], number, 2:] = FAR_WIDTH * ratio ** np.linspace(0, 1, FAR_COUNT)
         factors[0, number, 1], factors[strip, number, :2] = math.hypot(1, offset, spread), math.hypot(1, spread)
         shifts[strip, number, :2] = offset, -offset
         is_outlier[strip - 1, strip] = 1.0
-    # A number is an outlier in two of the strips: with its whole plot, or alone.
-    chance = 2 / (1 + (hard - 1) * (near + far))
-    at_start = np.full(len(sigmas) * WIDTH, math.sqrt(start_factor(outliers * [chance, chance, 1.0, 1.0])))
+        start_factors[number] = math.sqrt(start_factor(outliers[strip - 1]))
     weights *= (1 - law.manoeuvres) / weights.sum()
     weights[hard:, 0] = law.manoeuvres
     with np.errstate(divide="ignore"):
         chances = np.log(weights)
     noise_factors = np.where(np.arange(strips) == hard, math.sqrt(HARD_FACTOR), 1.0)
-    return PlotLaws(at_start, factors.ravel(), shifts.ravel(), chances, noise_factors, is_outlier)
+    return PlotLaws(start_factors.ravel(), factors.ravel(), shifts.ravel(), chances, noise_factors, is_outlier)

@@ -9,7 +9,7 @@ import numpy as np
 from radarsim.studies.error_law import MANOEUVRES, OUTLIERS, STATED_ERRORS, ErrorLaw
 from radarsim.studies.gross_errors import data_span, soundness_by_column, without_gross_starts
 from radarsim.studies.missed_scans import missed_scan_times
-from radarsim.studies.recording_interface import ALL_KINDS, usual_interval_s
+from radarsim.studies.recording_interface import usual_interval_s
 from radarsim.studies.step_checks import record
 from radarsim.studies.step_laws import has_laws, plot_laws
 from radarsim.studies.step_likelihood_programs import CompiledLikelihood, compile_likelihood, formula_choices, sigmas
@@ -27,7 +27,6 @@ class StepLikelihood:
 
     Where the filter merges states, and says which of its numbers are the σ of a plot, errors may follow other laws."""
 
-    outlier_kinds = ALL_KINDS
     far_kinds: tuple[str, ...] = ()
     has_offsets = True
     is_smooth = True
@@ -40,7 +39,7 @@ class StepLikelihood:
         self.stated = np.array([self._owner(key)[1] for key in self.keys], dtype=float)
         self.zero_limits = ZERO_SHARE * np.where(self.stated > 0, self.stated, 1.0)
         self.usual_s = usual_interval_s(tracks)
-        self.columns = study.columns(spec, keys)
+        self.columns = self.outlier_kinds = tuple(study.columns(spec, keys))
         self.explains: tuple[str, ...] = ()
         self.given_tracks = self.cleaned_tracks = list(tracks)
         if self.steps.merge is not None and self.steps.sigma_field is not None:

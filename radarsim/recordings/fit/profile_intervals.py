@@ -16,6 +16,7 @@ TRIAL_FALLS = np.array([2.0, 4.0, 6.0])  # below these a key that may be zero is
 OUTSIDE_STEP = 0.05  # beyond an end, in the logarithm of a key: where other near outliers are tried
 MAX_CLIMB_GAIN = 5.0  # of the log-likelihood, from there: starts that are lower are not searched
 CROSSING_POINTS = 4  # of a profile, from which an end is interpolated
+MAX_INTERPOLATIONS = 8  # of an end, before its bracket is halved: usual are 2 to 5
 MIN_FRACTION = 0.1  # of a bracket, by which it shrinks where a straight line is taken
 
 
@@ -104,7 +105,8 @@ class ProfileIntervals:
 
         The key and all coordinates are nearly straight lines as functions of the square root of the fall from the
         maximum. So they are interpolated by polynomials in it, through the points nearest to the limit; where these
-        fail, by a straight line through the ends of the bracket."""
+        fail, by a straight line through the ends of the bracket, and last by its middle: the likelihood has few digits
+        where plots are far from what the keys allow."""
 
         def height(point: ProfilePoint) -> float:
             fall = self.search.top - point.value
@@ -112,11 +114,14 @@ class ProfileIntervals:
 
         wanted = math.sqrt(2 * (self.search.top - limit))
         bracket, points, last_change = [inside, outside], [inside, outside], abs(outside.log_key - inside.log_key)
+        interpolations = 0
         while True:
             points = sorted(points, key=lambda point: abs(height(point) - wanted))[:CROSSING_POINTS]
             low, high = sorted(point.log_key for point in bracket)
             end = self._interpolate(points, _polynomial_weights([height(point) for point in points], wanted))
-            if not low < end.log_key < high:
+            if interpolations >= MAX_INTERPOLATIONS:
+                end = self._interpolate(bracket, (0.5, 0.5))
+            elif not low < end.log_key < high:
                 end = self._interpolate(bracket, _line_weights([height(point) for point in bracket], wanted))
             change = abs(end.log_key - points[0].log_key)
             if (
@@ -124,7 +129,7 @@ class ProfileIntervals:
                 or high - low < self.search.steps.tolerance
             ):
                 return end._replace(value=limit)
-            last_change = change
+            last_change, interpolations = change, interpolations + 1
             point = self._profile(i, end.log_key, end.point)
             bracket[int(point.value < limit)] = point
             points.append(point)

@@ -85,7 +85,11 @@ def test_the_compiled_likelihood_is_that_of_the_steps(filter_keys, rate_hz):
         np.testing.assert_allclose(np.cumsum(by_number), densities, rtol=1e-9)
 
 
-LAW = OutlierLaw(near=0.05, far=0.02, offset=4.0, spread=2.0)
+LAWS = (  # of outliers, by number
+    OutlierLaw(near=0.05, far=0.02, offset=4.0, spread=2.0),
+    OutlierLaw(near=0.1, far=0.01, offset=3.0, spread=0.0),
+    OutlierLaw(near=0.02, far=0.05, offset=0.0, spread=4.0),
+)
 HARD, FAR = 0.1, (10.0, 6)  # share of hard manoeuvres, ten times as large; least width of far outliers, widths
 
 
@@ -98,16 +102,20 @@ def laws_of(sigma, spans):
         [least * s * max(r / (least * s), 1) ** (i / (count - 1)) for i in range(count)]
         for s, r in zip(sigma, spans, strict=False)
     ]
-    near, wide = math.hypot(LAW.offset, LAW.spread, 1), math.hypot(LAW.spread, 1)
-    none, rest, all_numbers = (0.0,) * 3, sigma[m:], set(range(m))
-    laws = [(1 - LAW.near - LAW.far, sigma, none, set()), (LAW.near, tuple(near * s for s in sigma), none, all_numbers)]
-    laws += [(LAW.far / count, (*widths, *rest), none, all_numbers) for widths in zip(*far, strict=True)]
-    for j in range(m):
-        unit = np.eye(3)[j]
-        widened = [(LAW.near / 2, wide * sigma[j], side * LAW.offset * sigma[j]) for side in (1, -1)]
-        widened += [(LAW.far / count, width, 0.0) for width in far[j]]
+    none, rest, numbers = (0.0,) * 3, sigma[m:], LAWS[:m]
+    near = tuple(math.hypot(law.offset, law.spread, 1) * s for law, s in zip(numbers, sigma, strict=False))
+    laws = [(math.prod(1 - law.share for law in numbers), sigma, none, set())]
+    if m > 1:
+        laws.append((math.prod(law.near for law in numbers), (*near, *rest), none, set(range(m))))
+        all_far = math.prod(law.far for law in numbers) / count
+        laws += [(all_far, (*widths, *rest), none, set(range(m))) for widths in zip(*far, strict=True)]
+    for j, law in enumerate(numbers):
+        unit, others = np.eye(3)[j], math.prod(1 - other.share for other in numbers if other is not law)
+        wide = math.hypot(law.spread, 1) * sigma[j]
+        widened = [(law.near / 2, wide, side * law.offset * sigma[j]) for side in (1, -1)]
+        widened += [(law.far / count, width, 0.0) for width in far[j]]
         laws += [
-            (p, tuple(np.where(unit, width, sigma).tolist()), tuple((shift * unit).tolist()), {j})
+            (others * p, tuple(np.where(unit, width, sigma).tolist()), tuple((shift * unit).tolist()), {j})
             for p, width, shift in widened
         ]
     total = sum(law[0] for law in laws)
@@ -133,14 +141,13 @@ def enumerated(case, keys, track, spans, c):
     """The log-density of all plots but the first of a track, and the soundness of each row, by all laws."""
     steps, s, last, total = study("plane").kinds[keys.kind], None, math.nan, 0.0
     m, laws, soundness = len(spans), laws_of(c.sigma, spans), []
-    chance = 2 / (1 + m * LAW.share)
-    sizes = LAW.near * (LAW.offset**2 + LAW.spread**2) + LAW.far * (FAR[0] ** 2 - 1)
-    start_factor = math.sqrt(1 + chance * sizes)
+    sizes = [law.near * (law.offset**2 + law.spread**2) + law.far * (FAR[0] ** 2 - 1) for law in LAWS[:m]]
+    start_sigma = tuple(math.sqrt(1 + size) * a for size, a in zip(sizes, c.sigma, strict=False)) + c.sigma[m:]
     for t, *z in zip(*(track[name].tolist() for name in ("t_s", *NAMES)), strict=True):
         soundness.append(np.where(np.isfinite(z[:m]), 1.0, np.nan))
         if s is None:
             if np.isfinite(z[:m]).all():
-                s, last = steps.start(z, (), c._replace(sigma=tuple(start_factor * a for a in c.sigma))), t
+                s, last = steps.start(z, (), c._replace(sigma=start_sigma)), t
             continue
         missed = missed_scan_times(last, t, case.spec.radar.scan_period_s)
         for time in missed:
@@ -170,7 +177,8 @@ def test_the_laws_of_errors_are_weighed_and_merged_as_one_by_one(filter_keys):
     tracks[1]["range_m"][4] += 300.0
     tracks[1]["bearing_rad"][8] += 1.0
     likelihood = StepLikelihood(study("plane"), case.spec, keys, tracks)
-    law, columns = ErrorLaw(outlier_laws=(LAW,), manoeuvres=HARD), study("plane").columns(case.spec, keys)
+    columns = study("plane").columns(case.spec, keys)
+    law = ErrorLaw(outlier_laws=LAWS[: len(columns)], manoeuvres=HARD)
     spans = [
         np.ptp(column[np.isfinite(column)])
         for name in columns
