@@ -52,6 +52,7 @@ MIN_ROWS = 5  # of a track, with other velocities
 FAR_STEPS, FAR_SCATTERS = 10.0, 20.0  # steps between other numbers, and their median second differences
 OFF_SCATTERS, OFF_SHARE = 5.0, 0.05  # of rows with a number that is a fill elsewhere: second differences; of far
 MIN_FILLS, MIN_USUAL_FILLS = 3, 2  # rows with a number, and with one of FILL_NUMBERS
+MAX_BESIDE_STEPS = 5.0  # usual steps of time to another number: not over a gap
 MIN_ALTERNATING_SHARE = 0.1  # of rows with a number, if rows are far from those beside them throughout
 MIN_OTHER_NUMBERS = 3  # different ones of a track
 MIN_ISOLATION = 0.25  # of the miss of a velocity: that far no other is from it, as folded ones are
@@ -144,11 +145,20 @@ def _are_repeated_fills(t: np.ndarray, x: np.ndarray, is_number: np.ndarray, lim
     usual = max(FAR_STEPS * float(np.median(np.abs(np.diff(others)))), FAR_SCATTERS * scatter, limits.far)
     misses = _distance(x - np.interp(t, t[is_other], others), limits)
     is_inside = (t > t[is_other][0]) & (t < t[is_other][-1])
-    is_fill = is_suspected & (misses > usual) & (is_inside | limits.is_place)
+    is_beside = np.abs(t[:, None] - _times_beside(t, t[is_other])).min(axis=1) <= MAX_BESIDE_STEPS * np.median(
+        np.diff(t)
+    )
+    is_fill = is_suspected & (misses > usual) & (is_inside | limits.is_place) & is_beside
     # Where a number stands for none, it does so in the rows in which it is not so far, and at the ends of the track.
     is_off = misses > max(OFF_SCATTERS * scatter, OFF_SHARE * limits.far)
     result[order] = is_suspected & is_off & np.isin(x, x[is_fill])
     return result
+
+
+def _times_beside(t: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """The times of others before and after times (n,), or the nearest (n, 2)."""
+    after = np.minimum(np.searchsorted(others, t), len(others) - 1)
+    return np.stack([others[np.maximum(after - 1, 0)], others[after]], axis=1)
 
 
 def _enough_fills(values: np.ndarray, fills: np.ndarray, limits: _Limits) -> int:

@@ -24,7 +24,7 @@ SIDE_ROWS = (12, 6)  # fitted on each side; fewer where the course bends
 MIN_SIDE_ROWS, MIN_FITTED_ROWS = 3, 8  # on each side, and together
 MIN_GAIN = 20.0  # of twice the log-likelihood, with the step over without
 MAX_F_RATIO = 6.0  # of one parabola, over one for each side
-MAX_LEG_SHARE = 0.1  # of the way in a scan, by which rows may miss the parabola though errors are smaller
+MAX_LEG_SHARE = 0.02  # of the way in a scan, by which rows may miss the parabola though errors are smaller
 MIN_RESOLUTION, RESOLUTION_M = 1e-6, 1e-3  # below which misfits are rounding: of the distances between rows; m
 TURN_ROWS = 40  # on each side, that show a turn
 MAX_HALF_TURN = np.pi  # rad in the time of the gap: a target that turns farther may have come back
@@ -35,6 +35,7 @@ MIN_WINDING_RATIO, SECOND_DIFFERENCE_POWER = 3.0, 6.0  # of squares to those of 
 BEND_SHARE = 0.02  # of a bend by which a target turns back within the gap, which is π / 8 of the way and times
 MAX_REVISIT_LEGS = 1.5  # from the place of the gap, at which the target is seen at other times
 MIN_SUPPORT_RATIO = 4  # of the tracks that show a step to those that show none
+MAX_SMALL_STEP_S = 60.0  # of a step after which a few scans may be missed; after others, but of time zones, one passes
 ZONE_STEP_S = HOUR_S / 2  # by which time zones differ
 SNAP_GAIN = 6.0  # of twice the log-likelihood, by which a less usual step may be likelier
 MAX_WHOLE_SECONDS = 200  # steps that are examined where scans are not regular
@@ -166,7 +167,8 @@ def _likeliest_size(
     else:
         others = np.arange(np.ceil(smallest), np.floor(largest) + 1)[::-1][:MAX_WHOLE_SECONDS]
         others = others[np.argsort(np.abs(gap_s - others - scan_s), kind="stable")]
-    sizes = np.concatenate([zones[zones > 0], others[others >= smallest]])
+    is_small = (others < MAX_SMALL_STEP_S) | (np.abs(gap_s - others - scan_s) < 0.5 * scan_s)
+    sizes = np.concatenate([zones[zones > 0], others[(others >= smallest) & is_small]])
     if not sizes.size:
         return None
     misfits = np.array([sum(_log_misfit(t, positions, join, size) for join in joins) for size in sizes.tolist()])

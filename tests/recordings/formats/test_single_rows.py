@@ -68,21 +68,25 @@ def test_numbers_that_stand_for_none_are_left_out_of_each_column(tmp_path, colum
         assert any(f"again and again: {count} of 60; they are left out" in note for note in done.notes)
 
 
-@pytest.mark.parametrize("kind", ["stands", "cells", "two places", "lands", "levels"])
+@pytest.mark.parametrize("kind", ["stands", "cells", "two places", "lands", "levels", "gaps"])
 def test_numbers_that_repeat_near_others_are_values(tmp_path, kind):
-    """A target at rest, coarse cells, two targets under one name, and an aircraft that lands in a gap."""
-    r, height = courses()[0], np.full(N, 9000.0)
+    """A target at rest, coarse cells, two targets under one name, an aircraft that lands in a gap, and a slow one in
+    coarse cells that is seen for a short time between two gaps."""
+    t, r, height = T, courses()[0], np.full(N, 9000.0)
     if kind == "stands":
         r = np.full(N, 5000.0)
     elif kind == "cells":
         r = 600 * np.round(r / 600)
     elif kind == "two places":
         r = np.where(np.random.default_rng(3).random(N) < 0.3, 5000.0, 7000.0)
+    elif kind == "gaps":
+        t = T + 1500.0 * (np.arange(N) >= 20) + 1500.0 * (np.arange(N) >= 25)
+        r = 150 * np.round((20_000 + 3 * t) / 150)
     elif kind == "lands":
         height = np.where(T < 200, 9000.0, 0.0)
     else:
         height = np.where((T > 100) & (T < 200), 6000.0, 9000.0)
-    rows = (f"{t},{a},{h}" for t, a, h in zip(T, r, height, strict=True))
+    rows = (f"{x},{a},{h}" for x, a, h in zip(t, r, height, strict=True))
     done, columns, _ = imported(tmp_path, "\n".join(["time,range_m,altitude_m", *rows]).encode())
     np.testing.assert_array_equal(columns["range_m"], r)
     np.testing.assert_array_equal(columns["altitude_m"], height)
