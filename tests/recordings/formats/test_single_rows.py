@@ -81,7 +81,7 @@ def test_numbers_that_repeat_near_others_are_values(tmp_path, kind):
         r = np.where(np.random.default_rng(3).random(N) < 0.3, 5000.0, 7000.0)
     elif kind == "gaps":
         t = T + 1500.0 * (np.arange(N) >= 20) + 1500.0 * (np.arange(N) >= 25)
-        r = 150 * np.round((20_000 + 3 * t) / 150)
+        r = 150 * np.round((20_000 + 3 * np.abs(t - 1700)) / 150)
     elif kind == "lands":
         height = np.where(T < 200, 9000.0, 0.0)
     else:
