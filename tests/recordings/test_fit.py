@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,6 +107,25 @@ class Jumping(LastDigits):
 
     def __call__(self, *arguments, **explained):
         return np.round(self.of(*arguments, **explained), 3)
+
+
+class TwoMaxima(LastDigits):
+    """A likelihood with a second maximum, higher and narrow, at 500 times the stated keys."""
+
+    def __call__(self, values, *explained):
+        off = np.log(np.maximum(values, 1e-9) / (500 * self.of.stated)) / 0.2
+        other = self.of(self.of.stated) + 200.0 - off @ off / 2
+        first = self.of(values, *explained)
+        return max(first, other) if np.isfinite(first) else other
+
+
+def test_what_is_allowed_for_lowers_no_maximum():
+    """The plain fit is a start: it may have found another maximum."""
+    one = TwoMaxima(likelihood(recording(np.random.default_rng(2))))
+    plain = fit.fit_keys(one)
+    there = replace(plain, keys=tuple(replace(key, value=480 * key.stated) for key in plain.keys))
+    assert fit.fit_keys(one, (OUTLIERS,), plain=plain).keys[0].value < 10 * one.stated[0]  # the search does not find it
+    assert fit.fit_keys(one, (OUTLIERS,), plain=there).keys[0].value == pytest.approx(500 * one.stated[0], rel=1e-3)
 
 
 def test_a_likelihood_that_jumps_is_searched_no_longer():

@@ -338,11 +338,11 @@ def fit_likelihood(
     stages = FitStages(progress, bool(allowed))
     plain = result = fit_keys(likelihood, (), stages.report, rough)
     if allowed:
-        result = fit_keys(likelihood, allowed, stages.next(), rough)
+        result = fit_keys(likelihood, allowed, stages.next(), rough, plain)
     while allowing is None and (explanation := result.further_explanation) and _is_clear_error(explanation):
         allowed = (*allowed, explanation.name)
         try:
-            further = fit_keys(likelihood, allowed, stages.next(), rough)
+            further = fit_keys(likelihood, allowed, stages.next(), rough, plain)
         except ConfigError:  # so many outliers that the errors follow another law: the plain fit reports it
             break
         if explanation.weaker_rival is not None and not further.outlier_rows:
@@ -372,16 +372,18 @@ def fit_keys(
     allowing: Sequence[str] = (),
     progress: Progress = no_progress,
     rough: Likelihood | None = None,
+    plain: Fit | None = None,
 ) -> Fit:
     """The keys at the maximum of a likelihood, with profile intervals; allowing: for these of OUTLIERS and CORRELATION;
-    rough: the likelihood of fewer rows, for a first search. Raises ConfigError where these cannot be allowed for, or
-    the plots are impossible whatever the keys."""
+    rough: the likelihood of fewer rows, for a first search; plain: a fit that allows for none. Raises ConfigError where
+    these cannot be allowed for, or the plots are impossible whatever the keys."""
     check_explanations(likelihood, allowing)
     robust = OUTLIERS in allowing
     if CORRELATION in allowing:
         likelihood, rough = CorrelatedLikelihood(likelihood), rough and CorrelatedLikelihood(rough)
     start = LikelihoodSearch(rough, robust, no_progress).best if rough and rough.rows < likelihood.rows else None
-    search = LikelihoodSearch(likelihood, robust, progress, start)
+    plain_values = [key.value for key in plain.keys] if plain else []
+    search = LikelihoodSearch(likelihood, robust, progress, start, plain_values)
     while search.refine_zero():
         search.raise_zero_keys()
     if search.top <= IMPOSSIBLE_LOG_LIKELIHOOD:

@@ -68,9 +68,17 @@ LIKELIHOOD_LEAP = 0.01
 
 class LikelihoodSearch:
     """The maximum of a likelihood. Coordinates are logarithms of the keys, and for each kind of numbers LAW_SIZE of an
-    outlier law. What is at its lowest is zero."""
+    outlier law. What is at its lowest is zero. start_point: from a search of fewer rows; plain_values: of the keys, by
+    a fit that allows for less."""
 
-    def __init__(self, likelihood: Likelihood, robust: bool, progress: Progress, start_point: np.ndarray | None = None):
+    def __init__(
+        self,
+        likelihood: Likelihood,
+        robust: bool,
+        progress: Progress,
+        start_point: np.ndarray | None = None,
+        plain_values: Sequence[float] = (),
+    ):
         self.likelihood, self.robust, self.progress, self.evaluations = likelihood, robust, progress, 0
         self.end_count, self.ends_started_at = 0, 0
         self.steps = SMOOTH_STEPS if likelihood.is_smooth else LEAP_STEPS
@@ -108,12 +116,23 @@ class LikelihoodSearch:
                 candidate, value = self.climb(candidate, None, ROUGH_TOLERANCE)
             if value > self.top + 1e-6:
                 self.best, self.top = candidate, value
+        if plain_values:
+            self._try_plain_values(np.array(plain_values))
         self._prefer_plausible_laws()
         if robust and start_point is None:
             self._try_near_outliers()
         self.top = -math.inf
         self._polish(self.best)
         self.raise_zero_keys()
+
+    def _try_plain_values(self, values: np.ndarray) -> None:
+        """Climb from the values of a plain fit, the first of the keys, where these are likelier than the best point:
+        what else is allowed for is no reason for a worse maximum."""
+        start = self.lowest - FIRST_STEP
+        is_known = np.arange(start.size) < values.size
+        start[is_known] = np.maximum(start[is_known], np.log(np.maximum(values, np.finfo(float).tiny)))
+        if self.log_likelihood(start) > self.top:
+            self.best, self.top = self.climb(start, None, ROUGH_TOLERANCE)
 
     def _coarse_start(self, start: np.ndarray) -> np.ndarray:
         """A start with keys changed by whole powers of ten, as long as that gains much: from σ far too small, a search
