@@ -618,6 +618,17 @@ def test_missing_plots_count_as_nothing(name):
     assert one.by_number(values) == pytest.approx(kept.by_number(values), rel=allowed)
 
 
+def test_exponentials_are_those_of_numpy():
+    """To 3 units in the last place; what is less than exp(-700) stays a number."""
+    exponents = -np.concatenate([[0.0], np.geomspace(1e-18, 700, 2000)])
+    values = exponents.copy()
+    recorded_rows.take_exponentials(values)
+    np.testing.assert_allclose(values, np.exp(exponents), rtol=3 * np.finfo(float).eps)
+    least = np.array([-745.0, -1e300])
+    recorded_rows.take_exponentials(least)
+    np.testing.assert_allclose(least, np.exp(-700.0), rtol=1e-12)
+
+
 def test_the_likeliest_hypotheses_are_kept_in_their_order():
     from radarsim.studies.ambiguous_doppler.kernels.recorded_rows import likeliest
 

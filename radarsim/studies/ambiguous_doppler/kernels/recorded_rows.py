@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from radarsim.kernels.compiler import kernel
+from radarsim.kernels.compiler import kernel, summing_kernel
 from radarsim.kernels.kalman_algebra import (
     add_outer,
     add_scaled,
@@ -24,22 +24,59 @@ from radarsim.kernels.likelihood import FAR, LAW_COUNT, LOG_DENSITY, MEAN, NEAR,
 
 FARTHEST = 9.0  # standard deviations of the velocity's innovation within which folds are tried
 START_RANGES = 3  # of a track, among which gross errors are left out
-NEGLIGIBLE = 80.0  # below the logarithm of the greatest weight
+SHIFT = 1.5 * 2.0**52  # added to a number, leaves it whole
 ROUNDING = 1e-9  # of the logarithm of a ratio
 SMALLEST_MASS = 1e-300  # of the laws of a number
 FLAT_VARIANCE = 0.45  # of a folded velocity, in squares of the span: its density is even, to 2 exp(-2 pi² 0.45) = 3e-4
-INVISIBLE = 45.0  # the same, in a sum of weights: thousands of such change no digit
 MAX_SEQUENCES = 10_000_000  # sequences of folds at a row: states of 240 MB, seconds
+
+
+@kernel
+def take_exponentials(x):
+    """Replace numbers x (n,) of at most 0 by their exponentials, to 3 units in the last place; below -700 as at -700.
+
+    As `radarsim.kernels.lanes.exponential`, in loops that run in vector registers."""
+    powers = np.empty(x.size)
+    exponents = powers.view(np.int64)
+    for i in range(x.size):
+        a = x[i] if x[i] > -700.0 else -700.0
+        shifted = a * 1.4426950408889634 + SHIFT
+        n = shifted - SHIFT
+        r = a - n * 0.693147180369123816 - n * 1.90821492927058770e-10
+        p = r * (1.0 / 479001600.0) + 1.0 / 39916800.0
+        p = p * r + 1.0 / 3628800.0
+        p = p * r + 1.0 / 362880.0
+        p = p * r + 1.0 / 40320.0
+        p = p * r + 1.0 / 5040.0
+        p = p * r + 1.0 / 720.0
+        p = p * r + 1.0 / 120.0
+        p = p * r + 1.0 / 24.0
+        p = p * r + 1.0 / 6.0
+        p = p * r + 0.5
+        p = p * r + 1.0
+        x[i], powers[i] = p * r + 1.0, shifted
+    for i in range(x.size):
+        exponents[i] = (exponents[i] << 52) + (1023 << 52)  # the last bits of a shifted number are those of n
+    for i in range(x.size):
+        x[i] *= powers[i]
+
+
+@summing_kernel
+def sum_of(x):
+    """The sum of numbers x (n,)."""
+    total = 0.0
+    for i in range(x.size):
+        total += x[i]
+    return total
 
 
 @kernel
 def log_sum_exp(w):
     """The logarithm of Σ exp(w), of logarithms of weights w (…)."""
-    greatest, total = w.max(), 0.0
-    for x in w.flat:
-        if not x < greatest - INVISIBLE:
-            total += np.exp(x - greatest)
-    return greatest + np.log(total)
+    greatest = w.max()
+    weights = w.ravel() - greatest
+    take_exponentials(weights)
+    return greatest + np.log(sum_of(weights))
 
 
 @kernel
@@ -77,32 +114,32 @@ def take_range_of_laws(x, w, P, R, z, outliers, span, laws):
     prior_log_weight, chances, greatest = log_sum_exp(w), np.zeros(LAW_COUNT), -np.inf
     fill_laws(laws, 0.0, S, R, outliers, span)
     laws[LOG_DENSITY] += 0.5 * laws[MEAN] * laws[MEAN] / laws[VARIANCE]
-    posterior = np.empty((w.size, LAW_COUNT))
-    for i in range(w.size):
-        e = z - x[0, i]
-        for law in range(LAW_COUNT):
-            d = e - laws[MEAN, law]
-            posterior[i, law] = w[i] + laws[LOG_DENSITY, law] - 0.5 * d * d / laws[VARIANCE, law]
-            greatest = max(greatest, posterior[i, law])
-    for i in range(w.size):
-        w[i] = 0.0
-        for law in range(LAW_COUNT):
-            if posterior[i, law] > greatest - NEGLIGIBLE:
-                chance = np.exp(posterior[i, law] - greatest)
-                chances[law] += chance
-                w[i] += chance
+    posterior = np.empty((LAW_COUNT, w.size))
+    for law in range(LAW_COUNT):
+        for i in range(w.size):
+            d = z - x[0, i] - laws[MEAN, law]
+            posterior[law, i] = w[i] + laws[LOG_DENSITY, law] - 0.5 * d * d / laws[VARIANCE, law]
+        greatest = max(greatest, posterior[law].max())
+    posterior -= greatest
+    w[:] = 0.0
+    for law in range(LAW_COUNT):
+        if laws[LOG_DENSITY, law] > -np.inf:
+            take_exponentials(posterior[law])
+            chances[law] = sum_of(posterior[law])
+            w += posterior[law]
     total = chances.sum()
     chances /= total
     gain = (chances / laws[VARIANCE]).sum()
     drift = (chances * laws[MEAN] / laws[VARIANCE]).sum()
+    # The mean over laws of ((e - mean) / variance)², as a polynomial of e.
+    squares = chances / (laws[VARIANCE] * laws[VARIANCE])
+    c2, c1, c0 = squares.sum(), (squares * laws[MEAN]).sum(), (squares * laws[MEAN] * laws[MEAN]).sum()
     square = 0.0
     for i in range(w.size):
         e, weight = z - x[0, i], w[i] / total
         pull = gain * e - drift
-        for law in range(LAW_COUNT):
-            step = (e - laws[MEAN, law]) / laws[VARIANCE, law]
-            square += weight * chances[law] * (step * step - pull * pull)
-        w[i] = np.log(weight) if weight > 0.0 else -1e300
+        square += weight * ((c2 * e - 2.0 * c1) * e + c0 - pull * pull)
+        w[i] = np.log(weight)
         x[0, i], x[1, i], x[2, i] = add_scaled((x[0, i], x[1, i], x[2, i]), pull, p)
     shrink = gain - max(square, 0.0)
     updated_P = add_outer((P[0], P[1], P[2], P[3], P[4], P[5]), -shrink, p)
@@ -175,21 +212,24 @@ def weigh_outliers(w, e, weight, R, S, D, max_fold, outliers, span):
     sound, near = 1.0 - outliers[NEAR] - outliers[FAR], outliers[NEAR] * math.sqrt(S / T)
     far, factor = outliers[FAR] * math.exp(log_norm) / width, 0.5 / S
     best, prior_sum, total, sound_sum, pull_sum, spread = w.max(), 0.0, 0.0, 0.0, 0.0, 0.0
+    shares = np.empty((n, folds + 2))  # of the folds beside the nearest; of a sound number with that; of a hypothesis
     for i in range(n):
-        # Of the nearest fold, and of all in units of it.
         e2 = e[i, nearest_fold] * e[i, nearest_fold]
-        regular, close = sound * math.exp(-e2 * factor), 0.0
+        shares[i, folds], shares[i, folds + 1] = -e2 * factor, w[i] - best
+        for j in range(folds):
+            shares[i, j] = (e2 - e[i, j] * e[i, j]) * factor
+    take_exponentials(shares.ravel())
+    for i in range(n):
+        e2, branches, squares = e[i, nearest_fold] * e[i, nearest_fold], 0.0, 0.0
+        for j in range(folds):
+            branches += shares[i, j]
+            squares += shares[i, j] * e[i, j] * e[i, j]
+        regular, close = sound * shares[i, folds], 0.0
         if near > 0.0:
             close = near * math.exp(-0.5 * e2 / T)
-        square, branches = (regular + close * S / T) * e2, 1.0
-        for j in range(folds):
-            fall = (e[i, j] * e[i, j] - e2) * factor
-            if j != nearest_fold and fall < INVISIBLE:
-                share = math.exp(-fall)
-                branches += share
-                square += regular * share * e[i, j] * e[i, j]
+        square = regular * squares + close * S / T * e2
         regular *= branches
-        mass, prior = max(regular + close + far, SMALLEST_MASS), math.exp(w[i] - best)
+        mass, prior = max(regular + close + far, SMALLEST_MASS), shares[i, folds + 1]
         pull = (regular + close * S / T) / mass
         shift = math.log(mass / branches) + e2 * factor
         for j in range(folds):
@@ -257,6 +297,8 @@ def merge_alike(x, w, P, distance):
     lower, parts, _ = factorise((P[0], P[1], P[2], P[3] if P[3] > 0.0 else 1.0, P[4], P[5] if P[5] > 0.0 else 1.0))
     roots = math.sqrt(parts[0]), math.sqrt(parts[1]), math.sqrt(parts[2])
     group, totals, means = np.empty(n, dtype=np.int64), np.zeros(n), np.zeros((3, n))
+    shares = w.copy()
+    take_exponentials(shares)
     first0, first1, first2 = np.empty(n), np.empty(n), np.empty(n)
     for i in range(n):
         state = x[0, i], x[1, i], x[2, i]
@@ -268,7 +310,7 @@ def merge_alike(x, w, P, distance):
         if k == count:
             first0[k], first1[k], first2[k] = y
             count += 1
-        share = max(math.exp(w[i]), SMALLEST_MASS)
+        share = max(shares[i], SMALLEST_MASS)
         group[i], mass = k, mass + share
         totals[k] += share
         means[0, k], means[1, k], means[2, k] = add_scaled((means[0, k], means[1, k], means[2, k]), share, state)
@@ -278,7 +320,7 @@ def merge_alike(x, w, P, distance):
         for i in range(n):
             k = group[i]
             d = x[0, i] - means[0, k], x[1, i] - means[1, k], x[2, i] - means[2, k]
-            wide_P = add_spread(wide_P, math.exp(w[i]) / mass, none, d)
+            wide_P = add_spread(wide_P, shares[i] / mass, none, d)
         for i in range(6):
             P[i] = wide_P[i]
     return means, np.log(totals[:count])
