@@ -64,6 +64,7 @@ class Asterix:
         self.sector_profile = Profile(2, ("030",))
         self.clock = formats_records.UnrolledClock(formats_records.DAY_S)
         self.tracks = {kind: TrackNames() for kind in (formats_records.PLOTS, formats_records.POSITIONS)}
+        self.joined_numbers = 0  # that were used again only as the clock was set forward
         self.has_plots = False  # whether there are plots beside the truth
         self.recent_blocks: dict[bytes, None] = {}
         self.survey = survey_radars(path)
@@ -116,7 +117,7 @@ class Asterix:
                 consequence = "" if self.keep else tr("; in no track and no truth: --keep-marked keeps them there")
             if count:
                 lines.append(tr("records marked “{mark}”: {count}", mark=mark, count=count) + consequence)
-        if reused := sum(names.reused_numbers for names in self.tracks.values()):
+        if (reused := sum(names.reused_numbers for names in self.tracks.values()) - self.joined_numbers) > 0:
             lines.append(tr("track numbers given again to another aircraft, NUMBER-2 and so on: {count}", count=reused))
         if shared := sum(len(names.shared_codes) for names in self.tracks.values()):
             codes = term("Mode 3/A codes of several aircraft or of one seen again, ACODE-2 and so on: {count}")

@@ -214,7 +214,11 @@ class _Import:
         batches = [batch for batch in self._requested_batches() if batch.track]
         if not batches:
             return
-        batch, notes, self.disordered_count = row_order.sort_rows(row_order.join_batches(batches), self._positions)
+        batch = row_order.join_batches(batches)
+        track_count = len(set(batch.track))
+        batch, notes, self.disordered_count = row_order.sort_rows(batch, self._positions)
+        if isinstance(self.reader, Asterix):
+            self.reader.joined_numbers = track_count - len(set(batch.track))
         self.result.notes += notes
         batch = self._reachable_rows(batch)
         for first in range(0, len(batch.track), BATCH_ROWS):

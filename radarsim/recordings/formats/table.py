@@ -324,7 +324,8 @@ class Table:
             self.sensors[cells[self.sensor_index].strip()] += 1
         address_index = self.header.identities.get("address")
         address = "" if address_index is None else cells[address_index].strip().lower()
-        builder.add(name, address, row, tuple(cells[index].strip() for index in self.text_indices.values()))
+        texts = tuple(cells[index].strip() for index in self.text_indices.values()) if self.text_indices else ()
+        builder.add(name, address, row, texts)
 
     def _check_other_line(self, cells: list[str]) -> None:
         """Count a comment; any other line that is no row of the table is a fault, unless it is the last."""

@@ -251,7 +251,9 @@ def asterix(times):
 @pytest.mark.parametrize("size_s", [5, 18, 3600, -18, -3600])
 def test_every_format_has_clocks(tmp_path, write, size_s):
     times = set_back([50_000 + 5 * k for k in range(N)], size_s)
-    done, columns, _ = imported(tmp_path, write(times), AT)
+    done, columns, tracks = imported(tmp_path, write(times), AT)
+    assert len(set(tracks)) == 1  # though a radar gives a number to another aircraft after a minute
+    assert not any("to another aircraft" in note for note in done.notes)
     np.testing.assert_array_equal(columns["t_s"], 5.0 * np.arange(N))
     expected = {
         3600: "times fall by an hour",
