@@ -82,6 +82,8 @@ def _estimates_in_table(path: Path, table: "pd.DataFrame", case: Case) -> tuple[
         names = ", ".join(name for name, _ in plot_arrays.components)
         required = f"realisation, k or t_s, and of {names} those it estimates"
         raise ConfigError(f"{path}: must have the columns {required}; got {', '.join(map(str, table))}")
+    if not len(table):
+        raise ConfigError(f"{path}: has no rows")
     numbers = {name: _column_numbers(path, table, name) for name in ("realisation", scan_column, *columns)}
     K = len(plot_arrays.t_s)
     scan_values = np.arange(1, K + 1.0) if scan_column == "k" else plot_arrays.t_s

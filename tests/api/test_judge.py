@@ -661,6 +661,8 @@ def test_files_of_other_realisations_are_refused(estimates, tmp_path):
     assert refusal(tmp_path / "times.csv").endswith("t_s: must be one of the 15 scans of the plots, 0 … 140, got 1")
     rows.drop(columns="realisation").to_csv(tmp_path / "unnumbered.csv", index=False)
     assert "must have the columns realisation, k or t_s, and of r, Vr, ar" in refusal(tmp_path / "unnumbered.csv")
+    rows[:0].to_csv(tmp_path / "header.csv", index=False)
+    assert refusal(tmp_path / "header.csv").endswith("has no rows")
 
 
 def test_the_command_judges_a_file(estimates, tmp_path, monkeypatch):
