@@ -641,7 +641,7 @@ def test_files_of_other_realisations_are_refused(estimates, tmp_path):
         (tmp_path / name).write_bytes(b"")
         assert "cannot be read" in refusal(tmp_path / name)
     (tmp_path / "heading.csv").write_text("realisation,k,r\n")
-    assert refusal(tmp_path / "heading.csv").endswith("got float64 (0, 15, 1)")
+    assert refusal(tmp_path / "heading.csv").endswith("has no rows")
     few = said("covariances.npz", estimates=estimates, covariances=np.zeros((299, 15, 3, 3)))
     assert few == "mine: covariances must be of 300 realisations, as the estimates, got 299"
     for seed in ([1, 2], 2017.5, "one", np.nan):
@@ -661,8 +661,6 @@ def test_files_of_other_realisations_are_refused(estimates, tmp_path):
     assert refusal(tmp_path / "times.csv").endswith("t_s: must be one of the 15 scans of the plots, 0 … 140, got 1")
     rows.drop(columns="realisation").to_csv(tmp_path / "unnumbered.csv", index=False)
     assert "must have the columns realisation, k or t_s, and of r, Vr, ar" in refusal(tmp_path / "unnumbered.csv")
-    rows[:0].to_csv(tmp_path / "header.csv", index=False)
-    assert refusal(tmp_path / "header.csv").endswith("has no rows")
 
 
 def test_the_command_judges_a_file(estimates, tmp_path, monkeypatch):
