@@ -28,7 +28,13 @@ from types import MappingProxyType, ModuleType
 from typing import BinaryIO, NamedTuple, Self
 
 from radarsim.errors import ConfigError, StoreError
-from radarsim.system.private_files import create_readable_file, foreign_owner, make_readable_folder, write_private_file
+from radarsim.system.private_files import (
+    create_readable_file,
+    foreign_owner,
+    is_stale,
+    make_readable_folder,
+    write_private_file,
+)
 from radarsim.system.threads import mapping
 
 fcntl: ModuleType | None
@@ -40,7 +46,6 @@ except ImportError:  # not a POSIX system: nothing is locked
 WAIT_S, LOOK_S = 60.0, 0.02
 JOURNAL = ".replacing.json"
 MAX_THREADS = 8
-STALE_S = 600  # age from which a temporary file is one of a killed process
 
 
 def read(path: str | os.PathLike) -> bytes:
@@ -79,9 +84,10 @@ def replace_all(
                 _finish(folder)
                 for name in contents:
                     _refuse_special(folder / name)
-                    sweep(folder / name)
                 removed = [name for name in sorted({*stale(folder)} - {*contents}) if _is_inside(name)]
                 _replace(folder, Replacement(token, tuple(contents), tuple(removed)))
+                for name in contents:
+                    sweep(folder / name)
         finally:
             for name in contents:
                 temporary_path(folder / name, token).unlink(missing_ok=True)
@@ -154,7 +160,7 @@ def sweep(path: Path) -> None:
     """Remove temporary files for a path that a killed process left."""
     for temporary in path.parent.glob(f".{glob.escape(path.name)}.*.tmp"):
         with suppress(OSError):
-            if TEMPORARY.fullmatch(temporary.name) and time.time() - temporary.lstat().st_mtime > STALE_S:
+            if TEMPORARY.fullmatch(temporary.name) and is_stale(temporary):
                 temporary.unlink()
 
 

@@ -20,10 +20,18 @@ from typing import BinaryIO
 
 MAX_LINKS = 40  # symbolic links on the way to a file, as many as Linux follows
 ROOT_USER = 0
+STALE_S = 600  # by how much the files of a killed process are older than the last change in their folder
 
 
 class UntrustedFileError(PermissionError):
     """A file that another user could have made or changed; `strerror` says how."""
+
+
+def is_stale(temporary: Path) -> bool:
+    """Whether a temporary file is one that a killed process left. Raises OSError.
+
+    Only times of files are compared: another machine may write them, or our clock may have been set."""
+    return os.stat(temporary.parent).st_mtime - os.lstat(temporary).st_mtime > STALE_S
 
 
 def make_private_folder(path: str | os.PathLike) -> None:

@@ -113,12 +113,16 @@ def test_names_are_read_back_and_foreign_files_left_alone(tmp_path, blocks):
     assert (blocks / "notes.txt").read_text() == "mine"
 
 
-def test_temporary_files_of_a_killed_run_are_removed_once_they_are_old(tmp_path, blocks):
+@pytest.mark.parametrize("ahead_s", [0, 1e8])
+def test_temporary_files_of_a_killed_run_are_removed_once_they_are_old(tmp_path, blocks, monkeypatch, ahead_s):
+    """Old beside the other files: the clock may be ahead of theirs."""
+    now_s = time.time()
+    monkeypatch.setattr(time, "time", lambda: now_s + ahead_s)
     collect(WORK, 32, store=tmp_path)
     fresh, old = blocks / ".L00-9.sums.aa.tmp", blocks / ".L00-9.sums.bb.tmp"
     fresh.write_bytes(b"half")
     old.write_bytes(b"half")
-    os.utime(old, (time.time() - 3600,) * 2)
+    os.utime(old, (now_s - 3600,) * 2)
     collect(WORK, 64, store=tmp_path)
     assert fresh.exists()
     assert not old.exists()

@@ -16,11 +16,14 @@ import pytest
 from numba.core.registry import cpu_target
 from numba.core.typing import Context
 
-from radarsim.kernels import call_graph, compiler, numba_internals
+from radarsim.kernels import cache, call_graph, compiler, kalman_algebra, numba_internals, numba_options
 from radarsim.kernels.numba_internals import remembering_context
 
 SOURCES = Path(compiler.__file__).parent
-MACHINERY = "algebra.py", "cache.py", "call_graph.py", "compile.py", "numba_internals.py", "numba_options.py"
+MACHINERY = tuple(
+    f"{module.__name__.rpartition('.')[2]}.py"
+    for module in (kalman_algebra, cache, call_graph, compiler, numba_internals, numba_options)
+)
 
 
 def python(code, **environment):
@@ -44,9 +47,9 @@ def house(tmp_path):
     for name in MACHINERY:
         (kernels / name).write_text((SOURCES / name).read_text().replace("radarsim.kernels", "copied.kernels"))
     begin = "from copied.kernels"
-    (kernels / "helper.py").write_text(f"{begin}.compile import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
+    (kernels / "helper.py").write_text(f"{begin}.compiler import inline\n@inline\ndef grown(x):\n    return x + 1.0\n")
     (kernels / "user.py").write_text(
-        f"{begin}.compile import kernel\n{begin}.helper import grown\n@kernel\ndef use(x):\n    return grown(x)\n"
+        f"{begin}.compiler import kernel\n{begin}.helper import grown\n@kernel\ndef use(x):\n    return grown(x)\n"
     )
     return tmp_path
 

@@ -153,6 +153,14 @@ def test_an_archive_whose_writer_is_killed_at_any_step_is_the_old_or_the_new_one
     assert not seen[0]
 
 
+def test_files_are_replaced_where_the_clock_is_ahead_of_theirs(tmp_path, monkeypatch):
+    """The clock was set, or a server, whose clock is behind, keeps them."""
+    monkeypatch.setattr("time.time", lambda: 1e10)
+    for content in (b"old", b"new"):
+        atomic_files.replace_all(tmp_path, {"a": content, "b/c": content})
+        assert [(tmp_path / name).read_bytes() for name in ("a", "b/c")] == [content, content]
+
+
 def test_what_a_killed_process_left_is_removed_after_a_while(tmp_path):
     replace(tmp_path, OLD)
     old, fresh = tmp_path / f".curves.csv.{'a' * 32}.tmp", tmp_path / f".curves.csv.{'b' * 32}.tmp"

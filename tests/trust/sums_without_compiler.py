@@ -1,9 +1,11 @@
 """Sums of tiny runs of every kernel, as arrays in a file: `python -m tests.trust.sums_without_compiler OUT.npz`.
 
-With NUMBA_DISABLE_JIT=1 the kernels are plain Python; those on lanes then get NumPy floats, eight in an array, in place
-of the registers, and calculate by the same algebra. The names of the kernels that ran are kept beside the sums.
+With NUMBA_DISABLE_JIT=1 the kernels are plain Python; those on lanes then get arrays of eight floats in place of the
+registers (`tests.trust.plain_lanes`), and calculate by the same algebra. The names of the kernels that ran are kept
+beside the sums.
 """
 
+import ast
 import functools
 import importlib
 import os
@@ -14,93 +16,39 @@ from unittest import mock
 
 import numpy as np
 
+import radarsim
 from radarsim.kernels import compiler
 
-PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
-WIDTH = 8
-SIZES = {
-    "CHUNK": WIDTH,
-    "GROUPS": 1,
-    "EIGHTS": 1,
-}  # short chunks: a partial one is calculated whole, which takes its time here
-ran: set[str] = set()
-there: set[str] = set()
+PACKAGE = Path(radarsim.__file__).parent
+IS_PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+DECORATORS = "kernel", "careful_kernel", "summing_kernel", "kernel_part", "careful_part"
+# Short chunks: a partial one is calculated whole, which takes its time here.
+CHUNK_SIZES = {"CHUNK": 8, "GROUPS": 1, "EIGHTS": 1}
+kernels_that_ran: set[str] = set()
 
 
-class Pointer:
-    """A place in a flat array, as the kernels index it."""
-
-    def __init__(self, array, start=0):
-        self.array, self.start = array, start
-
-    def __getitem__(self, i):
-        return self.array[self.start + i]
-
-    def __setitem__(self, i, value):
-        self.array[self.start + i] = value
-
-    def row(self, r):
-        return slice(self.start + WIDTH * r, self.start + WIDTH * (r + 1))
+def kernels_of_source():
+    """All kernels and parts of the package, as `module.function`; one that a function makes has that before it."""
+    return {
+        f"{module_name(file)}.{name}"
+        for file in PACKAGE.rglob("*.py")
+        if "template" not in file.parts and "kernels.compiler" in (text := file.read_text())
+        for name in decorated_functions(ast.parse(text))
+    }
 
 
-def put(pointer, row, value):
-    pointer.array[pointer.row(row)] = value
+def module_name(file):
+    return ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts)
 
 
-def total(x):
-    x = np.broadcast_to(x, WIDTH)
-    while len(x) > 1:
-        x = x[: len(x) // 2] + x[len(x) // 2 :]
-    return x[0]
-
-
-def add_totals(pointer, number, *values):
-    for i, value in enumerate(values):
-        pointer[number + i] += total(value)
-
-
-def results(program, arrays):
-    """The results of all operations of a recorded program, eight numbers each, whose outputs are written."""
-    made = []
-    for op, *of in program.ops:
-        if op == "number":
-            made.append(np.full(WIDTH, of[0]))
-        elif op == "row":
-            made.append(arrays[of[0]].array[arrays[of[0]].row(of[1])].copy())
-        elif op == "plain":
-            made.append(np.full(WIDTH, arrays[of[0]][of[1]]))
-        else:
-            made.append(OPERATIONS[op](*(made[at] for at in of)))
-    for array, number, at in program.outputs:
-        put(arrays[array], number, made[at])
-    return made
-
-
-def added(program, arrays, held):
-    """The sums of a program with its results added."""
-    made = results(program, arrays)
-    return tuple(one + made[at] for one, at in zip(held, program.sums, strict=True))
-
-
-OPERATIONS = {"fadd": np.add, "fsub": np.subtract, "fmul": np.multiply, "fdiv": np.divide, "sqrt": np.sqrt}
-OPERATIONS |= {"where": np.where, ">": np.greater, "<": np.less}
-LANES = {
-    "emitted": lambda program: functools.partial(results, program),
-    "emitted_sums": lambda program: functools.partial(added, program),
-    "zeros": lambda count: lambda: (np.zeros(WIDTH),) * count,
-    "where_greater": lambda x, y, yes, no: np.where(x > y, yes, no),
-    "any_greater": lambda x, y: bool(np.any(x > y)),
-    "full": float,  # formulas are called by NumPy too, with arrays of other sizes
-    "root": np.sqrt,
-    "nearest": np.rint,
-    "power_of_two": lambda x: np.ldexp(1.0, x.astype(int)),
-    "total": total,
-    "add_totals": add_totals,
-    "address": lambda array: Pointer(array.reshape(-1)),
-    "row": lambda pointer, number: Pointer(pointer.array, pointer.start + WIDTH * number),
-    "get": lambda pointer, row: pointer.array[pointer.row(row)].copy(),
-    "put": put,
-}
+def decorated_functions(tree, prefix=""):
+    """The qualified names of functions that a decorator of the compiler compiles."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.FunctionDef):
+            names = {getattr(decorator, "id", getattr(decorator, "attr", "")) for decorator in node.decorator_list}
+            if names & set(DECORATORS):
+                yield prefix + node.name
+            yield from decorated_functions(node, f"{prefix}{node.name}.<locals>.")
 
 
 def record(argument):
@@ -124,47 +72,41 @@ class Records:
         return record(np.zeros(shape, dtype))
 
 
-def recorded(decorate):
-    """The decorator, of functions that note that they ran."""
+def run_plainly(function):
+    """The decorator in place of those of the compiler: the function as it is, which notes that it ran."""
+    name = f"{function.__module__}.{function.__qualname__}"
 
-    def noted(function):
-        name, made = f"{function.__module__}.{function.__name__}", decorate(function)
-        there.add(name)
+    @functools.wraps(function)
+    def noting(*arguments):
+        kernels_that_ran.add(name)
+        return function(*map(record, arguments))
 
-        @functools.wraps(function)
-        def noting(*arguments):
-            ran.add(name)
-            return made(*map(record, arguments))
-
-        return noting
-
-    return noted
+    return noting
 
 
-def uncompiled():
-    """Put the plain floats in place of the registers, before any kernel is imported."""
+def replace_compiler():
+    """Put arrays in place of the registers, before any kernel is imported."""
     np.seterr(over="ignore")  # words of random numbers overflow by design
-    for name in ("kernel", "part", "summing"):
-        setattr(compiler, name, recorded(getattr(compiler, name)))
-    from radarsim.kernels import lanes
+    replace_names(compiler, dict.fromkeys(DECORATORS, run_plainly))
+    from radarsim.kernels import lane_programs, lanes
+    from tests.trust import plain_lanes
 
-    for name in LANES.keys() & vars(lanes).keys():
-        setattr(lanes, name, LANES[name])
-    from radarsim.kernels import lane_programs  # which imports those of lanes
-
-    for name in LANES.keys() - vars(lanes).keys():
-        setattr(lane_programs, name, LANES[name])
-    package = Path(compiler.__file__).parents[1]
-    every = (*package.rglob("kernels/[a-z]*.py"), *package.rglob("kernels.py"))
-    for file in sorted(file for file in every if "template" not in file.parts):
-        name = ".".join(file.relative_to(package.parent).with_suffix("").parts)
+    replace_names(lanes, plain_lanes.LANES)
+    replace_names(lane_programs, plain_lanes.LANE_PROGRAMS)
+    modules_of_kernels = {name.partition(".<locals>")[0].rpartition(".")[0] for name in kernels_of_source()}
+    for name in sorted(modules_of_kernels):
         module = importlib.import_module(name)
         if hasattr(module, "np"):
             module.np = Records()
-        if not {"discriminator", "bursts"} & set(file.parts):
-            for constant, size in SIZES.items():
-                if hasattr(module, constant):
-                    setattr(module, constant, size)
+    for name, module in list(sys.modules.items()):
+        if name.startswith("radarsim.") and not {"discriminator", "bursts"} & set(name.split(".")):
+            replace_names(module, {name: size for name, size in CHUNK_SIZES.items() if hasattr(module, name)})
+
+
+def replace_names(module, replacements):
+    for name, value in replacements.items():
+        getattr(module, name)  # a name that is no longer there is one to replace here
+        setattr(module, name, value)
 
 
 BURST = {"carrier_hz": 10e9, "pulse_period_s": 1e-5, "pulse_length_s": 2e-6, "sampling_period_s": 1e-6, "pulses": 64}
@@ -232,6 +174,8 @@ RUNS = {
     "multimodel families": ("multimodel_families", SHORT, 8),
     "multimodel irregular": ("multimodel_irregular", SHORT, 8),
     "multimodel at prediction": ("multimodel_covariance", SWEPT, 8),
+    "plane": ("plane", ["scans=6"], 9),
+    "plane clutter": ("plane_clutter", ["scans=14", "sweep.radar.false_plots_per_km2=[0.3]"], 9),
     "discriminator on block sums": (DISCRIMINATOR | {"engine": "block_sums"}, [], 8),
     "discriminator shifted": (DISCRIMINATOR | SHIFTED | {"engine": "block_sums"}, [], 8),
     "discriminator demodulated": (DISCRIMINATOR | {"engine": "demodulated"}, [], 2),
@@ -244,16 +188,19 @@ RUNS = {
 ERRORS = {"linear with misses": 4, "sonar alike": 4, "sonar missed": 12, "multimodel irregular": 6}
 
 
-def words():
+def random_numbers():
     """Random numbers of every kind."""
     from radarsim.kernels import random
 
-    key, made = random.stream(3, "plain"), {}
+    key, arrays = random.stream(3, "plain"), {}
     for fill, size in ((random.fill_normal_pairs, 5), (random.fill_uniform_pairs, 5), (random.fill_normal_strip, 16)):
         a, b = np.empty(size), np.empty(size)
         fill(key, 10, 2, a, b)
-        made[fill.__name__] = np.stack([a, b])
-    return made
+        arrays[fill.__name__] = np.stack([a, b])
+    for fill in (random.fill_normal_rows, random.fill_uniform_rows):
+        arrays[fill.__name__] = np.empty((2, 7))
+        fill(key, np.arange(2, dtype=np.uint64), np.array([3, 4], np.uint64), arrays[fill.__name__])
+    return arrays
 
 
 class Work:
@@ -360,11 +307,8 @@ def tracks():
     from radarsim.kernels import second_order
     from radarsim.studies.ambiguous_doppler.kernels import realisations
     from radarsim.studies.ambiguous_doppler.recorded_plots import FoldedRecordedPlots
-    from radarsim.studies.error_law import ErrorLaw
     from radarsim.studies.multimodel import study as multimodel
     from radarsim.studies.multimodel import tracking as multimodel_tracking
-    from radarsim.studies.multimodel.recorded_plots import FlightRecordedPlots
-    from radarsim.studies.range_doppler import plot_likelihood
     from radarsim.studies.range_doppler import tracking as range_doppler_tracking
     from radarsim.studies.range_doppler.recorded_plots import RangeDopplerRecordedPlots
     from radarsim.studies.sonar.clutter import tracking as clutter_tracking
@@ -384,15 +328,6 @@ def tracks():
     folded = FoldedRecordedPlots().simulated(one.case, 3)
     made["folded plots"] = np.nan_to_num(folded["velocity_mps"])
     made["folds of one"] = np.nan_to_num(realisations.simulate_hypotheses(one.plan.world, one.plan.banks, 0)[1])
-    measured = {name: folded[name] for name in ("t_s", "range_m", "velocity_mps")}
-    for options in one.case.spec.filters:
-        if likelihood := FoldedRecordedPlots().likelihood(one.case, options.name, [measured]):
-            made[f"folded likelihood {options.name}"] = np.array([likelihood(likelihood.stated)])
-    one = work(*RUNS["linear"][:2])
-    likelihood = plot_likelihood.PlotLikelihood(one.case, None, [recorded])
-    made["linear likelihood"] = np.array(
-        [likelihood(likelihood.stated), likelihood(likelihood.stated, ErrorLaw(0.1, bias=0.5))]
-    )
     one = work(*RUNS["multimodel families"][:2])
     z, R, _ = multimodel.simulate_plots(one.plan, 0)
     made["multimodel plots"], made["multimodel covariances"] = z, R
@@ -403,16 +338,35 @@ def tracks():
     recorded = dict(zip(("t_s", "range_m", "elevation_rad", "azimuth_rad"), columns, strict=True))
     track = multimodel_tracking.track(one.case, recorded)
     made["multimodel track"] = np.nan_to_num(track.estimate)
-    likelihood = FlightRecordedPlots().likelihood(one.case, None, [recorded])
-    made["multimodel likelihood"] = np.array(
-        [likelihood(likelihood.stated), likelihood(likelihood.stated, ErrorLaw(0.1))]
-    )
     one = work(*RUNS["sonar clutter"][:2])
     recorded = clutter_tracking.simulated_plots(one.case)(3, 1).rows(0)
     made["clutter plots"] = np.stack([np.nan_to_num(recorded[name]) for name in ("t_s", "range_m", "bearing_rad")])
     measured = {name: recorded[name] for name in ("t_s", "range_m", "bearing_rad")}
     made["clutter track"] = np.nan_to_num(clutter_tracking.Tracker(one.case).feed(measured).estimate)
     return made
+
+
+def likelihoods():
+    """Likelihoods of recorded plots under every filter that has one, of the stated errors and of other laws."""
+    from radarsim.studies.error_law import BIAS, MANOEUVRES, OUTLIERS, ErrorLaw
+    from radarsim.studies.registry import study
+
+    arrays = {}
+    for run in ("linear", "folds missed", "multimodel families", "plane"):
+        config, overrides, _ = RUNS[run]
+        case = work(config, [*overrides, "scans=9"]).case
+        interface = study(case.study).recording_interface()
+        recorded = interface.simulated(case, 3)
+        names = next(names for names in interface.columns(case.spec) if recorded.keys() >= set(names))
+        for options in case.spec.filters:
+            if likelihood := interface.likelihood(case, options.name, [{name: recorded[name] for name in names}]):
+                explained = likelihood.explains
+                law = ErrorLaw(
+                    0.1 * (OUTLIERS in explained), 0.5 * (BIAS in explained), 0, 0.1 * (MANOEUVRES in explained)
+                )
+                values = [likelihood(likelihood.stated), likelihood(likelihood.stated, law)]
+                arrays[f"{run} {options.name}"] = np.array(values)
+    return arrays
 
 
 def alike():
@@ -475,8 +429,9 @@ def given():
 
 def numbers():
     """All arrays: {run/name: array}."""
-    made = {f"random/{name}": array for name, array in words().items()}
+    made = {f"random/{name}": array for name, array in random_numbers().items()}
     made |= {f"tracks/{name}": array for name, array in tracks().items()}
+    made |= {f"likelihoods/{name}": array for name, array in likelihoods().items()}
     made |= {f"patterns/{name}": array for name, array in alike().items()}
     made |= {f"matrices of {name}": array for name, array in matrices().items()}
     made |= {f"given gains/{name}": array for name, array in given().items()}
@@ -491,7 +446,7 @@ def numbers():
 
 
 if __name__ == "__main__":
-    if PLAIN:
-        uncompiled()
-    made = numbers()
-    np.savez(sys.argv[1], **made, ran=np.array(sorted(ran)), there=np.array(sorted(there)))
+    if IS_PLAIN:
+        replace_compiler()
+    arrays = numbers()
+    np.savez(sys.argv[1], **arrays, kernels_that_ran=np.array(sorted(kernels_that_ran)))

@@ -1,5 +1,6 @@
 """Compiled kernels against plain Python, kernel by kernel; this processor's machine code against the common one."""
 
+import inspect
 import os
 import subprocess
 import sys
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from radarsim.kernels import compiler, lane_programs, lanes
 from tests.tolerances import rounding
+from tests.trust import plain_lanes
 from tests.trust import sums_without_compiler as plain
 
 OPERATIONS = 100  # between a number that is drawn and one that is compared: steps of a filter, a sum over realisations
@@ -87,13 +90,31 @@ def assert_agree(one, other):
     assert_same_bursts(one, other)
 
 
+def functions_of(module):
+    """The public functions that a module defines."""
+    return {
+        name: function
+        for name, function in vars(module).items()
+        if inspect.isfunction(function) and function.__module__ == module.__name__ and not name.startswith("_")
+    }
+
+
+def test_all_that_only_a_compiler_understands_has_its_replacement():
+    """And each replacement is of a name that is there: the long test below is seldom run."""
+    assert {name for name, value in vars(lanes).items() if isinstance(value, type(lanes.get))} == set(plain_lanes.LANES)
+    assert set(functions_of(lane_programs)) == set(plain_lanes.LANE_PROGRAMS)
+    decorators = functions_of(compiler).items()
+    assert {name for name, function in decorators if [*inspect.signature(function).parameters] == ["function"]} == set(
+        plain.DECORATORS
+    )
+
+
 @pytest.mark.slow
 def test_every_kernel_in_plain_python(tmp_path):
     """Without compiler, registers replaced by plain floats: the same numbers but for fused multiply-adds."""
-    found = elsewhere(tmp_path / "plain.npz", NUMBA_DISABLE_JIT="1")
-    never = set(found.pop("there")) - set(found.pop("ran"))
-    assert never == set()
-    assert_agree(found, plain.numbers())
+    arrays = elsewhere(tmp_path / "plain.npz", NUMBA_DISABLE_JIT="1")
+    assert plain.kernels_of_source() - set(arrays.pop("kernels_that_ran")) == set()
+    assert_agree(arrays, plain.numbers())
 
 
 @pytest.mark.slow
@@ -101,5 +122,5 @@ def test_every_kernel_for_the_common_processor(tmp_path):
     """Compiled without this processor's wide registers and fused multiply-adds, in a cache of its own."""
     generic = {"NUMBA_CPU_NAME": "generic", "RADARSIM_CACHE_DIR": str(tmp_path / "cache")}
     found = elsewhere(tmp_path / "generic.npz", **generic)
-    assert_agree({name: array for name, array in found.items() if name not in ("ran", "there")}, plain.numbers())
+    assert_agree({name: array for name, array in found.items() if name != "kernels_that_ran"}, plain.numbers())
     assert any(path.is_file() for path in (tmp_path / "cache").glob("kernels-*/**/*"))

@@ -16,7 +16,6 @@ that differ have a folder of their own, and read nothing from those of others.""
 import os
 import re
 import stat
-import time
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -38,12 +37,12 @@ from radarsim.errors import StoreError
 from radarsim.system.private_files import (
     UntrustedFileError,
     entry_fault,
+    is_stale,
     make_private_folder,
     make_readable_folder,
     write_private_file,
 )
 
-STALE_S = 600  # age from which a temporary file is one of a killed run
 ATTEMPTS = 4  # at reading or writing what another program merges or removes at the same time
 
 
@@ -160,13 +159,12 @@ class Store:
     def sweep(self, durable: Collection[Node]) -> None:
         """Remove files of pieces contained in durable nodes, and temporary files of a killed run."""
         highest = max((node.level for node in durable), default=-1)
-        now = time.time()
         try:
             for name in os.listdir(self.path):
                 piece, path = piece_named(name), self.path / name
                 with suppress(FileNotFoundError):
                     merged = piece is not None and any(node in durable for node in piece.containing_nodes(highest))
-                    if merged or (name.endswith(".tmp") and now - path.stat().st_mtime > STALE_S):
+                    if merged or (name.endswith(".tmp") and is_stale(path)):
                         path.unlink()
         except FileNotFoundError:  # removed by `radarsim clean`: nothing is left to tidy
             return
