@@ -134,7 +134,7 @@ def test_sums_whose_holders_die_before_they_are_asked_for_are_computed_again(two
         os.kill(process, signal.SIGKILL)
     outcomes = []
     while not outcomes and time.monotonic() < end + 20:
-        outcomes = two.finished(1.0)
+        outcomes = two.take_outcomes(1.0)
     assert len(outcomes) == 1
 
 
