@@ -61,8 +61,8 @@ def test_an_edit_of_late_realisations_adopts_nothing_and_leaves_nothing(edited):
 @pytest.mark.slow
 def test_a_comment_in_a_kernel_begins_anew_and_a_sentence_does_not(edited):
     edited(FEW, out="comment")
-    assert edited(FEW, "kernels/linear.py", "# a comment\n", out="comment")[0] == FEW
-    assert edited(FEW, "studies/range_doppler/words.py", "# a comment\n", out="comment")[0] == 0
+    assert edited(FEW, "kernels/second_order.py", "# a comment\n", out="comment")[0] == FEW
+    assert edited(FEW, "studies/range_doppler/answer.py", "# a comment\n", out="comment")[0] == 0
     assert edited(FEW, "report/tables.py", "# a comment\n", out="comment")[0] == 0
 
 
