@@ -17,12 +17,13 @@ from tests.trust import sums_without_compiler as plain
 
 OPERATIONS = 100  # between a number that is drawn and one that is compared: steps of a filter, a sum over realisations
 AGREED = rounding(50, OPERATIONS)  # κ of a plot's covariance, see `plain.EVEN`, and of designed filters: 1.1·10⁻¹²
-# Runs that multiply rounding more. Covariances of each realisation's own, from a start of κ near 10⁴; weights of
+# Runs that multiply rounding more. Covariances of each realisation's own, from a start of κ near 10⁴ (in the plane:
+# of the first velocity, which is measured along the line of sight alone); weights of
 # hypotheses are exponentials of up to −50, which multiplies a relative error by 50. A likelihood begins with variances
 # of 10⁹ beside plots of 1 … 10⁴. eᵀP⁻¹e of a parabola extrapolated over the scans that all miss: κ of P is 6·10⁴ with
 # every plot before them and grows as more are missed at random.
 MISSING = "linear with misses", "linear, drawn flight"
-SOLVED = (*MISSING, "folds", "folds missed", "orders", "folds and orders", "tracks", "patterns")
+SOLVED = (*MISSING, "folds", "folds missed", "orders", "folds and orders", "tracks", "likelihoods", "patterns", "plane")
 OWN = dict.fromkeys((*SOLVED, "sonar missed/joint"), rounding(5e3, OPERATIONS))
 ROOT = Path(__file__).parents[2]
 MOMENTS = ("error", "error_all", "ahead")  # Σe, Σe², Σe³, Σe⁴ in the last axis
