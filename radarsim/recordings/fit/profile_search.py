@@ -104,7 +104,8 @@ class LikelihoodSearch:
             # Fewer rows may have been without the outliers of all: a share that is zero has no slope.
             start[: len(likelihood.stated)] = start_point[: len(likelihood.stated)]
             start = np.where(start_point > self.lowest, start_point, start)
-        start = self._coarse_start(start)
+        if not robust:
+            start = self._coarse_start(start)
         self.best, self.top = self.climb(start, None, ROUGH_TOLERANCE)
         # A second start far away: the likelihood of manoeuvre and plot errors may have two maxima.
         for climb_count, factor in enumerate((0.1, 10.0) if start_point is None else (), 1):
