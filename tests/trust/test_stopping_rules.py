@@ -191,7 +191,7 @@ def test_a_real_claim_at_the_border_is_refuted_in_few_runs_that_decide(monkeypat
     part = Part(("rls2",), "σ", "m", measure, expected, exact=unknown)
     evidence = type("Any", (Evidence,), {"case": lambda self, key: self.results[0]})
     own = PaperClaims([Claim("P9.1", "here", "said", (part,), config="rls2")], evidence, "nobody")
-    monkeypatch.setattr(type(study), "claims", lambda self: own)
+    monkeypatch.setattr(type(study), "claims", lambda self: own, raising=False)
     ended = [radarsim.run("rls2", realisations=64_000, seed=1 + seed, decide=True) for seed in range(runs)]
     verdicts = [one.tables["claims"]["class"].iloc[0] for one in ended]
     assert np.median([one.cases[0].count for one in ended]) == 64_000
