@@ -282,11 +282,17 @@ def put(typingctx, pointer, row, value):
 
 @inline
 def exponential(x):
-    """exp x for x from -700 to 700, to 3 units in the last place; below -700 as at -700. 2**n times the Taylor series
-    of exp on |r| <= ln 2 / 2, with ln 2 in two parts (Cody and Waite)."""
+    """exp x for x from -700 to 700, to 3 units in the last place; below -700 as at -700. 2**n exp r, with ln 2 in two
+    parts (Cody and Waite)."""
     x = where_greater(x, full(-700.0), x, full(-700.0))
     n = nearest(x * 1.4426950408889634)
     r = x - n * 0.693147180369123816 - n * 1.90821492927058770e-10
+    return exponential_series(r) * power_of_two(n)
+
+
+@inline
+def exponential_series(r):
+    """The Taylor series of exp on |r| <= ln 2 / 2, of numbers or lanes."""
     p = r * (1.0 / 479001600.0) + 1.0 / 39916800.0
     p = p * r + 1.0 / 3628800.0
     p = p * r + 1.0 / 362880.0
@@ -298,5 +304,4 @@ def exponential(x):
     p = p * r + 1.0 / 6.0
     p = p * r + 0.5
     p = p * r + 1.0
-    p = p * r + 1.0
-    return p * power_of_two(n)
+    return p * r + 1.0

@@ -20,6 +20,7 @@ from radarsim.kernels.kalman_algebra import (
     take_value,
     whiten,
 )
+from radarsim.kernels.lanes import exponential_series
 from radarsim.kernels.likelihood import FAR, LAW_COUNT, LOG_DENSITY, MEAN, NEAR, OFFSET, SPREAD, VARIANCE, fill_laws
 
 FARTHEST = 9.0  # standard deviations of the velocity's innovation within which folds are tried
@@ -43,18 +44,7 @@ def take_exponentials(x):
         shifted = a * 1.4426950408889634 + SHIFT
         n = shifted - SHIFT
         r = a - n * 0.693147180369123816 - n * 1.90821492927058770e-10
-        p = r * (1.0 / 479001600.0) + 1.0 / 39916800.0
-        p = p * r + 1.0 / 3628800.0
-        p = p * r + 1.0 / 362880.0
-        p = p * r + 1.0 / 40320.0
-        p = p * r + 1.0 / 5040.0
-        p = p * r + 1.0 / 720.0
-        p = p * r + 1.0 / 120.0
-        p = p * r + 1.0 / 24.0
-        p = p * r + 1.0 / 6.0
-        p = p * r + 0.5
-        p = p * r + 1.0
-        x[i], powers[i] = p * r + 1.0, shifted
+        x[i], powers[i] = exponential_series(r), shifted
     for i in range(x.size):
         exponents[i] = (exponents[i] << 52) + (1023 << 52)  # the last bits of a shifted number are those of n
     for i in range(x.size):
