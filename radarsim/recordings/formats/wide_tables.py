@@ -26,23 +26,8 @@ WORD_PATTERNS = (
     re.compile(r"(?P<before>.+)[ _.\-]+(?P<label>[^\W\d]+)(?P<after>)"),
 )
 OTHER_WORDS = (  # that do not tell targets apart
-    *(
-        "min",
-        "max",
-        "mean",
-        "avg",
-        "median",
-        "std",
-        "sigma",
-        "rms",
-        "sd",
-        "var",
-        "err",
-        "error",
-        "bias",
-        "true",
-        "truth",
-    ),
+    *("min", "max", "mean", "avg", "median", "std", "sigma", "rms", "sd", "var", "err", "error", "bias"),
+    *("true", "truth"),
     *("raw", "rate", "slant", "ground", "horizontal", "corrected", "smoothed", "filtered", "predicted", "estimated"),
     *("gate", "bin", "cell", "m", "quality", "valid", "flag", "unit", "units", "last", "next", "start", "end", "own"),
 )
